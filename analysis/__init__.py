@@ -1,0 +1,1 @@
+"""Reading what came out of a test: votes to scores, recordings to physics."""

@@ -1,0 +1,16 @@
+"""Fixtures that several promises share."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+
+@pytest.fixture(scope="session")
+def shared_data() -> Path:
+    """Folder of real images, recordings and votes; tests that need it skip where it is absent."""
+    beside = Path(__file__).resolve().parents[2] / "shared" / "data"
+    folder = Path(os.environ.get("DSIS_SHARED_DATA", beside))
+    if not folder.is_dir():
+        pytest.skip(f"no real data: {folder} is absent (set DSIS_SHARED_DATA)")
+    return folder

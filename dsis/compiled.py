@@ -24,7 +24,10 @@ def kernel(function: F) -> F:
 
 
 def inlined(function: F) -> F:
-    """Compile a small function that kernels call; the compiler pastes it into their loops."""
+    """Compile a small function that kernels call; it is pasted into their loops.
+
+    It must stand in the file of the kernels that call it: the cache on disk follows that file only.
+    """
     compiled = numba.njit(nogil=True, error_model="numpy", fastmath=False, inline="always")(
         function
     )

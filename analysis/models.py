@@ -1,0 +1,153 @@
+"""Observer models: what a vote says about the sequence, and what about the observer."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from analysis.screening import BT500, Bt500Rule, _screen, moments
+from analysis.votes import Indexed, index_votes
+
+Z95 = 1.95996
+"""Normal quantile of a 95 % interval, to the digits that published results were made with."""
+
+ROUNDS_MAX = 1000
+CONVERGED = 1e-8  # change of the scores, root of the sum of squares, grades
+_FLOOR = 1e-8  # added to each observer's variance, grades^2: nobody's weight is infinite
+
+
+@dataclass(frozen=True)
+class BiasRemoved:
+    """Scores of P.913, 12.4.
+
+    Attributes
+    ----------
+    scores
+        `stimulus, n, score, se`: mean and standard error of the corrected votes of the observers
+        who pass; nan where nobody is left.
+    observers
+        `bias` beside the columns of `analysis.screen_bt500`.
+    """
+
+    scores: pd.DataFrame
+    observers: pd.DataFrame
+
+
+def p913(votes: pd.DataFrame, rule: Bt500Rule = BT500) -> BiasRemoved:
+    """Subtract each observer's bias, screen by BT.500 what remains, and average (P.913, 12.4).
+
+    The bias is the mean of (vote - mean of the stimulus) over the observer's votes.
+    """
+    scored = index_votes(votes)
+    __, mean, __ = moments(scored.stimulus, scored.vote, 1)
+    bias = _mean_per_observer(scored, scored.vote - mean[scored.stimulus])
+    corrected = scored.vote - bias[scored.observer]
+    observers = _screen(scored, corrected, rule).assign(bias=bias)
+    scores = scores_of(scored, corrected, observers["rejected"].to_numpy(dtype=np.bool_))
+    return BiasRemoved(scores, observers)
+
+
+def scores_of(
+    scored: Indexed, vote: NDArray[np.float64], rejected: NDArray[np.bool_]
+) -> pd.DataFrame:
+    """Return `stimulus, n, score, se` from the votes of the observers who are not rejected."""
+    stays = ~rejected[scored.observer]
+    table = scored.stimuli[["stimulus"]].assign(n=0, score=np.nan, se=np.nan)
+    if not stays.any():
+        return table
+    judged, group = np.unique(scored.stimulus[stays], return_inverse=True)
+    n, mean, sd = moments(group.reshape(-1), vote[stays], 1)
+    for name, values in (("n", n), ("score", mean), ("se", sd / np.sqrt(n))):
+        column = table[name].to_numpy(copy=True)
+        column[judged] = values
+        table[name] = column
+    return table
+
+
+@dataclass(frozen=True)
+class MaximumLikelihood:
+    """Scores of P.910, Annex E (P.913, 12.6).
+
+    Attributes
+    ----------
+    scores
+        `stimulus, score, se, ci_low, ci_high`.
+    observers
+        `lab, observer, n, bias, bias_ci_low, bias_ci_high, inconsistency, inconsistency_ci_low,
+        inconsistency_ci_high`.
+    rounds
+        Rounds of the alternating projection.
+    converged
+        False: it was stopped after `ROUNDS_MAX`.
+    """
+
+    scores: pd.DataFrame
+    observers: pd.DataFrame
+    rounds: int
+    converged: bool
+
+
+def p910(votes: pd.DataFrame) -> MaximumLikelihood:
+    """Fit vote = score + bias + inconsistency X, X ~ N(0, 1), by alternating projection.
+
+    Score by stimulus, weighted by 1 / inconsistency^2; bias and inconsistency by observer; the
+    biases have mean zero. An observer's interval follows from chi^2 with as many degrees of freedom
+    as he has votes; a score's from the spread of the residuals on that stimulus. Population sd
+    throughout, as in the programs whose results are published.
+    """
+    scored = index_votes(votes)
+    score, bias, rounds, converged = _project(scored)
+    residual = scored.vote - score[scored.stimulus] - bias[scored.observer]
+    spread = _spread_per_observer(scored, residual)
+    n, __, sd = moments(scored.stimulus, residual, 0)
+    se = sd / np.sqrt(n)
+    scores = scored.stimuli[["stimulus"]].assign(
+        score=score + bias.mean(),
+        se=se,
+        ci_low=score + bias.mean() - Z95 * se,
+        ci_high=score + bias.mean() + Z95 * se,
+    )
+    observers = _observers(scored, bias - bias.mean(), spread)
+    return MaximumLikelihood(scores, observers, rounds, converged)
+
+
+def _project(scored: Indexed) -> tuple[NDArray[np.float64], NDArray[np.float64], int, bool]:
+    """Return score (stimulus,), bias (observer,), the rounds made, and whether they sufficed."""
+    __, score, __ = moments(scored.stimulus, scored.vote, 1)
+    bias = _mean_per_observer(scored, scored.vote - score[scored.stimulus])
+    for rounds in range(1, ROUNDS_MAX + 1):
+        before = score
+        residual = scored.vote - score[scored.stimulus] - bias[scored.observer]
+        weight = (1 / (_spread_per_observer(scored, residual) ** 2 + _FLOOR))[scored.observer]
+        unbiased = scored.vote - bias[scored.observer]
+        score = scored.per_stimulus(weight * unbiased) / scored.per_stimulus(weight)
+        bias = _mean_per_observer(scored, scored.vote - score[scored.stimulus])
+        if np.linalg.norm(score - before) < CONVERGED:
+            return score, bias, rounds, True
+    return score, bias, ROUNDS_MAX, False
+
+
+def _mean_per_observer(scored: Indexed, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    return scored.per_observer(values) / np.bincount(scored.observer)
+
+
+def _spread_per_observer(scored: Indexed, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    return moments(scored.observer, values, 0)[2]
+
+
+def _observers(
+    scored: Indexed, bias: NDArray[np.float64], spread: NDArray[np.float64]
+) -> pd.DataFrame:
+    n = np.bincount(scored.observer)
+    half = Z95 * spread / np.sqrt(n)
+    return scored.observers[["lab", "observer"]].assign(
+        n=n,
+        bias=bias,
+        bias_ci_low=bias - half,
+        bias_ci_high=bias + half,
+        inconsistency=spread,
+        inconsistency_ci_low=spread * np.sqrt(n / chi2.ppf(0.975, n)),
+        inconsistency_ci_high=spread * np.sqrt(n / chi2.ppf(0.025, n)),
+    )

@@ -1,0 +1,125 @@
+"""Scores: mean opinion score with its interval, and the two tables that a test ends in."""
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from scipy.stats import t
+
+from analysis.models import p910, p913, scores_of
+from analysis.screening import moments, remove_outliers, screen_bt500, screen_correlation
+from analysis.table import Column, Kind
+from analysis.votes import COLUMNS, CONDITION, index_votes
+
+_VOTE = {column.name: column for column in COLUMNS}
+_SIMULATED = Column("simulated", Kind.FLAG, "", "true: simulated votes are among these")
+
+
+def _score(name: str, meaning: str) -> Column:
+    return Column(name, Kind.NUMBER, "grade", meaning)
+
+
+MOS_COLUMNS = (
+    *(_VOTE[name] for name in ("stimulus", *CONDITION)),
+    Column("n", Kind.WHOLE, "vote", "votes scored: valid, on test sequences"),
+    _score("mos", "mean of all scored votes"),
+    _score("sd", "sample standard deviation of all scored votes"),
+    _score("ci_low", "lower end of the 95 % interval of mos, Student t, n - 1"),
+    _score("ci_high", "upper end of the same"),
+    Column(
+        "n_removed", Kind.WHOLE, "vote", "votes further than 2 sd from mos, removed in one pass"
+    ),
+    _score("mos_trimmed", "mean of the votes kept"),
+    _score("sd_trimmed", "sample standard deviation of the votes kept"),
+    _score("ci_trimmed_low", "lower end of their nominal 95 % interval; too narrow"),
+    _score("ci_trimmed_high", "upper end of the same"),
+    _score("mos_bt500", "mean over the observers that BT.500's screening accepts"),
+    _score("mos_p913", "mean after bias removal (P.913, 12.4), then BT.500's screening"),
+    _score("score_p910", "maximum-likelihood score (P.910, Annex E)"),
+    _score("p910_ci_low", "lower end of its 95 % interval"),
+    _score("p910_ci_high", "upper end of the same"),
+    _SIMULATED,
+    Column("kind", Kind.TEXT, "", "test, or reference: a hidden reference"),
+)
+OBSERVER_COLUMNS = (
+    _VOTE["observer"],
+    Column("n", Kind.WHOLE, "vote", "votes scored"),
+    _score("bias", "how far above the others the observer votes (P.910)"),
+    _score("inconsistency", "sd of the observer's votes about score + bias (P.910)"),
+    Column("bt500_p", Kind.WHOLE, "vote", "votes far above the mean (BT.500)"),
+    Column("bt500_q", Kind.WHOLE, "vote", "votes far below the mean (BT.500)"),
+    Column("bt500_rejected", Kind.FLAG, "", "(p + q) / n > 0.05 and |p - q| / (p + q) < 0.3"),
+    Column("correlation", Kind.NUMBER, "", "smaller of Pearson's and Spearman's, votes with mos"),
+    Column("correlation_rejected", Kind.FLAG, "", "at most min(0.7, mean - sd over the observers)"),
+    _SIMULATED,
+    _VOTE["lab"],
+)
+
+
+def mos(votes: pd.DataFrame) -> pd.DataFrame:
+    """Return the mean opinion score of each stimulus with its 95 % interval.
+
+    mos +- t(0.975, n - 1) sd / sqrt(n), sd with n - 1; over valid votes of kind test or reference.
+    The interval may leave the scale; it is nan for a single vote and has no width where all agree.
+
+    Parameters
+    ----------
+    votes
+        Table of votes (`analysis.read_votes`).
+
+    Returns
+    -------
+    DataFrame
+        `stimulus, content, noise, demosaic, level, n, mos, sd, ci_low, ci_high`, sorted by content,
+        level, noise and demosaicking.
+    """
+    scored = index_votes(votes)
+    n, mean, sd = moments(scored.stimulus, scored.vote, 1)
+    half = _half_width(n, sd)
+    return scored.stimuli[["stimulus", *CONDITION]].assign(
+        n=n, mos=mean, sd=sd, ci_low=mean - half, ci_high=mean + half
+    )
+
+
+def _half_width(n: NDArray[np.int64], sd: NDArray[np.float64]) -> NDArray[np.float64]:
+    quantile = t.ppf(0.975, np.maximum(n - 1, 1))
+    return np.asarray(quantile * sd / np.sqrt(n), dtype=np.float64)
+
+
+def score_table(votes: pd.DataFrame) -> pd.DataFrame:
+    """Return one row a stimulus with all scores: the table `mos.csv`, columns `MOS_COLUMNS`."""
+    scored = index_votes(votes)
+    trimmed = mos(remove_outliers(votes).kept)
+    rejected = screen_bt500(votes)["rejected"].to_numpy(dtype=np.bool_)
+    likelihood = p910(votes).scores
+    table = mos(votes).assign(
+        n_removed=lambda raw: raw["n"] - trimmed["n"],
+        mos_trimmed=trimmed["mos"],
+        sd_trimmed=trimmed["sd"],
+        ci_trimmed_low=trimmed["ci_low"],
+        ci_trimmed_high=trimmed["ci_high"],
+        mos_bt500=scores_of(scored, scored.vote, rejected)["score"],
+        mos_p913=p913(votes).scores["score"],
+        score_p910=likelihood["score"],
+        p910_ci_low=likelihood["ci_low"],
+        p910_ci_high=likelihood["ci_high"],
+        simulated=scored.stimuli["simulated"],
+        kind=scored.stimuli["kind"],
+    )
+    return table[[column.name for column in MOS_COLUMNS]]
+
+
+def observer_table(votes: pd.DataFrame) -> pd.DataFrame:
+    """Return one row an observer: the table `observers.csv`, columns `OBSERVER_COLUMNS`."""
+    scored = index_votes(votes)
+    fitted = p910(votes).observers
+    kurtosis = screen_bt500(votes)
+    agreement = screen_correlation(votes)
+    table = fitted[["lab", "observer", "n", "bias", "inconsistency"]].assign(
+        bt500_p=kurtosis["p"],
+        bt500_q=kurtosis["q"],
+        bt500_rejected=kurtosis["rejected"],
+        correlation=agreement["correlation"],
+        correlation_rejected=agreement["rejected"],
+        simulated=scored.observers["simulated"],
+    )
+    return table[[column.name for column in OBSERVER_COLUMNS]]

@@ -1,0 +1,208 @@
+"""The table of votes: its columns, and which of its rows are scored.
+
+A table of votes is a data frame with one row a vote. Needed are `observer`, `stimulus` and `vote`;
+every other column of `COLUMNS` may be absent and then has its default everywhere.
+"""
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from analysis.table import DTYPES, Column, Kind
+from analysis.table import codebook as table_codebook
+from dsis.errors import InputError
+
+TABLE = "votes"  # what messages call a table that came from no file
+SCORED_KINDS = ("test", "reference")
+
+COLUMNS = (
+    Column("lab", Kind.TEXT, "", "laboratory; observers of two labs are two people", default=""),
+    Column("observer", Kind.TEXT, "", "pseudonym of the observer", required=True, filled=True),
+    Column("stimulus", Kind.TEXT, "", "name of the sequence judged", required=True, filled=True),
+    Column("content", Kind.TEXT, "", "what the sequence shows", default=""),
+    Column("noise", Kind.TEXT, "", "noise model: awgn, sd (signal-dependent) ...", default=""),
+    Column("demosaic", Kind.TEXT, "", "demosaicking, or none: never mosaicked", default=""),
+    Column("level", Kind.NUMBER, "stop", "stops of under-exposure"),
+    Column("session", Kind.TEXT, "", "viewing session", default=""),
+    Column("presentation", Kind.WHOLE, "", "place in the observer's order, from 1", least=1),
+    Column(
+        "repetition", Kind.WHOLE, "", "which showing to this observer, from 1", default=1, least=1
+    ),
+    Column("attempt", Kind.WHOLE, "", "from 1; more where a showing failed", default=1, least=1),
+    Column(
+        "valid",
+        Kind.FLAG,
+        "",
+        "false: shown with dropped frames and repeated later; never scored",
+        default=True,
+    ),
+    Column(
+        "kind",
+        Kind.TEXT,
+        "",
+        "test; reference: hidden reference; training, dummy: never scored",
+        default="test",
+        allowed=("test", "training", "dummy", "reference"),
+    ),
+    Column("vote", Kind.NUMBER, "grade", "the vote; blank: none was given", required=True),
+    Column("reaction_ms", Kind.NUMBER, "ms", "time from the end of the clip to the vote", least=0),
+    Column("voted_at", Kind.TIME, "", "local time of the vote, ISO 8601 with offset", default=""),
+    Column("dropped_frames", Kind.WHOLE, "frame", "frames that missed their refresh", least=0),
+    Column("simulated", Kind.FLAG, "", "true: the vote of a simulated observer", default=False),
+)
+CONDITION = ("content", "noise", "demosaic", "level")
+
+
+def codebook() -> list[dict[str, str]]:
+    """Return name, type, unit and description of each column of a table of votes."""
+    return table_codebook(COLUMNS)
+
+
+def complete(votes: pd.DataFrame) -> pd.DataFrame:
+    """Return the table with every column of `COLUMNS`, in their types; others stay as they are.
+
+    Raises
+    ------
+    InputError
+        A needed column is missing, or a column cannot be brought to its type.
+    """
+    whole = votes.copy()
+    for column in COLUMNS:
+        if column.name not in whole:
+            if column.required:
+                raise InputError.of(TABLE, column.name, "column is missing")
+            whole[column.name] = column.default
+        try:
+            whole[column.name] = whole[column.name].astype(DTYPES[column.kind])  # type: ignore[call-overload]  # the stubs want a literal
+        except (TypeError, ValueError) as error:
+            raise InputError.of(TABLE, column.name, str(error)) from None
+    return whole
+
+
+def scored(votes: pd.DataFrame) -> pd.DataFrame:
+    """Return the rows that are scored: valid, of kind test or reference, with a vote."""
+    whole = complete(votes)
+    return whole[whole["valid"] & whole["kind"].isin(SCORED_KINDS) & whole["vote"].notna()]
+
+
+def contradictions(votes: pd.DataFrame, low: float, high: float) -> Iterator[tuple[int, str, str]]:
+    """Yield (row, column, fact) for every row that contradicts the scale or another row.
+
+    Votes lie in `low`..`high`; among scored votes (lab, observer, stimulus, repetition) is unique,
+    and a stimulus has one content, noise, demosaicking, level and kind. `row` is the index.
+    """
+    outside = votes[(votes["vote"] < low) | (votes["vote"] > high)]
+    for row, vote in zip(outside.index, outside["vote"], strict=True):
+        yield row, "vote", f"is {vote:g}, must be from {low:g} to {high:g}"
+    counting = scored(votes)
+    key = ["lab", "observer", "stimulus", "repetition"]
+    again = counting[counting.duplicated(key)]
+    first = _first_rows(counting, key) if len(again) else {}
+    for row, values in zip(again.index, again[key].itertuples(index=False, name=None), strict=True):
+        shown = ", ".join(f"{n} {v}" for n, v in zip(key, values, strict=True) if v != "")
+        yield row, "observer", f"votes a second time ({shown}); first in row {first[values]}"
+    for name in (*CONDITION, "kind"):
+        yield from _changed(counting, name)
+
+
+def _first_rows(votes: pd.DataFrame, key: list[str]) -> dict[tuple[object, ...], int]:
+    first = votes.drop_duplicates(key)
+    return dict(zip(first[key].itertuples(index=False, name=None), first.index, strict=True))
+
+
+def _changed(votes: pd.DataFrame, name: str) -> Iterator[tuple[int, str, str]]:
+    codes = pd.factorize(votes[name])[0]
+    stimulus = pd.factorize(votes["stimulus"])[0]
+    __, first = np.unique(stimulus, return_index=True)
+    for at in np.flatnonzero(codes != codes[first][stimulus]):
+        origin = int(first[stimulus[at]])
+        here, there = _shown(votes[name].iloc[at]), _shown(votes[name].iloc[origin])
+        fact = (
+            f"of {votes['stimulus'].iloc[at]} is {here}, but {there} in row {votes.index[origin]}"
+        )
+        yield votes.index[at], name, fact
+
+
+def _shown(value: object) -> str:
+    return "blank" if value in ("", None) or value != value else str(value)  # noqa: PLR0124  nan
+
+
+@dataclass(frozen=True)
+class Indexed:
+    """Scored votes as index arrays, for what sums over observers or stimuli.
+
+    Attributes
+    ----------
+    table
+        The scored rows.
+    vote
+        float64 (vote,): grades.
+    stimulus, observer, presentation
+        intp (vote,): row of `stimuli`, row of `observers`, number of the (stimulus, repetition).
+    stimuli
+        `stimulus`, the condition, `kind`, `simulated` (any vote is), by content, level, noise,
+        demosaicking (none first) and name.
+    observers
+        `lab`, `observer`, `simulated`, by name.
+    """
+
+    table: pd.DataFrame
+    vote: NDArray[np.float64]
+    stimulus: NDArray[np.intp]
+    observer: NDArray[np.intp]
+    presentation: NDArray[np.intp]
+    stimuli: pd.DataFrame
+    observers: pd.DataFrame
+
+    def per_stimulus(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the sum of `values` (vote,) over each stimulus."""
+        return np.bincount(self.stimulus, values, len(self.stimuli)).astype(np.float64)
+
+    def per_observer(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the sum of `values` (vote,) over each observer."""
+        return np.bincount(self.observer, values, len(self.observers)).astype(np.float64)
+
+
+def index_votes(votes: pd.DataFrame) -> Indexed:
+    """Return the scored votes as index arrays; raise `InputError` where there are none."""
+    table = scored(votes)
+    if table.empty:
+        raise InputError.of(TABLE, "", "hold no valid vote on a test sequence")
+    order = ["content", "level", "noise", "mosaicked", "demosaic", "stimulus"]
+    stimuli = _groups(table, ["stimulus"], [*CONDITION, "kind"])
+    stimuli["mosaicked"] = stimuli["demosaic"] != "none"
+    stimuli = stimuli.sort_values(order, key=_natural, ignore_index=True)
+    observers = _groups(table, ["lab", "observer"], [])
+    observers = observers.sort_values(["lab", "observer"], key=_natural, ignore_index=True)
+    return Indexed(
+        table,
+        table["vote"].to_numpy(dtype=np.float64),
+        _places(table, stimuli, ["stimulus"]),
+        _places(table, observers, ["lab", "observer"]),
+        np.asarray(table.groupby(["stimulus", "repetition"]).ngroup(), dtype=np.intp),
+        stimuli.drop(columns="mosaicked"),
+        observers,
+    )
+
+
+def _groups(table: pd.DataFrame, key: list[str], first: list[str]) -> pd.DataFrame:
+    """Return one row per `key`: the first of each of `first`, and any of `simulated`."""
+    steps = dict.fromkeys(first, "first") | {"simulated": "any"}
+    return table.groupby(key).agg(steps).reset_index()
+
+
+def _places(table: pd.DataFrame, groups: pd.DataFrame, key: list[str]) -> NDArray[np.intp]:
+    """Return the row of `groups` that each row of `table` belongs to."""
+    index = pd.MultiIndex.from_frame(groups[key])
+    return index.get_indexer(pd.MultiIndex.from_frame(table[key])).astype(np.intp)
+
+
+def _natural(names: pd.Series) -> pd.Series:
+    """Pad the numbers in names, so that s2 sorts before s10; leave numbers as they are."""
+    if pd.api.types.is_numeric_dtype(names):
+        return names
+    return names.map(lambda name: re.sub("[0-9]+", lambda digits: digits[0].zfill(12), str(name)))

@@ -1,0 +1,172 @@
+"""Reading and writing `votes.csv`."""
+
+import csv
+import io
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from analysis.scale import describe_test
+from analysis.table import DTYPES, Column, to_csv
+from analysis.votes import COLUMNS, complete, contradictions
+from dsis.errors import Fault, InputError
+
+FAULTS_LISTED = 20
+_DELIMITERS = (",", ";", "\t")
+
+_Found = list[tuple[int, str, str]]  # row, column, what is wrong
+
+
+def read_votes(
+    path: str | os.PathLike[str], scale: tuple[float, float] | None = None
+) -> pd.DataFrame:
+    """Return the votes of a CSV file, with every column of `analysis.votes.COLUMNS`.
+
+    The file is UTF-8, with or without byte order mark; cells are parted by commas, semicolons or
+    tabs (the latter two may have decimal commas). Blanks around a cell are no part of it; blank
+    lines are passed over; a blank vote is a vote not given. Columns not known are kept as text.
+
+    Parameters
+    ----------
+    path
+        The file.
+    scale
+        Lowest and highest grade; None: as the `datapackage.json` beside the file says.
+
+    Returns
+    -------
+    DataFrame
+        One row a vote; the index, `row`, is the line in the file (the header is line 1).
+
+    Raises
+    ------
+    InputError
+        Not a table, a column missing, text for a number, a vote outside the scale, a second vote
+        with the same (lab, observer, stimulus, repetition), a stimulus under two conditions: every
+        row at once.
+    """
+    file = Path(path)
+    test = describe_test(file, scale)
+    delimiter, header, lines, rows = _cells(file)
+    found: _Found = []
+    columns: dict[str, pd.Series] = {}
+    for column, texts in zip(header, zip(*rows, strict=True), strict=True):
+        known = next((c for c in COLUMNS if c.name == column), None)
+        if known is None:
+            columns[column] = pd.Series(texts, lines, dtype="str")
+        else:
+            values, faults = _parse_column(known, texts, decimal_comma=delimiter != ",")
+            columns[column] = pd.Series(values, lines, dtype=DTYPES[known.kind])
+            found += [(lines[at], column, fact) for at, fact in faults]
+    votes = complete(pd.DataFrame(columns, index=pd.Index(lines, name="row")))
+    sound = votes.drop(index=list({row for row, _, _ in found}))
+    found += contradictions(sound, test.scale.low, test.scale.high)
+    if found:
+        raise InputError(_faults(str(path), found))
+    return votes
+
+
+def write_votes(votes: pd.DataFrame, path: str | os.PathLike[str]) -> None:
+    """Write votes as CSV, every column of `analysis.votes.COLUMNS` and then the others."""
+    Path(path).write_text(to_csv(complete(votes), COLUMNS), encoding="utf-8", newline="")
+
+
+def _cells(file: Path) -> tuple[str, list[str], list[int], list[list[str]]]:
+    """Return delimiter, header, the line each row starts on, and the stripped cells of each row."""
+    try:
+        text = file.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError:
+        raise InputError.of(file, "", "is not UTF-8 text (save it as CSV UTF-8)") from None
+    except OSError as error:
+        raise InputError.of(file, "", f"cannot be read: {error.strerror}") from None
+    delimiter = _delimiter(text)
+    reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter, strict=True)
+    lines: list[int] = []
+    rows: list[list[str]] = []
+    line = 1
+    try:
+        for row in reader:
+            cells = [cell.strip() for cell in row]
+            if any(cells):
+                rows.append(cells)
+                lines.append(line)
+            line = reader.line_num + 1
+    except csv.Error as error:
+        raise InputError.of(file, f"row {line}", f"is not CSV: {error}") from None
+    if not rows:
+        raise InputError.of(file, "", "is empty")
+    header = rows.pop(0)
+    _check_shape(file, header, lines.pop(0), lines, rows)
+    return delimiter, header, lines, rows
+
+
+def _delimiter(text: str) -> str:
+    """Return the delimiter whose header has the most cells that are known columns."""
+    header = next((line for line in text.splitlines() if line.strip()), "")
+    known = {column.name for column in COLUMNS}
+
+    def hits(delimiter: str) -> int:
+        return len(known & {cell.strip(' "') for cell in header.split(delimiter)})
+
+    return max(_DELIMITERS, key=hits)
+
+
+def _check_shape(
+    file: Path, header: list[str], at: int, lines: list[int], rows: list[list[str]]
+) -> None:
+    known = ", ".join(header)
+    found: _Found = [
+        (at, column.name, f"column is missing; found here: {known}")
+        for column in COLUMNS
+        if column.required and column.name not in header
+    ]
+    found += [
+        (at, name or "header", f"stands {header.count(name)} times" if name else "has no name")
+        for name in dict.fromkeys(header)
+        if not name or header.count(name) > 1
+    ]
+    if not found and not rows:
+        raise InputError.of(file, "", "holds a header and no votes")
+    found += [
+        (line, "", f"has {len(row)} cells, the header {len(header)}")
+        for line, row in zip(lines, rows, strict=True)
+        if len(row) != len(header)
+    ]
+    if found:
+        raise InputError(_faults(str(file), found))
+
+
+def _parse_column(
+    column: Column, texts: Sequence[str], *, decimal_comma: bool
+) -> tuple[list[object], list[tuple[int, str]]]:
+    """Return the values, and (place, what is wrong) of the cells that have none.
+
+    Each distinct text is parsed once: a column of votes has ten.
+    """
+    codes, distinct = pd.factorize(np.array(texts, dtype=object))
+    values: list[object] = []
+    wrong: dict[int, str] = {}
+    for code, text in enumerate(distinct):
+        try:
+            values.append(column.parse(str(text), decimal_comma=decimal_comma))
+        except ValueError as error:
+            values.append(column.default if not column.filled else "")
+            wrong[code] = str(error)
+    faults = [
+        (int(at), wrong[int(codes[at])]) for at in np.flatnonzero(np.isin(codes, list(wrong)))
+    ]
+    return [values[code] for code in codes], faults
+
+
+def _faults(file: str, found: _Found) -> list[Fault]:
+    """Return the first faults by row, and how many more there are."""
+    in_order = sorted(found)
+    listed = [
+        Fault(file, f"row {row}, {column}" if column else f"row {row}", fact)
+        for row, column, fact in in_order[:FAULTS_LISTED]
+    ]
+    more = len(in_order) - len(listed)
+    return [*listed, Fault(file, "", f"and {more} more faults")] if more else listed

@@ -1,0 +1,212 @@
+"""Counter-based random fields: a draw is a function of where it stands, never of what came before.
+
+Every number comes from Philox4x32-10 (Salmon et al., "Parallel random numbers: as easy as 1, 2, 3",
+SC 2011) of the counter (column group, row, frame, channel) under a key made of seed and purpose. So
+a crop of a field is the field of the crop, frames and rows may be computed in any order by any
+number of workers, and a new purpose leaves every other field as it was. Normal deviates are made by
+Box and Muller's transform with polynomials in plain float32 arithmetic, no fused operations: the
+same bytes wherever IEEE 754 holds. The largest deviate is 6.7.
+"""
+
+import hashlib
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsis.cfa import Cfa
+from dsis.compiled import inlined, kernel, over_rows
+from dsis.grid import PixelGrid
+
+_M0, _M1 = np.uint64(0xD2511F53), np.uint64(0xCD9E8D57)
+_W0, _W1 = np.uint64(0x9E3779B9), np.uint64(0xBB67AE85)
+_LOW, _HALF = np.uint64(0xFFFFFFFF), np.uint64(32)
+_ONE, _TWO, _THREE, _THIRTY = np.uint64(1), np.uint64(2), np.uint64(3), np.uint64(30)
+_EIGHTH_TURN = np.uint64(1 << 29)
+_TURN_TO_RADIANS = np.float32(2 * np.pi / 2**32)
+_EIGHT, _UNIT_24 = np.uint64(8), np.float32(2.0**-24)
+_F, _I = np.float32, np.int32
+_SQRT_HALF_BITS = np.int32(0x3F3504F3)
+_LN_2 = np.float32(np.log(2.0))
+
+
+@inlined
+def philox(c0, c1, c2, c3, k0, k1):  # type: ignore[no-untyped-def] # compiled per argument types
+    """Return the four 32-bit words of Philox4x32-10, each in a uint64."""
+    for _ in range(10):
+        p0 = _M0 * c0
+        p1 = _M1 * c2
+        c0, c1, c2, c3 = (p1 >> _HALF) ^ c1 ^ k0, p1 & _LOW, (p0 >> _HALF) ^ c3 ^ k1, p0 & _LOW
+        k0 = (k0 + _W0) & _LOW
+        k1 = (k1 + _W1) & _LOW
+    return c0, c1, c2, c3
+
+
+@inlined
+def log_of_uniform(word):  # type: ignore[no-untyped-def]
+    """Return ln of (word/2 + 1/2) / 2^31: Cephes' logf on mantissa and exponent, error 1e-7."""
+    x = np.float32(_I(word >> _ONE)) + _F(0.5)
+    bits = np.float32(x).view(np.int32)
+    exponent = (bits - _SQRT_HALF_BITS) >> _I(23)
+    m = np.int32(bits - (exponent << _I(23))).view(np.float32) - _F(1)
+    p = _F(7.0376836292e-2)
+    p = p * m + _F(-1.1514610310e-1)
+    p = p * m + _F(1.1676998740e-1)
+    p = p * m + _F(-1.2420140846e-1)
+    p = p * m + _F(1.4249322787e-1)
+    p = p * m + _F(-1.6668057665e-1)
+    p = p * m + _F(2.0000714765e-1)
+    p = p * m + _F(-2.4999993993e-1)
+    p = p * m + _F(3.3333331174e-1)
+    square = m * m
+    return m * square * p - _F(0.5) * square + m + _F(exponent - _I(31)) * _LN_2
+
+
+@inlined
+def box_muller(word_radius, word_angle):  # type: ignore[no-untyped-def]
+    """Return two independent standard normal deviates (float32) from two 32-bit words."""
+    radius = np.sqrt(max(_F(-2) * log_of_uniform(word_radius), _F(0)))
+    quadrant = (word_angle + _EIGHTH_TURN) >> _THIRTY
+    angle = _F(_I(np.uint32(word_angle - (quadrant << _THIRTY)))) * _TURN_TO_RADIANS
+    s = angle * angle
+    sine = _F(-1.9515295891e-4) * s + _F(8.3321608736e-3)
+    sine = (sine * s + _F(-1.6666654611e-1)) * s * angle + angle
+    cosine = _F(2.443315711809948e-5) * s + _F(-1.388731625493765e-3)
+    cosine = (cosine * s + _F(4.166664568298827e-2)) * s * s - _F(0.5) * s + _F(1)
+    quadrant = quadrant & _THREE
+    odd = (quadrant & _ONE) != np.uint64(0)
+    x = sine if odd else cosine
+    y = cosine if odd else sine
+    x = -x if (quadrant == _ONE or quadrant == _TWO) else x  # noqa: PLR1714 # no tuples in kernels
+    y = -y if quadrant >= _TWO else y
+    return radius * x, radius * y
+
+
+@inlined
+def _normal_lanes(lanes, groups, c0, c1, frame, channel, k0, k1):  # type: ignore[no-untyped-def]
+    """Fill lanes (4, groups) with normal deviates of the counters c0, c0 + 2, c0 + 4 ..."""
+    for g in range(groups):
+        a, b, c, d = philox(c0 + np.uint64(2 * g), c1, frame, channel, k0, k1)
+        lanes[0, g], lanes[1, g] = box_muller(a, b)
+        lanes[2, g], lanes[3, g] = box_muller(c, d)
+
+
+@inlined
+def _uniform_lanes(lanes, groups, c0, c1, frame, channel, k0, k1):  # type: ignore[no-untyped-def]
+    """Fill lanes (4, groups) with deviates uniform on (0, 1), multiples of 2^-25."""
+    for g in range(groups):
+        a, b, c, d = philox(c0 + np.uint64(2 * g), c1, frame, channel, k0, k1)
+        lanes[0, g] = (_F(_I(a >> _EIGHT)) + _F(0.5)) * _UNIT_24
+        lanes[1, g] = (_F(_I(b >> _EIGHT)) + _F(0.5)) * _UNIT_24
+        lanes[2, g] = (_F(_I(c >> _EIGHT)) + _F(0.5)) * _UNIT_24
+        lanes[3, g] = (_F(_I(d >> _EIGHT)) + _F(0.5)) * _UNIT_24
+
+
+@kernel
+def _fill(
+    out: NDArray[np.float32],
+    place: NDArray[np.int64],
+    channels: NDArray[np.uint8],
+    key: NDArray[np.uint64],
+    frame: np.uint64,
+    normal: bool,
+) -> None:
+    """Fill `out` (rows, columns, planes), whose first pixel is sensor pixel place = (row, column).
+
+    One call of the generator serves four columns of one parity, so that a mosaic, whose columns
+    alternate between two channels, wastes nothing.
+    """
+    rows, columns, planes = out.shape
+    first_group = place[1] // 8
+    groups = (place[1] + columns - 1) // 8 - first_group + 1
+    lanes = np.empty((4, groups), np.float32)
+    for row in range(rows):
+        sensor_row = place[0] + row
+        for parity in range(2):
+            for plane in range(planes):
+                channel = np.uint64(channels[sensor_row % 2, parity, plane])
+                c0, c1 = np.uint64(2 * first_group + parity), np.uint64(sensor_row)
+                if normal:
+                    _normal_lanes(lanes, groups, c0, c1, frame, channel, key[0], key[1])
+                else:
+                    _uniform_lanes(lanes, groups, c0, c1, frame, channel, key[0], key[1])
+                for lane in range(4):
+                    start = 8 * first_group + 2 * lane + parity - place[1]
+                    begin = 1 if start < 0 else 0
+                    end = min(groups, (columns - 1 - start) // 8 + 1)
+                    for g in range(begin, end):
+                        out[row, start + 8 * g, plane] = lanes[lane, g]
+
+
+@dataclass(frozen=True)
+class Draw:
+    """Random fields of one seed.
+
+    Attributes
+    ----------
+    seed
+        Any integer.
+    scope
+        Names that set one use of the seed apart from another (a content, a level).
+    """
+
+    seed: int
+    scope: tuple[str, ...] = ()
+
+    def within(self, *names: str) -> "Draw":
+        """Return the fields of a narrower scope: independent of these and of every other scope."""
+        return Draw(self.seed, (*self.scope, *names))
+
+    def normal(
+        self, purpose: str, grid: PixelGrid, frame: int = 0, threads: int = 1
+    ) -> NDArray[np.float32]:
+        """Return independent standard normal deviates on `grid`: float32, `grid.shape`."""
+        return self._field(purpose, grid, frame, threads, normal=True)
+
+    def uniform(
+        self, purpose: str, grid: PixelGrid, frame: int = 0, threads: int = 1
+    ) -> NDArray[np.float32]:
+        """Return independent deviates, uniform on (0, 1), on `grid`: float32, `grid.shape`."""
+        return self._field(purpose, grid, frame, threads, normal=False)
+
+    def rows(
+        self, purpose: str, grid: PixelGrid, frame: int = 0
+    ) -> NDArray[np.float32]:
+        """Return one standard normal deviate per sensor row of `grid`, common to all channels."""
+        line = PixelGrid(grid.rows, 1, Cfa.MONO, grid.first_row, 0)
+        return self.normal(purpose, line, frame)[:, 0]
+
+    def columns(
+        self, purpose: str, grid: PixelGrid, frame: int = 0
+    ) -> NDArray[np.float32]:
+        """Return one standard normal deviate per sensor column of `grid`, common to all channels."""
+        line = PixelGrid(1, grid.columns, Cfa.MONO, 0, grid.first_column)
+        return self.normal(purpose, line, frame)[0]
+
+    def normal_rows(
+        self, purpose: str, grid: PixelGrid, frame: int, first: int, last: int
+    ) -> NDArray[np.float32]:
+        """Return rows first..last-1 of `normal(purpose, grid, frame)`, for work in row blocks."""
+        block = PixelGrid(
+            last - first, grid.columns, grid.cfa, grid.first_row + first, grid.first_column
+        )
+        return self._field(purpose, block, frame, 1, normal=True)
+
+    def _field(
+        self, purpose: str, grid: PixelGrid, frame: int, threads: int, *, normal: bool
+    ) -> NDArray[np.float32]:
+        channels = grid.channels()
+        out = np.empty((grid.rows, grid.columns, channels.shape[2]), np.float32)
+        key = self._key(purpose)
+
+        def block(first: int, last: int) -> None:
+            place = np.array([grid.first_row + first, grid.first_column], np.int64)
+            _fill(out[first:last], place, channels, key, np.uint64(frame), normal)
+
+        over_rows(block, grid.rows, threads)
+        return out.reshape(grid.shape)
+
+    def _key(self, purpose: str) -> NDArray[np.uint64]:
+        name = "\x1f".join((str(self.seed), *self.scope, purpose)).encode()
+        words = np.frombuffer(hashlib.blake2b(name, digest_size=8).digest(), "<u4")
+        return words.astype(np.uint64)

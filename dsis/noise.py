@@ -1,0 +1,169 @@
+"""The paper's noise: equations (1) to (4). sigma there is a standard deviation.
+
+AWGN adds N(0, sigma) to a display image. Camera noise adds N(0, sqrt(m x + t)) to linear raw data,
+m and t piecewise constant in the clean signal x: one pair per read-out segment (dual gain has two).
+It is drawn as what it is made of: shot noise of variance m x and read noise of variance t, each
+from a field of its own, so that physics between the two finds its place in the chain.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsis.compiled import kernel, over_rows
+from dsis.draw import Draw
+from dsis.grid import PixelGrid
+
+
+@dataclass(frozen=True)
+class Segments:
+    """Variance of raw noise against the clean signal x, one entry per read-out segment, ascending.
+
+    Attributes
+    ----------
+    lower_dn
+        Where each segment begins, DN above black; the first is -inf.
+    slope_dn
+        m, DN.
+    intercept_dn2
+        t, DN^2. Where t < 0 (a black level estimated too low) shot noise carries it all.
+    """
+
+    lower_dn: NDArray[np.float32]
+    slope_dn: NDArray[np.float32]
+    intercept_dn2: NDArray[np.float32]
+
+    @classmethod
+    def of(cls, segments: Sequence[tuple[float, float, float]]) -> "Segments":
+        """Return segments from (lower_dn, slope_dn, intercept_dn2) in ascending order."""
+        lower, slope, intercept = np.asarray(segments, np.float32).T
+        return cls(lower, slope, intercept)
+
+    def index(self, signal_dn: NDArray[np.float32]) -> NDArray[np.intp]:
+        """Return the segment of each clean signal (DN above black)."""
+        found = np.searchsorted(self.lower_dn[1:], signal_dn, side="right")
+        return np.asarray(found, np.intp)
+
+    def variance_dn2(self, signal_dn: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Return m x + t of the clean signal x: DN^2. Shot and read noise each count from 0."""
+        i, zero = self.index(signal_dn), np.float32(0)
+        t = self.intercept_dn2[i]
+        shot = np.maximum(self.slope_dn[i] * signal_dn + np.minimum(t, zero), zero)
+        return shot + np.maximum(t, zero)
+
+
+def awgn(
+    image: NDArray[np.float32], sigma: float, draw: Draw, grid: PixelGrid, frame: int
+) -> NDArray[np.float32]:
+    """Return image + N(0, sigma), equation (4); `sigma` in the unit of `image` (`grid.shape`)."""
+    return image + np.float32(sigma) * draw.normal("awgn", grid, frame)
+
+
+def shot_noise(
+    expected_dn: NDArray[np.float32],
+    segments: Segments,
+    draw: Draw,
+    grid: PixelGrid,
+    frame: int,
+    threads: int = 1,
+) -> NDArray[np.float32]:
+    """Return the expected signal (DN above black, `grid.shape`) with shot noise of variance m x."""
+    out = np.empty_like(expected_dn)
+
+    def block(first: int, last: int) -> None:
+        deviates = draw.normal_rows("shot_noise", grid, frame, first, last)
+        _add_shot(
+            expected_dn[first:last].reshape(-1),
+            deviates.reshape(-1),
+            out[first:last].reshape(-1),
+            segments.lower_dn,
+            segments.slope_dn,
+            segments.intercept_dn2,
+        )
+
+    over_rows(block, grid.rows, threads)
+    return out
+
+
+def read_noise(
+    signal_dn: NDArray[np.float32],
+    expected_dn: NDArray[np.float32],
+    segments: Segments,
+    draw: Draw,
+    grid: PixelGrid,
+    frame: int,
+    threads: int = 1,
+) -> NDArray[np.float32]:
+    """Return `signal_dn` with read noise of variance t, segment chosen by the expected signal."""
+    out = np.empty_like(signal_dn)
+    sigma = np.sqrt(np.maximum(segments.intercept_dn2, np.float32(0)))
+
+    def block(first: int, last: int) -> None:
+        deviates = draw.normal_rows("read_noise", grid, frame, first, last)
+        _add_read(
+            signal_dn[first:last].reshape(-1),
+            expected_dn[first:last].reshape(-1),
+            deviates.reshape(-1),
+            out[first:last].reshape(-1),
+            segments.lower_dn,
+            sigma,
+        )
+
+    over_rows(block, grid.rows, threads)
+    return out
+
+
+def camera_noise(
+    clean_dn: NDArray[np.float32],
+    segments: Segments,
+    draw: Draw,
+    grid: PixelGrid,
+    frame: int,
+    threads: int = 1,
+) -> NDArray[np.float32]:
+    """Return x + N(0, sqrt(m x + t)) of the clean signal x: DN above black, `grid.shape`.
+
+    Neither rounded nor clipped: that is the converter's part (`dsis.camera`).
+    """
+    shot = shot_noise(clean_dn, segments, draw, grid, frame, threads)
+    return read_noise(shot, clean_dn, segments, draw, grid, frame, threads)
+
+
+@kernel
+def _add_shot(
+    expected: NDArray[np.float32],
+    deviates: NDArray[np.float32],
+    out: NDArray[np.float32],
+    lower: NDArray[np.float32],
+    slope: NDArray[np.float32],
+    intercept: NDArray[np.float32],
+) -> None:
+    zero = np.float32(0)
+    for i in range(expected.size):
+        x = expected[i]
+        m, t = slope[0], intercept[0]
+        for s in range(1, lower.size):
+            if x >= lower[s]:
+                m, t = slope[s], intercept[s]
+        # A negative intercept cannot be read noise: shot noise carries it.
+        out[i] = x + np.sqrt(max(m * x + min(t, zero), zero)) * deviates[i]
+
+
+@kernel
+def _add_read(
+    signal: NDArray[np.float32],
+    expected: NDArray[np.float32],
+    deviates: NDArray[np.float32],
+    out: NDArray[np.float32],
+    lower: NDArray[np.float32],
+    sigma: NDArray[np.float32],
+) -> None:
+    for i in range(signal.size):
+        x = expected[i]
+        s = sigma[0]
+        for k in range(1, lower.size):
+            if x >= lower[k]:
+                s = sigma[k]
+        out[i] = signal[i] + s * deviates[i]

@@ -1,13 +1,14 @@
 """Observer models: what a vote says about the sequence, and what about the observer."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from analysis.screening import BT500, Bt500Rule, _screen, moments
+from analysis.screening import BT500, Bt500Rule, judge, moments
 from analysis.votes import Indexed, index_votes
 
 Z95 = 1.95996
@@ -41,10 +42,10 @@ def p913(votes: pd.DataFrame, rule: Bt500Rule = BT500) -> BiasRemoved:
     The bias is the mean of (vote - mean of the stimulus) over the observer's votes.
     """
     scored = index_votes(votes)
-    __, mean, __ = moments(scored.stimulus, scored.vote, 1)
+    mean = moments(scored.stimulus, scored.vote, 1).mean
     bias = _mean_per_observer(scored, scored.vote - mean[scored.stimulus])
     corrected = scored.vote - bias[scored.observer]
-    observers = _screen(scored, corrected, rule).assign(bias=bias)
+    observers = judge(scored, corrected, rule).assign(bias=bias)
     scores = scores_of(scored, corrected, observers["rejected"].to_numpy(dtype=np.bool_))
     return BiasRemoved(scores, observers)
 
@@ -98,43 +99,44 @@ def p910(votes: pd.DataFrame) -> MaximumLikelihood:
     throughout, as in the programs whose results are published.
     """
     scored = index_votes(votes)
-    score, bias, rounds, converged = _project(scored)
+    score, bias, spread, rounds, converged = _project(scored)
     residual = scored.vote - score[scored.stimulus] - bias[scored.observer]
-    spread = _spread_per_observer(scored, residual)
-    n, __, sd = moments(scored.stimulus, residual, 0)
-    se = sd / np.sqrt(n)
+    around = moments(scored.stimulus, residual, 0)
+    se = around.sd / np.sqrt(around.n)
+    centred = score + bias.mean()
     scores = scored.stimuli[["stimulus"]].assign(
-        score=score + bias.mean(),
-        se=se,
-        ci_low=score + bias.mean() - Z95 * se,
-        ci_high=score + bias.mean() + Z95 * se,
+        score=centred, se=se, ci_low=centred - Z95 * se, ci_high=centred + Z95 * se
     )
     observers = _observers(scored, bias - bias.mean(), spread)
     return MaximumLikelihood(scores, observers, rounds, converged)
 
 
-def _project(scored: Indexed) -> tuple[NDArray[np.float64], NDArray[np.float64], int, bool]:
-    """Return score (stimulus,), bias (observer,), the rounds made, and whether they sufficed."""
-    __, score, __ = moments(scored.stimulus, scored.vote, 1)
+class _Projection(NamedTuple):
+    score: NDArray[np.float64]  # (stimulus,)
+    bias: NDArray[np.float64]  # (observer,)
+    spread: NDArray[np.float64]  # (observer,): the one that weighted `score`
+    rounds: int
+    converged: bool
+
+
+def _project(scored: Indexed) -> _Projection:
+    score = moments(scored.stimulus, scored.vote, 1).mean
     bias = _mean_per_observer(scored, scored.vote - score[scored.stimulus])
     for rounds in range(1, ROUNDS_MAX + 1):
         before = score
         residual = scored.vote - score[scored.stimulus] - bias[scored.observer]
-        weight = (1 / (_spread_per_observer(scored, residual) ** 2 + _FLOOR))[scored.observer]
+        spread = moments(scored.observer, residual, 0).sd
+        weight = (1 / (spread**2 + _FLOOR))[scored.observer]
         unbiased = scored.vote - bias[scored.observer]
         score = scored.per_stimulus(weight * unbiased) / scored.per_stimulus(weight)
         bias = _mean_per_observer(scored, scored.vote - score[scored.stimulus])
         if np.linalg.norm(score - before) < CONVERGED:
-            return score, bias, rounds, True
-    return score, bias, ROUNDS_MAX, False
+            return _Projection(score, bias, spread, rounds, converged=True)
+    return _Projection(score, bias, spread, ROUNDS_MAX, converged=False)
 
 
 def _mean_per_observer(scored: Indexed, values: NDArray[np.float64]) -> NDArray[np.float64]:
     return scored.per_observer(values) / np.bincount(scored.observer)
-
-
-def _spread_per_observer(scored: Indexed, values: NDArray[np.float64]) -> NDArray[np.float64]:
-    return moments(scored.observer, values, 0)[2]
 
 
 def _observers(

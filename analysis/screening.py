@@ -71,10 +71,16 @@ def remove_outliers(votes: pd.DataFrame, threshold: float = 2.0, ddof: int = 1) 
     return Removal(scored.table[~out], removed[[c.name for c in REMOVED_COLUMNS]])
 
 
-def moments(
-    group: NDArray[np.intp], values: NDArray[np.float64], ddof: int
-) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
-    """Return number, mean and sd of the `values` of each group 0, 1 ...; sd nan where n <= ddof.
+class Moments(NamedTuple):
+    """Number, mean and standard deviation by group, each (group,)."""
+
+    n: NDArray[np.int64]
+    mean: NDArray[np.float64]
+    sd: NDArray[np.float64]
+
+
+def moments(group: NDArray[np.intp], values: NDArray[np.float64], ddof: int) -> Moments:
+    """Return the moments of the `values` of each group 0, 1 ...; sd nan where n <= ddof.
 
     Values that are all equal have an sd of exactly zero, whatever rounding makes of their mean.
     """
@@ -85,9 +91,9 @@ def moments(
     np.minimum.at(lowest, group, values)
     np.maximum.at(highest, group, values)
     squares[lowest == highest] = 0.0
-    sd = np.full(len(n), np.nan)
-    np.divide(squares, n - ddof, out=sd, where=n > ddof)
-    return n, mean, np.sqrt(sd)
+    variance = np.full(len(n), np.nan)
+    np.divide(squares, n - ddof, out=variance, where=n > ddof)
+    return Moments(n.astype(np.int64), mean, np.sqrt(variance))
 
 
 @dataclass(frozen=True)
@@ -128,13 +134,14 @@ def screen_bt500(votes: pd.DataFrame, rule: Bt500Rule = BT500) -> pd.DataFrame:
         |p - q| / (p + q) (nan if p + q = 0), `rejected`, and `above`, `below`: the stimuli counted.
     """
     scored = index_votes(votes)
-    return _screen(scored, scored.vote, rule)
+    return judge(scored, scored.vote, rule)
 
 
-def _screen(scored: Indexed, vote: NDArray[np.float64], rule: Bt500Rule) -> pd.DataFrame:
+def judge(scored: Indexed, vote: NDArray[np.float64], rule: Bt500Rule) -> pd.DataFrame:
+    """Screen as `screen_bt500` does, by the values `vote` (vote,) in place of the votes."""
     above, below = _outside(scored.presentation, vote, rule)
-    p = scored.per_observer(above).astype(np.int64)
-    q = scored.per_observer(below).astype(np.int64)
+    p = np.bincount(scored.observer[above], minlength=len(scored.observers))
+    q = np.bincount(scored.observer[below], minlength=len(scored.observers))
     presentations = int(scored.presentation.max()) + 1
     cast = np.bincount(scored.observer)
     n = cast if rule.of_votes_cast else np.full_like(cast, presentations)
@@ -175,12 +182,14 @@ def _outside(
     )
 
 
-def _names(scored: Indexed, counted: NDArray[np.bool_]) -> list[tuple[str, ...]]:
-    names = scored.stimuli["stimulus"].to_numpy()
-    return [
-        tuple(str(name) for name in names[scored.stimulus[counted & (scored.observer == o)]])
-        for o in range(len(scored.observers))
-    ]
+def _names(scored: Indexed, counted: NDArray[np.bool_]) -> list[str]:
+    """Return for each observer the stimuli of the votes counted, in the order of the table."""
+    names: list[list[str]] = [[] for _ in range(len(scored.observers))]
+    for stimulus, observer in zip(
+        scored.table["stimulus"][counted], scored.observer[counted], strict=True
+    ):
+        names[observer].append(stimulus)
+    return ["; ".join(of_one) for of_one in names]
 
 
 def screen_correlation(votes: pd.DataFrame, limit: float = 0.7) -> pd.DataFrame:
@@ -196,8 +205,7 @@ def screen_correlation(votes: pd.DataFrame, limit: float = 0.7) -> pd.DataFrame:
         `lab, observer, pearson, spearman, correlation, threshold, rejected`.
     """
     scored = index_votes(votes)
-    __, mean, __ = moments(scored.stimulus, scored.vote, 1)
-    expected = mean[scored.stimulus]
+    expected = moments(scored.stimulus, scored.vote, 1).mean[scored.stimulus]
     order = np.argsort(scored.observer, kind="stable")
     cuts = np.cumsum(np.bincount(scored.observer))[:-1]
     pairs = zip(np.split(scored.vote[order], cuts), np.split(expected[order], cuts), strict=True)

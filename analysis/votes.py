@@ -118,7 +118,7 @@ def _changed(votes: pd.DataFrame, name: str) -> Iterator[tuple[int, str, str]]:
     codes = pd.factorize(votes[name])[0]
     stimulus = pd.factorize(votes["stimulus"])[0]
     __, first = np.unique(stimulus, return_index=True)
-    for at in np.flatnonzero(codes != codes[first][stimulus]):
+    for at in np.flatnonzero(codes != codes[first][stimulus]).tolist():
         origin = int(first[stimulus[at]])
         here, there = _shown(votes[name].iloc[at]), _shown(votes[name].iloc[origin])
         fact = (
@@ -144,8 +144,8 @@ class Indexed:
     stimulus, observer, presentation
         intp (vote,): row of `stimuli`, row of `observers`, number of the (stimulus, repetition).
     stimuli
-        `stimulus`, the condition, `kind`, `simulated` (any vote is), by content, level, noise,
-        demosaicking (none first) and name.
+        `stimulus`, the condition, `kind`, `simulated` (any vote is), by content (hidden references
+        last), level, noise, demosaicking (none first) and name.
     observers
         `lab`, `observer`, `simulated`, by name.
     """
@@ -172,8 +172,9 @@ def index_votes(votes: pd.DataFrame) -> Indexed:
     table = scored(votes)
     if table.empty:
         raise InputError.of(TABLE, "", "hold no valid vote on a test sequence")
-    order = ["content", "level", "noise", "mosaicked", "demosaic", "stimulus"]
+    order = ["content", "hidden", "level", "noise", "mosaicked", "demosaic", "stimulus"]
     stimuli = _groups(table, ["stimulus"], [*CONDITION, "kind"])
+    stimuli["hidden"] = stimuli["kind"] == "reference"
     stimuli["mosaicked"] = stimuli["demosaic"] != "none"
     stimuli = stimuli.sort_values(order, key=_natural, ignore_index=True)
     observers = _groups(table, ["lab", "observer"], [])
@@ -184,7 +185,7 @@ def index_votes(votes: pd.DataFrame) -> Indexed:
         _places(table, stimuli, ["stimulus"]),
         _places(table, observers, ["lab", "observer"]),
         np.asarray(table.groupby(["stimulus", "repetition"]).ngroup(), dtype=np.intp),
-        stimuli.drop(columns="mosaicked"),
+        stimuli.drop(columns=["hidden", "mosaicked"]),
         observers,
     )
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from dsis.cfa import Cfa
+from dsis.color import white_balanced
 from dsis.draw import Draw
 from dsis.effects import Effect, Exposure, Image, Stage, any_effect
 from dsis.grid import PixelGrid
@@ -114,9 +115,12 @@ class Camera(Model):
 
         The white-balance gains multiply signal and noise, equation (2).
         """
-        gain = np.array(self.white_balance) / self._scene_gain()
-        matrix = np.linalg.inv(np.array(self.camera_from_scene)) * gain[np.newaxis, :]
-        return raw @ matrix.T.astype(np.float32)
+        return self.scene_light_of_balanced(white_balanced(raw, self.white_balance))
+
+    def scene_light_of_balanced(self, balanced: Image) -> Image:
+        """Return scene light of white-balanced signals (row, column, 3), demosaicked ones say."""
+        matrix = np.linalg.inv(np.array(self.camera_from_scene)) / self._scene_gain()
+        return balanced @ matrix.T.astype(np.float32)
 
     def expose(
         self,

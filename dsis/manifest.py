@@ -5,12 +5,13 @@ A manifest may also be written by hand, for clips made elsewhere: `schema`, `seq
 """
 
 import json
+from collections import Counter
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from dsis.errors import InputError
+from dsis.errors import Fault, InputError
 from dsis.model import Model, structure
 from dsis.spec import Sequence, Session
 from dsis.visibility import Viewing
@@ -50,7 +51,7 @@ class Quality(Model):
         The same before clipping to 0..255 and rounding.
     psnr_demosaicked_db
         As `psnr_db`, against the demosaicked noise-free frame.
-    visible_noise, visible_lightness, visible_chroma
+    visible_noise, visible_lightness, visible_colour
         Mean squared visible difference (S-CIELAB Delta E^2) over `visible_frames`, and its parts.
     """
 
@@ -60,7 +61,7 @@ class Quality(Model):
     visible_frames: tuple[int, ...] = ()
     visible_noise: float | None = None
     visible_lightness: float | None = None
-    visible_chroma: float | None = None
+    visible_colour: float | None = None
 
 
 class Clip(Model):
@@ -76,6 +77,8 @@ class Clip(Model):
         Stimulus that is shown as its reference; None for references themselves.
     noise, demosaic, level
         The condition; None where it does not apply.
+    awgn_sigma
+        Standard deviation of the white noise in 8-bit codes.
     """
 
     stimulus: str
@@ -85,13 +88,25 @@ class Clip(Model):
     noise: str | None = None
     demosaic: str | None = None
     level: int | None = None
-    sigma: float | None = None
+    awgn_sigma: float | None = None
     files: dict[str, ClipFiles]
     quality: Quality = Quality()
 
 
 class Manifest(Model):
-    """All stimuli of a test."""
+    """All stimuli of a test.
+
+    Attributes
+    ----------
+    spec
+        The spec as resolved, the camera model in full: builds the same bytes again.
+    awgn_sigma
+        The solved standard deviations of the white noise, 8-bit codes, by content and level.
+    remarks
+        What a reader of the results must know of the footage.
+    versions
+        Of dsis and of what the bytes depend on.
+    """
 
     schema_: Annotated[Literal["dsis-manifest/1"], Field(alias="schema")]
     title: str = ""
@@ -101,8 +116,7 @@ class Manifest(Model):
     clips: Annotated[tuple[Clip, ...], Field(min_length=1)]
     remarks: tuple[str, ...] = ()
     spec: dict[str, Any] | None = None
-    camera: dict[str, Any] | None = None
-    sources: dict[str, tuple[str, ...]] = {}
+    awgn_sigma: dict[str, dict[str, float]] = {}
     versions: dict[str, str] = {}
 
     def clip(self, stimulus: str) -> Clip:
@@ -137,10 +151,6 @@ def write_manifest(manifest: Manifest, folder: Path) -> None:
 
 
 def _check_references(manifest: Manifest, path: Path) -> None:
-    from collections import Counter
-
-    from dsis.errors import Fault
-
     faults = []
     names = Counter(clip.stimulus for clip in manifest.clips)
     roles = {clip.stimulus: clip.role for clip in manifest.clips}

@@ -5,7 +5,7 @@ import json
 import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeVar, get_args
+from typing import Annotated, Any, TypeVar, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 
@@ -71,65 +71,80 @@ def attempt(
 
 
 def _fault(kind: Any, item: Any, file: str, prefix: str) -> Fault:
-    location = tuple(part for part in item["loc"] if not _is_tag(part, item))
-    key = _path(prefix, location)
-    problem = item["type"]
-    value = item.get("input")
+    key, parent = _walk(kind, item["loc"], prefix)
+    problem, value, context = item["type"], item.get("input"), item.get("ctx", {})
     if problem == "extra_forbidden":
-        known = _known_keys(kind, location[:-1])
-        near = difflib.get_close_matches(str(location[-1]), known, 1)
+        known = _keys(parent)
+        near = difflib.get_close_matches(str(item["loc"][-1]), known, 1)
         hint = f"; did you mean {near[0]}?" if near else ""
-        return Fault(
-            file,
-            key,
-            f"unknown key{hint} Allowed here: {', '.join(known)}".replace("y Al", "y. Al"),
-        )
+        return Fault(file, key, f"unknown key{hint} (allowed here: {', '.join(known)})")
     if problem == "missing":
         return Fault(file, key, "is missing")
     if problem == "value_error":
-        return Fault(file, key, str(item["ctx"]["error"]))
+        return Fault(file, key, str(context["error"]))
+    if problem == "union_tag_invalid":
+        known = sorted(context["expected_tags"].replace("'", "").split(", "))
+        near = difflib.get_close_matches(context["tag"], known, 1)
+        hint = f" (did you mean {near[0]}?)" if near else ""
+        tag_key = context["discriminator"].strip("'")
+        fact = f"is {context['tag']!r}{hint}, must be one of: {', '.join(known)}"
+        return Fault(file, f"{key}.{tag_key}", fact)
+    if problem == "union_tag_not_found":
+        return Fault(file, f"{key}.{context['discriminator'].strip(chr(39))}", "is missing")
     fact = item["msg"][:1].lower() + item["msg"][1:]
     fact = fact.removeprefix("input should be ").removeprefix("value should be ")
-    shown = json.dumps(value, default=str)
+    shown = json.dumps(value, default=str, ensure_ascii=False)
     shown = shown if len(shown) <= 60 else shown[:57] + "..."
-    return Fault(file, key, f"is {shown}, must be {fact}" if fact != item["msg"] else fact)
+    return Fault(file, key, f"is {shown}, must be {fact}")
 
 
-def _is_tag(part: object, item: Any) -> bool:
-    """Pydantic puts the tag of a tagged union into the location: `effect.0.row_noise.sigma_dn`."""
-    del item
-    return isinstance(part, str) and part.startswith("tag:")
+def _walk(kind: Any, location: Sequence[object], prefix: str) -> tuple[str, Any]:
+    """Return the path of `location` as users write it, and the type that holds its last part.
 
-
-def _path(prefix: str, location: Sequence[object]) -> str:
-    path = prefix
+    Pydantic names the tag of a tagged union (`effect[0].row_noise.sigma_dn`); the file does not.
+    """
+    path, parent = prefix, kind
     for part in location:
+        parent = kind
         if isinstance(part, int):
             path += f"[{part}]"
-        else:
-            path += f".{part}" if path else str(part)
-    return path
+            kind = next((a for a in get_args(_bare(kind)) if a is not Ellipsis), None)
+            continue
+        member = _tagged(kind, str(part))
+        if member is not None:
+            kind = member
+            continue
+        path += f".{part}" if path else str(part)
+        kind = _fields(kind).get(str(part))
+    return path, parent
 
 
-def _known_keys(kind: Any, location: Sequence[object]) -> list[str]:
-    """Return the keys that the model at `location` inside `kind` allows."""
-    for part in location:
-        if isinstance(part, int):
-            kind = next((a for a in get_args(kind) if a is not Ellipsis), kind)
-        else:
-            kind = _field_type(kind, str(part))
-    fields = getattr(_model_of(kind), "model_fields", {})
-    return [field.alias or name for name, field in fields.items()]
+def _bare(kind: Any) -> Any:
+    """Return a type without `Annotated`."""
+    return _bare(get_args(kind)[0]) if get_origin(kind) is Annotated else kind
+
+
+def _tagged(kind: Any, tag: str) -> Any:
+    """Return the member of a union whose `kind` is `tag`, if `kind` is such a union."""
+    for member in get_args(_bare(kind)):
+        field = getattr(member, "model_fields", {}).get("kind")
+        if field is not None and field.default == tag:
+            return member
+    return None
 
 
 def _model_of(kind: Any) -> Any:
+    kind = _bare(kind)
     if isinstance(kind, type) and issubclass(kind, BaseModel):
         return kind
     return next((found for a in get_args(kind) if (found := _model_of(a)) is not None), None)
 
 
-def _field_type(kind: Any, name: str) -> Any:
-    for key, field in getattr(_model_of(kind), "model_fields", {}).items():
-        if name in (key, field.alias):
-            return field.annotation
-    return None
+def _fields(kind: Any) -> dict[str, Any]:
+    """Return the type of every key that the model `kind` allows, by its name in the file."""
+    fields = getattr(_model_of(kind), "model_fields", {})
+    return {field.alias or name: field.annotation for name, field in fields.items()}
+
+
+def _keys(kind: Any) -> list[str]:
+    return list(_fields(kind))

@@ -12,8 +12,8 @@ from dsis.compiled import kernel, over_rows
 from dsis.demosaic.borders import frame
 
 MARGIN = 1
-HALF = np.float32(0.5)
-QUARTER = np.float32(0.25)
+_HALF = np.float32(0.5)
+_QUARTER = np.float32(0.25)
 
 
 def bilinear(
@@ -52,7 +52,17 @@ def bilinear(
 
 
 @kernel
-def _rows(mosaic, rows, columns, red_row, red_column, out, first, last):
+def _rows(
+    mosaic: NDArray[np.float32],
+    rows: NDArray[np.int64],
+    columns: NDArray[np.int64],
+    red_row: int,
+    red_column: int,
+    out: NDArray[np.float32],
+    first: int,
+    last: int,
+) -> None:
+    """Demosaick rows first..last-1 with three rows of the mosaic at hand."""
     width = mosaic.shape[1]
     above = np.empty(width + 2 * MARGIN, np.float32)
     here = np.empty_like(above)
@@ -61,24 +71,28 @@ def _rows(mosaic, rows, columns, red_row, red_column, out, first, last):
     _load(mosaic, rows[first + 1], columns, here)
     for y in range(first, last):
         _load(mosaic, rows[y + 2], columns, below)
-        own = 2 * ((y + red_row) & 1)  # red in red rows, blue in blue rows
-        other = 2 - own
+        row_colour = 2 * ((y + red_row) & 1)  # red in red rows, blue in blue rows
         start = (y + red_row + red_column) & 1
         result = out[y]
         for x in range(start, width, 2):
             axial = (here[x] + here[x + 2]) + (above[x + 1] + below[x + 1])
             diagonal = (above[x] + below[x + 2]) + (above[x + 2] + below[x])
-            result[x, own] = here[x + 1]
-            result[x, 1] = QUARTER * axial
-            result[x, other] = QUARTER * diagonal
+            result[x, row_colour] = here[x + 1]
+            result[x, 1] = _QUARTER * axial
+            result[x, 2 - row_colour] = _QUARTER * diagonal
         for x in range(1 - start, width, 2):
-            result[x, own] = HALF * (here[x] + here[x + 2])
+            result[x, row_colour] = _HALF * (here[x] + here[x + 2])
             result[x, 1] = here[x + 1]
-            result[x, other] = HALF * (above[x + 1] + below[x + 1])
+            result[x, 2 - row_colour] = _HALF * (above[x + 1] + below[x + 1])
         above, here, below = here, below, above
 
 
 @kernel
-def _load(mosaic, row, columns, line):
+def _load(
+    mosaic: NDArray[np.float32],
+    row: int,
+    columns: NDArray[np.int64],
+    line: NDArray[np.float32],
+) -> None:
     for x in range(columns.size):
         line[x] = mosaic[row, columns[x]]

@@ -9,8 +9,11 @@ directions d, with e = G(d) + (C(0) - C(2d))/2 and the weight
 
 Red and blue minus green are then weighted means of the four diagonal, afterwards of the four axial
 neighbours, with the weight 1/(1 + |C(d) - C(-d)| + |M(0) - M(2d)| + |G(0) - G(d)|), M the mosaic.
-The 1 is one 8-bit code. The post-processing, not used in the paper that dsis extends, replaces
-green minus red and green minus blue by their medians and takes green from both.
+The 1 is one 8-bit code. Post-processing replaces green minus red and green minus blue by their
+medians and takes green from both; the matrix of the paper that dsis extends fits without it.
+
+Tiles are kept flat, so that a row is a step of `PITCH`, and indexed by unsigned integers, which
+spare the check for negative ones that would keep the compiler from vectorising.
 """
 
 import numpy as np
@@ -21,9 +24,10 @@ from dsis.compiled import inlined, kernel, over_rows
 from dsis.demosaic.borders import frame, full_scale_checked
 
 MARGIN = 5  # 3 green + 1 diagonal + 1 axial differences
-TILE_ROWS = 64 + 2 * MARGIN
-TILE_COLUMNS = 256
+ROWS = 64 + 2 * MARGIN  # of a tile
+PITCH = 256  # columns of a tile
 
+_U = np.uintp
 _ONE, _HALF = np.float32(1), np.float32(0.5)
 
 
@@ -84,69 +88,58 @@ def _rows(
     first: int,
     last: int,
 ) -> None:
-    shape = (TILE_ROWS, TILE_COLUMNS)
-    m, g, o = np.empty(shape, np.float32), np.empty(shape, np.float32), np.empty(shape, np.float32)
-    along, across = np.empty(TILE_COLUMNS, np.float32), np.empty(TILE_COLUMNS, np.float32)
-    for y in range(first, last, TILE_ROWS - 2 * MARGIN):
-        height = min(last - y + 2 * MARGIN, TILE_ROWS)
-        for x in range(0, mosaic.shape[1], TILE_COLUMNS - 2 * MARGIN):
-            width = min(mosaic.shape[1] - x + 2 * MARGIN, TILE_COLUMNS)
+    """Demosaick rows first..last-1 tile by tile."""
+    m, g = np.empty(ROWS * PITCH, np.float32), np.empty(ROWS * PITCH, np.float32)
+    other = np.empty(ROWS * PITCH, np.float32)
+    along, across = np.empty(ROWS * PITCH, np.float32), np.empty(ROWS * PITCH, np.float32)
+    for y in range(first, last, ROWS - 2 * MARGIN):
+        height = min(last - y + 2 * MARGIN, ROWS)
+        for x in range(0, mosaic.shape[1], PITCH - 2 * MARGIN):
+            width = min(mosaic.shape[1] - x + 2 * MARGIN, PITCH)
+            chroma = (y + x + red_row + red_column) & 1  # parity of red and blue in this tile
             for i in range(height):
                 for j in range(width):
-                    m[i, j] = mosaic[rows[y + i], columns[x + j]]
-            chroma = (y + x + red_row + red_column) & 1  # parity of red and blue in this tile
+                    m[_U(i * PITCH + j)] = mosaic[rows[y + i], columns[x + j]]
             for i in range(3, height - 3):
-                for j in range(3, width - 3):
-                    sum_h, weight_h = _green(m, code, i, j, 0, 1)
-                    sum_v, weight_v = _green(m, code, i, j, 1, 0)
-                    g[i, j] = (sum_h + sum_v) / (weight_h + weight_v)
+                for k in range(i * PITCH + 3, i * PITCH + width - 3):
+                    sum_h, weight_h = _green(m, code, k, 1, PITCH)
+                    sum_v, weight_v = _green(m, code, k, PITCH, 1)
+                    g[_U(k)] = (sum_h + sum_v) / (weight_h + weight_v)
                 for j in range(3 + ((i + chroma) & 1), width - 3, 2):
-                    g[i, j] = m[i, j]
+                    g[_U(i * PITCH + j)] = m[_U(i * PITCH + j)]
             for i in range(4, height - 4):
-                for j in range(4, width - 4):
-                    falling, weight_f = _difference(m, m, g, code, i, j, 1, 1)
-                    rising, weight_r = _difference(m, m, g, code, i, j, 1, -1)
-                    o[i, j] = g[i, j] + (falling + rising) / (weight_f + weight_r)
+                for k in range(i * PITCH + 4, i * PITCH + width - 4):
+                    sum_f, weight_f = _difference(m, m, g, code, k, PITCH + 1)
+                    sum_r, weight_r = _difference(m, m, g, code, k, PITCH - 1)
+                    other[_U(k)] = g[_U(k)] + (sum_f + sum_r) / (weight_f + weight_r)
             for i in range(5, height - 5):
-                for j in range(5, width - 5):
-                    sum_h, weight_h = _difference(m, m, g, code, i, j, 0, 1)
-                    sum_v, weight_v = _difference(o, m, g, code, i, j, 1, 0)
-                    along[j] = (sum_h + sum_v) / (weight_h + weight_v)
-                    sum_h, weight_h = _difference(o, m, g, code, i, j, 0, 1)
-                    sum_v, weight_v = _difference(m, m, g, code, i, j, 1, 0)
-                    across[j] = (sum_h + sum_v) / (weight_h + weight_v)
-                row = y + i - MARGIN
-                row_colour = 2 * ((row + red_row) & 1)  # red in red rows, blue in blue rows
-                start = 5 + ((i + chroma + 1) & 1)
-                for j in range(start, width - 5, 2):
-                    result = out[row, x + j - MARGIN]
-                    result[row_colour] = m[i, j]
-                    result[1] = g[i, j]
-                    result[2 - row_colour] = o[i, j]
-                for j in range(11 - start, width - 5, 2):
-                    result = out[row, x + j - MARGIN]
-                    result[row_colour] = m[i, j] + along[j]
-                    result[1] = m[i, j]
-                    result[2 - row_colour] = m[i, j] + across[j]
+                for k in range(i * PITCH + 5, i * PITCH + width - 5):
+                    sum_h, weight_h = _difference(m, m, g, code, k, 1)
+                    sum_v, weight_v = _difference(other, m, g, code, k, PITCH)
+                    along[_U(k)] = m[_U(k)] + (sum_h + sum_v) / (weight_h + weight_v)
+                for k in range(i * PITCH + 5, i * PITCH + width - 5):
+                    sum_h, weight_h = _difference(other, m, g, code, k, 1)
+                    sum_v, weight_v = _difference(m, m, g, code, k, PITCH)
+                    across[_U(k)] = m[_U(k)] + (sum_h + sum_v) / (weight_h + weight_v)
+            for i in range(height - 2 * MARGIN):
+                _write(m, g, other, along, across, i, width, red_row, red_column, y, x, out)
 
 
 @inlined
 def _green(
-    m: NDArray[np.float32], code: np.float32, i: int, j: int, di: int, dj: int
+    m: NDArray[np.float32], code: np.float32, k: int, step: int, side: int
 ) -> tuple[np.float32, np.float32]:
     """Return weighted sum and weight of the two estimates of green along one axis."""
-    here, ahead, behind = m[i, j], m[i + di, j + dj], m[i - di, j - dj]
-    second, back = m[i + 2 * di, j + 2 * dj], m[i - 2 * di, j - 2 * dj]
-    left, right = m[i - dj, j - di], m[i + dj, j + di]
+    here, ahead, behind = m[_U(k)], m[_U(k + step)], m[_U(k - step)]
+    second, back = m[_U(k + 2 * step)], m[_U(k - 2 * step)]
+    left, right = m[_U(k - side)], m[_U(k + side)]
     common = code + abs(behind - ahead)
-    side = abs(left - m[i - dj + 2 * di, j - di + 2 * dj])
-    side += abs(right - m[i + dj + 2 * di, j + di + 2 * dj])
-    edge = abs(ahead - m[i + 3 * di, j + 3 * dj]) + abs(here - second)
-    weight_ahead = _ONE / (common + edge + _HALF * side)
-    side = abs(left - m[i - dj - 2 * di, j - di - 2 * dj])
-    side += abs(right - m[i + dj - 2 * di, j + di - 2 * dj])
-    edge = abs(behind - m[i - 3 * di, j - 3 * dj]) + abs(here - back)
-    weight_behind = _ONE / (common + edge + _HALF * side)
+    edge = abs(ahead - m[_U(k + 3 * step)]) + abs(here - second)
+    aside = abs(left - m[_U(k - side + 2 * step)]) + abs(right - m[_U(k + side + 2 * step)])
+    weight_ahead = _ONE / (common + edge + _HALF * aside)
+    edge = abs(behind - m[_U(k - 3 * step)]) + abs(here - back)
+    aside = abs(left - m[_U(k - side - 2 * step)]) + abs(right - m[_U(k + side - 2 * step)])
+    weight_behind = _ONE / (common + edge + _HALF * aside)
     total = weight_ahead * (ahead + _HALF * (here - second))
     total += weight_behind * (behind + _HALF * (here - back))
     return total, weight_ahead + weight_behind
@@ -158,20 +151,50 @@ def _difference(
     m: NDArray[np.float32],
     g: NDArray[np.float32],
     code: np.float32,
-    i: int,
-    j: int,
-    di: int,
-    dj: int,
+    k: int,
+    step: int,
 ) -> tuple[np.float32, np.float32]:
     """Return weighted sum and weight of colour c minus green at the two neighbours on one axis."""
-    common = code + abs(c[i + di, j + dj] - c[i - di, j - dj])
-    edge = abs(m[i, j] - m[i + 2 * di, j + 2 * dj]) + abs(g[i, j] - g[i + di, j + dj])
+    ahead, behind = c[_U(k + step)], c[_U(k - step)]
+    green_ahead, green_behind = g[_U(k + step)], g[_U(k - step)]
+    common = code + abs(ahead - behind)
+    edge = abs(m[_U(k)] - m[_U(k + 2 * step)]) + abs(g[_U(k)] - green_ahead)
     weight_ahead = _ONE / (common + edge)
-    edge = abs(m[i, j] - m[i - 2 * di, j - 2 * dj]) + abs(g[i, j] - g[i - di, j - dj])
+    edge = abs(m[_U(k)] - m[_U(k - 2 * step)]) + abs(g[_U(k)] - green_behind)
     weight_behind = _ONE / (common + edge)
-    total = weight_ahead * (c[i + di, j + dj] - g[i + di, j + dj])
-    total += weight_behind * (c[i - di, j - dj] - g[i - di, j - dj])
+    total = weight_ahead * (ahead - green_ahead) + weight_behind * (behind - green_behind)
     return total, weight_ahead + weight_behind
+
+
+@inlined
+def _write(
+    m: NDArray[np.float32],
+    g: NDArray[np.float32],
+    other: NDArray[np.float32],
+    along: NDArray[np.float32],
+    across: NDArray[np.float32],
+    i: int,
+    width: int,
+    red_row: int,
+    red_column: int,
+    y: int,
+    x: int,
+    out: NDArray[np.float32],
+) -> None:
+    """Write row i of a tile: at red and blue sites, then at green ones."""
+    row_colour = 2 * ((y + i + red_row) & 1)  # red in red rows, blue in blue rows
+    start = (y + i + x + red_row + red_column) & 1
+    base = (i + MARGIN) * PITCH + MARGIN
+    for j in range(start, width - 2 * MARGIN, 2):
+        result = out[y + i, x + j]
+        result[row_colour] = m[_U(base + j)]
+        result[1] = g[_U(base + j)]
+        result[2 - row_colour] = other[_U(base + j)]
+    for j in range(1 - start, width - 2 * MARGIN, 2):
+        result = out[y + i, x + j]
+        result[row_colour] = along[_U(base + j)]
+        result[1] = m[_U(base + j)]
+        result[2 - row_colour] = across[_U(base + j)]
 
 
 @kernel

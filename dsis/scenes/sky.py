@@ -13,9 +13,10 @@ from dsis.scenes.view import View
 ROWS_AT_ONCE = 128
 SUN = np.array([0.80, 0.74, 0.64], np.float32)  # on a surface that faces it
 AMBIENT = np.array([0.13, 0.17, 0.24], np.float32)  # of the open sky on an upright surface
-_ZENITH = np.array([0.07, 0.17, 0.44], np.float32)
-_RIM = np.array([0.44, 0.55, 0.68], np.float32)  # at the horizon, and the colour of haze
-_HAZE_PER_M = np.array([0.7e-4, 0.9e-4, 1.2e-4], np.float32)
+_ZENITH = np.array([0.06, 0.19, 0.46], np.float32)
+_RIM = np.array([0.47, 0.58, 0.68], np.float32)  # at the horizon, and the colour of haze
+_HAZE_PER_M = np.array([0.9e-4, 1.1e-4, 1.4e-4], np.float32)
+_CLEAR_M = 1200.0  # the air thins out towards the eye, which is high up
 
 
 def sun_direction(azimuth: float, elevation: float) -> tuple[float, float, float]:
@@ -33,7 +34,8 @@ def clear(slope: Field) -> Field:
 
 def hazed(colour: Field, distance: Field, strength: float = 1.0) -> Field:
     """Return a colour (..., 3) seen through `distance` (...) metres of air."""
-    through = np.exp(-strength * _HAZE_PER_M * distance[..., None])
+    depth = distance * distance / (distance + np.float32(_CLEAR_M))
+    through = np.exp(-strength * _HAZE_PER_M * depth[..., None])
     seen: Field = _RIM + through * (colour - _RIM)
     return seen
 
@@ -61,11 +63,10 @@ def paint(view: View, texture: Texture, cover: float) -> None:
 
 def _clouds(sky: Field, azimuth: Field, slope: Field, texture: Texture, cover: float) -> None:
     """Blend heaps of cloud over `sky`: flatter and closer together towards the horizon."""
-    # A layer at constant height would smear into streaks at the horizon: bend it up like a dome.
-    height = np.float32(1.0) / (np.maximum(slope, 0) + np.float32(0.09))
-    u, v = azimuth * height * np.float32(0.75) + np.float32(3), height * np.float32(0.62)
-    body = texture.fractal(u, v, 6)
-    lit = body - texture.fractal(u - np.float32(0.10), v + np.float32(0.10), 4)
+    # A level layer of clouds would smear into streaks at the horizon: use a dome instead.
+    u, v = azimuth * np.float32(6.5) + np.float32(3), np.sqrt(np.maximum(slope, 0)) * np.float32(6)
+    body = texture.fractal(u, v, 7, 6.5 / 1000)
+    lit = body - texture.fractal(u - np.float32(0.12), v + np.float32(0.14), 4)
     bias = np.float32(0.62 - 0.9 * cover)
     cloud = step(body, bias, bias + 0.34) * step(slope, 0.004, 0.03)
     light = step(lit, -0.5, 0.55)[..., None]

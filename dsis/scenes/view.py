@@ -84,7 +84,9 @@ class View:
         under = self.image[first_row : first_row + rows, first_column : first_column + columns]
         under += cover[..., None] * (colour - under)
 
-    def facet(self, corners: Sequence[Point], azimuth: float, shade: Shade) -> None:
+    def facet(
+        self, corners: Sequence[Point], azimuth: float, shade: Shade, lowest_row: float = math.inf
+    ) -> None:
         """Paint a convex plane facet, edges covered by area, if it faces the eye.
 
         Parameters
@@ -94,44 +96,62 @@ class View:
             v axis is perpendicular to that, towards the other corners.
         azimuth
             Of the object, in radians: tells the turn of the cylinder.
+        lowest_row
+            What lies below this row is hidden by nearer things and need not be painted.
         shade
             Of (u, v, range) in metres and the widths of a pixel along u and v; gives the colour.
         """
-        origin = np.array(corners[0])
-        along, other = np.array(corners[1]) - origin, np.array(corners[-1]) - origin
-        along /= np.linalg.norm(along)
-        other -= along * (other @ along)
-        up = other / np.linalg.norm(other)
-        normal = np.cross(along, up)
-        level = float(normal @ (origin - (0, 0, self.eye_m)))
+        origin = (corners[0][0], corners[0][1], corners[0][2] - self.eye_m)
+        along = _unit(_minus(corners[1], corners[0]))
+        other = _minus(corners[-1], corners[0])
+        lean = _dot(other, along)
+        up = _unit(_minus(other, (lean * along[0], lean * along[1], lean * along[2])))
+        normal = (
+            along[1] * up[2] - along[2] * up[1],
+            along[2] * up[0] - along[0] * up[2],
+            along[0] * up[1] - along[1] * up[0],
+        )
+        level = _dot(normal, origin)
         if level > -1e-3:  # seen from behind or edge on
             return
         spots = [self.project(corner, azimuth) for corner in corners]
         c, r = zip(*spots, strict=True)
-        top, bottom, left, right = self.box(min(c) - 1, min(r) - 1, max(c) + 1, max(r) + 1)
+        top, bottom, left, right = self.box(min(c) - 1, min(r) - 1, max(c) + 1, min(max(r) + 1, lowest_row))
         if top >= bottom or left >= right:
             return
         az, slope = self.azimuths(left, right), self.slopes(top, bottom)
         sin, cos = np.sin(az), np.cos(az)
-        facing = float(normal[0]) * sin + float(normal[1]) * cos + float(normal[2]) * slope
-        distance = level / np.minimum(facing, -1e-4)
-        u = distance * (float(along[0]) * sin + float(along[1]) * cos + float(along[2]) * slope)
-        v = distance * (float(up[0]) * sin + float(up[1]) * cos + float(up[2]) * slope)
-        start = origin - (0, 0, self.eye_m)
-        u -= float(along @ start)
-        v -= float(up @ start)
-        colour = shade(u, v, distance, *_footprint(u, v))
+
+        def rise(axis: Point) -> Field:
+            seen: Field = np.float32(axis[0]) * sin + np.float32(axis[1]) * cos
+            return seen + np.float32(axis[2]) * slope if axis[2] else seen
+
+        distance = level / np.minimum(rise(normal), np.float32(-1e-4))
+        u = distance * rise(along) - np.float32(_dot(along, origin))
+        v = distance * rise(up) - np.float32(_dot(up, origin))
+        colour = shade(u, v, distance, _footprint(u), _footprint(v))
         self.blend(top, left, colour, _cover(spots, top, bottom, left, right))
 
 
-def _footprint(u: Field, v: Field) -> tuple[float, float]:
-    """Return the mean widths of a pixel along u and v."""
-    sizes = []
-    for axis in (u, v):
-        down = abs(float(axis[-1].mean() - axis[0].mean())) / max(axis.shape[0] - 1, 1)
-        across = abs(float(axis[:, -1].mean() - axis[:, 0].mean())) / max(axis.shape[1] - 1, 1)
-        sizes.append(down + across)
-    return sizes[0], sizes[1]
+def _minus(p: Point, q: Point) -> Point:
+    return p[0] - q[0], p[1] - q[1], p[2] - q[2]
+
+
+def _dot(p: Point, q: Point) -> float:
+    return p[0] * q[0] + p[1] * q[1] + p[2] * q[2]
+
+
+def _unit(p: Point) -> Point:
+    length = math.sqrt(_dot(p, p))
+    return p[0] / length, p[1] / length, p[2] / length
+
+
+def _footprint(axis: Field) -> float:
+    """Return the width of a pixel along a facet's axis, in the middle of the facet."""
+    rows, columns = axis.shape
+    down = axis[-1, columns // 2] - axis[0, columns // 2]
+    across = axis[rows // 2, -1] - axis[rows // 2, 0]
+    return float(abs(down)) / max(rows - 1, 1) + float(abs(across)) / max(columns - 1, 1)
 
 
 def _cover(

@@ -15,6 +15,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from numpy.typing import NDArray
 
 from analysis.scale import Scale
 
@@ -34,12 +35,13 @@ ROWS_PER_COLUMN = 60
 ROWS_NAMED = 3 * ROWS_PER_COLUMN
 NAME_LENGTH = 44
 
-STYLE = {
+STYLE: dict[Any, Any] = {
     "svg.hashsalt": "dsis",
     "svg.fonttype": "path",
     "font.family": "DejaVu Sans",  # comes with matplotlib: the same letters everywhere
     "font.size": 9.0,
     "text.color": INK,
+    "text.parse_math": False,  # a "$" in a name is a dollar sign
     "axes.edgecolor": "#888888",
     "axes.facecolor": "none",  # the mark of simulated votes lies behind
     "axes.labelcolor": INK,
@@ -88,7 +90,7 @@ def has_conditions(scores: pd.DataFrame) -> bool:
     """Return whether the test stimuli have noise and demosaicking, each combination once."""
     tests = scores[scores["kind"] == "test"]
     named = (tests["noise"] != "").all() and (tests["demosaic"] != "").all()
-    cells = tests[["content", "noise", "demosaic", "level"]]
+    cells = tests[["content", "noise", "demosaic", "level"]].fillna({"level": 0.0})
     return bool(named and len(tests) > 0 and not cells.duplicated().any())
 
 
@@ -181,7 +183,7 @@ def _draw_conditions(scores: pd.DataFrame, scale: Scale) -> Figure:
         )
         _draw_panel(axes, layout, tests[tests[layout.panels] == value], beside)
         if number > 1:
-            axes.set_title(_panel_title(layout.panels, value), loc="left")
+            axes.set_title(_value_name(layout.panels, value), loc="left")
     for axes in list(grid.flat)[number:]:
         axes.remove()
     for axes in grid[:, 0]:
@@ -190,8 +192,8 @@ def _draw_conditions(scores: pd.DataFrame, scale: Scale) -> Figure:
     return figure
 
 
-def _panel_title(panels: str, value: Any) -> str:
-    return _exposure(value) if panels == "level" else str(value)
+def _value_name(column: str, value: Any) -> str:
+    return _exposure(value) if column == "level" else str(value)
 
 
 def _exposure(level: float) -> str:
@@ -208,14 +210,14 @@ def _draw_panel(axes: Axes, layout: _Layout, tests: pd.DataFrame, references: pd
         x = np.array([layout.places.index(place) for place in rows["demosaic"]], dtype=float)
         x += (at - (len(series) - 1) / 2) * layout.step()
         colour, mark = _colour(layout, value)
-        axes.plot(x, rows["mos"], color=colour, ls=_dashes(noise), lw=1.4)
-        _marks(axes, x, rows, colour, mark, layout.step())
+        axes.plot(x, rows["mos"], color=colour, ls=_dashes(noise, layout), lw=1.4)
+        _marks(axes, x, rows, (colour, mark), layout.step())
     for at, row in enumerate(references.itertuples()):
         one = references.iloc[at : at + 1]
         known = layout.colours == "content" and row.content in layout.colour_values
         colour, mark = _colour(layout, row.content) if known else (GREY, "o")
         x = np.array([(at - (len(references) - 1) / 2) * layout.step()])
-        _marks(axes, x, one, colour, mark, layout.step())
+        _marks(axes, x, one, (colour, mark), layout.step())
     axes.set_xticks(range(len(layout.places)), [_place(p, layout) for p in layout.places])
     axes.tick_params(axis="x", length=0, labelbottom=True, labelsize=8.5)
     axes.set_xlim(-0.5, len(layout.places) - 0.5)
@@ -224,9 +226,10 @@ def _draw_panel(axes: Axes, layout: _Layout, tests: pd.DataFrame, references: pd
 
 
 def _marks(
-    axes: Axes, x: np.ndarray[Any, Any], rows: pd.DataFrame, colour: str, mark: str, step: float
+    axes: Axes, x: NDArray[np.float64], rows: pd.DataFrame, look: tuple[str, str], step: float
 ) -> None:
     """Full marks with intervals (all votes); hollow marks beside them (after the removal)."""
+    colour, mark = look
     bars = np.nan_to_num(np.stack([rows["mos"] - rows["ci_low"], rows["ci_high"] - rows["mos"]]))
     axes.errorbar(x, rows["mos"], bars, color=colour, fmt=mark, ms=5, lw=1.1, capsize=2.2, zorder=3)
     axes.plot(
@@ -246,9 +249,11 @@ def _colour(layout: _Layout, value: Any) -> tuple[str, str]:
     return COLOURS[at % MAX_COLOURS], MARKS[at % MAX_COLOURS]
 
 
-def _dashes(noise: str) -> Any:
-    # By name, so that a noise model looks alike in all figures of one test.
-    return DASHES.get(noise, MORE_DASHES[sum(noise.encode()) % len(MORE_DASHES)])
+def _dashes(noise: str, layout: _Layout) -> Any:
+    others = [name for name in layout.noises if name not in DASHES]
+    if noise in others:
+        return MORE_DASHES[others.index(noise) % len(MORE_DASHES)]
+    return DASHES[noise]
 
 
 def _place(place: str, layout: _Layout) -> str:
@@ -287,15 +292,18 @@ def _legend(figure: Figure, layout: _Layout, *, aside: bool) -> None:
     if len(layout.colour_values) > 1:
         for value in layout.colour_values:
             colour, mark = _colour(layout, value)
-            label = str(value) if layout.colours == "content" else _exposure(value)
+            label = _value_name(layout.colours, value)
+            label = f" {label}" if label.startswith("_") else label  # else left out of legends
             handles.append(Line2D([], [], color=colour, marker=mark, ls="", label=label))
     handles += [
-        Line2D([], [], color=INK, ls=_dashes(noise), lw=1.4, label=NOISES.get(noise, noise))
+        Line2D([], [], color=INK, ls=_dashes(noise, layout), lw=1.4, label=NOISES.get(noise, noise))
         for noise in layout.noises
     ]
     handles += _twins()
-    place = "outside right upper" if aside else "outside lower center"
-    figure.legend(handles=handles, loc=place, ncols=1 if aside else min(len(handles), 5))
+    if aside:
+        figure.legend(handles=handles, loc="outside right upper")
+    else:
+        figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), 5))
 
 
 def _twins() -> list[Line2D]:

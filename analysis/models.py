@@ -95,7 +95,7 @@ def p910(votes: pd.DataFrame) -> MaximumLikelihood:
 
     Score by stimulus, weighted by 1 / inconsistency^2; bias and inconsistency by observer; the
     biases have mean zero. An observer's interval follows from chi^2 with as many degrees of freedom
-    as he has votes; a score's from the spread of the residuals on that stimulus. Population sd
+    as there are votes; a score's from the spread of the residuals on that stimulus. Population sd
     throughout, as in the programs whose results are published.
     """
     scored = index_votes(votes)

@@ -121,7 +121,7 @@ SUREAL = Bt500Rule(ddof=0, skip_constant=False, of_votes_cast=False)
 
 
 def screen_bt500(votes: pd.DataFrame, rule: Bt500Rule = BT500) -> pd.DataFrame:
-    """Return for each observer whether BT.500's kurtosis method rejects him, and the numbers.
+    """Return for each observer whether BT.500's kurtosis method rejects them, and the numbers.
 
     For each presentation (stimulus and repetition) an observer's vote counts in `p` if it lies at
     least eps sd above the mean, in `q` if as far below; eps = 2 where the kurtosis is in 2..4, else
@@ -193,7 +193,7 @@ def _names(scored: Indexed, counted: NDArray[np.bool_]) -> list[str]:
 
 
 def screen_correlation(votes: pd.DataFrame, limit: float = 0.7) -> pd.DataFrame:
-    """Return for each observer how his votes correlate with the MOS, and whether that is too low.
+    """Return for each observer how the votes correlate with the MOS, and whether that is too low.
 
     `correlation` is the smaller of Pearson's and Spearman's (as in BT.1788). Rejected: it is at
     most min(`limit`, mean - sd over the observers). It is nan, and nobody is rejected by it, where

@@ -67,7 +67,14 @@ def attempt(
     try:
         return TypeAdapter(kind).validate_json(text, context=context), []
     except ValidationError as error:
-        return None, [_fault(kind, item, file, prefix) for item in error.errors()]
+        items = error.errors()
+        places = [item["loc"] for item in items]
+        return None, [
+            _fault(kind, item, file, prefix)
+            for item in items
+            # An array whose items are all at fault is not empty besides.
+            if item["type"] != "too_short" or sum(p[: len(item["loc"])] == item["loc"] for p in places) == 1
+        ]
 
 
 def _fault(kind: Any, item: Any, file: str, prefix: str) -> Fault:
@@ -91,6 +98,9 @@ def _fault(kind: Any, item: Any, file: str, prefix: str) -> Fault:
         return Fault(file, f"{key}.{tag_key}", fact)
     if problem == "union_tag_not_found":
         return Fault(file, f"{key}.{context['discriminator'].strip(chr(39))}", "is missing")
+    if problem in ("too_short", "too_long"):
+        bound = f"at least {context['min_length']}" if problem == "too_short" else f"at most {context['max_length']}"
+        return Fault(file, key, f"has {context['actual_length']} items, must have {bound}")
     fact = item["msg"][:1].lower() + item["msg"][1:]
     fact = fact.removeprefix("input should be ").removeprefix("value should be ")
     shown = json.dumps(value, default=str, ensure_ascii=False)

@@ -29,7 +29,7 @@ Noise = Literal["awgn", "sd"]
 
 NAME = re.compile(r"[A-Za-z0-9]+(?:[-_.]?[A-Za-z0-9]+)*")
 Globs = Annotated[
-    tuple[str, ...], BeforeValidator(lambda value: [value] if isinstance(value, str) else value)
+    tuple[str, ...], BeforeValidator(lambda globs: (globs,) if isinstance(globs, str) else tuple(globs))
 ]
 FILE_NAME_RULE = "letters, digits and single '-', '_' or '.' between them"
 

@@ -6,22 +6,19 @@ of the mosaic, as the bilinear one does. All take any Bayer phase and any size o
 reflect the mosaic at its borders, clip nothing, and give the same bytes for any number of threads.
 """
 
-from typing import Literal, get_args
-
 import numpy as np
 from numpy.typing import NDArray
 
 from dsis.cfa import Cfa
 from dsis.demosaic import bilinear, dlmmse, lu_tan
 
-Method = Literal["bilinear", "dlmmse", "lu_tan"]
-METHODS: tuple[Method, ...] = get_args(Method)
+METHODS = ("bilinear", "dlmmse", "lu_tan")
 
 
 def demosaic(
     mosaic: NDArray[np.float32],
     cfa: Cfa,
-    method: Method,
+    method: str,
     *,
     full_scale: float = 1.0,
     out: NDArray[np.float32] | None = None,

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from dsis.cfa import Cfa
 from dsis.compiled import kernel, over_rows
-from dsis.demosaic.borders import frame
+from dsis.demosaic.borders import Frame, frame
 
 MARGIN = 1
 _HALF = np.float32(0.5)
@@ -47,52 +47,39 @@ def bilinear(
         Where an argument is not as said above.
     """
     given = frame(mosaic, cfa, MARGIN, out)
-    over_rows(lambda first, last: _rows(*given, first, last), mosaic.shape[0], threads)
+    over_rows(lambda first, last: _rows(given, first, last), mosaic.shape[0], threads)
     return given.out
 
 
 @kernel
-def _rows(
-    mosaic: NDArray[np.float32],
-    rows: NDArray[np.int64],
-    columns: NDArray[np.int64],
-    red_row: int,
-    red_column: int,
-    out: NDArray[np.float32],
-    first: int,
-    last: int,
-) -> None:
+def _rows(given: Frame, first: int, last: int) -> None:
     """Demosaick rows first..last-1 with three rows of the mosaic at hand."""
-    width = mosaic.shape[1]
+    width = given.mosaic.shape[1]
     above = np.empty(width + 2 * MARGIN, np.float32)
-    here = np.empty_like(above)
-    below = np.empty_like(above)
-    _load(mosaic, rows[first], columns, above)
-    _load(mosaic, rows[first + 1], columns, here)
+    here, below = np.empty_like(above), np.empty_like(above)
+    _load(given, first - 1, above)
+    _load(given, first, here)
     for y in range(first, last):
-        _load(mosaic, rows[y + 2], columns, below)
-        row_colour = 2 * ((y + red_row) & 1)  # red in red rows, blue in blue rows
-        start = (y + red_row + red_column) & 1
-        result = out[y]
+        _load(given, y + 1, below)
+        row_colour = 2 * ((y + given.red_row) & 1)  # red in red rows, blue in blue rows
+        start = (y + given.red_row + given.red_column) & 1
+        line = given.out[y]
         for x in range(start, width, 2):
             axial = (here[x] + here[x + 2]) + (above[x + 1] + below[x + 1])
             diagonal = (above[x] + below[x + 2]) + (above[x + 2] + below[x])
-            result[x, row_colour] = here[x + 1]
-            result[x, 1] = _QUARTER * axial
-            result[x, 2 - row_colour] = _QUARTER * diagonal
+            line[x, row_colour] = here[x + 1]
+            line[x, 1] = _QUARTER * axial
+            line[x, 2 - row_colour] = _QUARTER * diagonal
         for x in range(1 - start, width, 2):
-            result[x, row_colour] = _HALF * (here[x] + here[x + 2])
-            result[x, 1] = here[x + 1]
-            result[x, 2 - row_colour] = _HALF * (above[x + 1] + below[x + 1])
+            line[x, row_colour] = _HALF * (here[x] + here[x + 2])
+            line[x, 1] = here[x + 1]
+            line[x, 2 - row_colour] = _HALF * (above[x + 1] + below[x + 1])
         above, here, below = here, below, above
 
 
 @kernel
-def _load(
-    mosaic: NDArray[np.float32],
-    row: int,
-    columns: NDArray[np.int64],
-    line: NDArray[np.float32],
-) -> None:
-    for x in range(columns.size):
-        line[x] = mosaic[row, columns[x]]
+def _load(given: Frame, y: int, line: NDArray[np.float32]) -> None:
+    """Fill `line` with row y of the mosaic, -1 <= y <= number of rows, and its margins."""
+    row = given.rows[y + MARGIN]
+    for x in range(line.size):
+        line[x] = given.mosaic[row, given.columns[x]]

@@ -16,12 +16,14 @@ Tiles are kept flat, so that a row is a step of `PITCH`, and indexed by unsigned
 spare the check for negative ones that would keep the compiler from vectorising.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
 from dsis.cfa import Cfa
 from dsis.compiled import inlined, kernel, over_rows
-from dsis.demosaic.borders import frame, full_scale_checked
+from dsis.demosaic.borders import Frame, frame, full_scale_checked
 
 MARGIN = 5  # 3 green + 1 diagonal + 1 axial differences
 ROWS = 64 + 2 * MARGIN  # of a tile
@@ -70,59 +72,92 @@ def lu_tan(
     """
     given = frame(mosaic, cfa, MARGIN, out)
     code = full_scale_checked(full_scale) / np.float32(255)
-    over_rows(lambda first, last: _rows(*given, code, first, last), mosaic.shape[0], threads)
+    over_rows(lambda first, last: _rows(given, code, first, last), mosaic.shape[0], threads)
     if post_process:
         _filter_differences(given.out)
     return given.out
 
 
+class _Tile(NamedTuple):
+    """Where a tile lies, margin excluded, and its planes, margin included: float32 (ROWS * PITCH).
+
+    `m` is the mosaic and `g` green. `other` is blue at red sites and red at blue sites. At green
+    sites `along` is the colour of the neighbours in the row, `across` that of those in the column.
+    """
+
+    y: int
+    x: int
+    height: int
+    width: int
+    m: NDArray[np.float32]
+    g: NDArray[np.float32]
+    other: NDArray[np.float32]
+    along: NDArray[np.float32]
+    across: NDArray[np.float32]
+
+
 @kernel
-def _rows(
-    mosaic: NDArray[np.float32],
-    rows: NDArray[np.int64],
-    columns: NDArray[np.int64],
-    red_row: int,
-    red_column: int,
-    out: NDArray[np.float32],
-    code: np.float32,
-    first: int,
-    last: int,
-) -> None:
+def _rows(given: Frame, code: np.float32, first: int, last: int) -> None:
     """Demosaick rows first..last-1 tile by tile."""
-    m, g = np.empty(ROWS * PITCH, np.float32), np.empty(ROWS * PITCH, np.float32)
-    other = np.empty(ROWS * PITCH, np.float32)
-    along, across = np.empty(ROWS * PITCH, np.float32), np.empty(ROWS * PITCH, np.float32)
+    planes = np.empty((5, ROWS * PITCH), np.float32)
+    m, g, other, along, across = planes[0], planes[1], planes[2], planes[3], planes[4]
+    columns = given.mosaic.shape[1]
     for y in range(first, last, ROWS - 2 * MARGIN):
-        height = min(last - y + 2 * MARGIN, ROWS)
-        for x in range(0, mosaic.shape[1], PITCH - 2 * MARGIN):
-            width = min(mosaic.shape[1] - x + 2 * MARGIN, PITCH)
-            chroma = (y + x + red_row + red_column) & 1  # parity of red and blue in this tile
+        for x in range(0, columns, PITCH - 2 * MARGIN):
+            height, width = min(last - y, ROWS - 2 * MARGIN), min(columns - x, PITCH - 2 * MARGIN)
+            tile = _Tile(y, x, height, width, m, g, other, along, across)
+            chroma = (y + x + given.red_row + given.red_column) & 1  # parity of red and blue
+            _load(given, tile)
+            _interpolate_green(tile, code, chroma)
+            _interpolate_diagonally(tile, code)
+            _interpolate_axially(tile, code)
             for i in range(height):
-                for j in range(width):
-                    m[_U(i * PITCH + j)] = mosaic[rows[y + i], columns[x + j]]
-            for i in range(3, height - 3):
-                for k in range(i * PITCH + 3, i * PITCH + width - 3):
-                    sum_h, weight_h = _green(m, code, k, 1, PITCH)
-                    sum_v, weight_v = _green(m, code, k, PITCH, 1)
-                    g[_U(k)] = (sum_h + sum_v) / (weight_h + weight_v)
-                for j in range(3 + ((i + chroma) & 1), width - 3, 2):
-                    g[_U(i * PITCH + j)] = m[_U(i * PITCH + j)]
-            for i in range(4, height - 4):
-                for k in range(i * PITCH + 4, i * PITCH + width - 4):
-                    sum_f, weight_f = _difference(m, m, g, code, k, PITCH + 1)
-                    sum_r, weight_r = _difference(m, m, g, code, k, PITCH - 1)
-                    other[_U(k)] = g[_U(k)] + (sum_f + sum_r) / (weight_f + weight_r)
-            for i in range(5, height - 5):
-                for k in range(i * PITCH + 5, i * PITCH + width - 5):
-                    sum_h, weight_h = _difference(m, m, g, code, k, 1)
-                    sum_v, weight_v = _difference(other, m, g, code, k, PITCH)
-                    along[_U(k)] = m[_U(k)] + (sum_h + sum_v) / (weight_h + weight_v)
-                for k in range(i * PITCH + 5, i * PITCH + width - 5):
-                    sum_h, weight_h = _difference(other, m, g, code, k, 1)
-                    sum_v, weight_v = _difference(m, m, g, code, k, PITCH)
-                    across[_U(k)] = m[_U(k)] + (sum_h + sum_v) / (weight_h + weight_v)
-            for i in range(height - 2 * MARGIN):
-                _write(m, g, other, along, across, i, width, red_row, red_column, y, x, out)
+                _write(given, tile, i, (i + chroma) & 1)
+
+
+@inlined
+def _load(given: Frame, tile: _Tile) -> None:
+    for i in range(tile.height + 2 * MARGIN):
+        row = given.rows[tile.y + i]
+        for j in range(tile.width + 2 * MARGIN):
+            tile.m[_U(i * PITCH + j)] = given.mosaic[row, given.columns[tile.x + j]]
+
+
+@inlined
+def _interpolate_green(tile: _Tile, code: np.float32, chroma: int) -> None:
+    m, g = tile.m, tile.g
+    for i in range(3, tile.height + 2 * MARGIN - 3):
+        for k in range(i * PITCH + 3, i * PITCH + tile.width + 2 * MARGIN - 3):
+            sum_h, weight_h = _green(m, code, k, 1, PITCH)
+            sum_v, weight_v = _green(m, code, k, PITCH, 1)
+            g[_U(k)] = (sum_h + sum_v) / (weight_h + weight_v)
+        first_green = i * PITCH + 3 + ((i + chroma) & 1)
+        for k in range(first_green, i * PITCH + tile.width + 2 * MARGIN - 3, 2):
+            g[_U(k)] = m[_U(k)]
+
+
+@inlined
+def _interpolate_diagonally(tile: _Tile, code: np.float32) -> None:
+    m, g = tile.m, tile.g
+    for i in range(4, tile.height + 2 * MARGIN - 4):
+        for k in range(i * PITCH + 4, i * PITCH + tile.width + 2 * MARGIN - 4):
+            sum_f, weight_f = _difference(tile, m, code, k, PITCH + 1)
+            sum_r, weight_r = _difference(tile, m, code, k, PITCH - 1)
+            tile.other[_U(k)] = g[_U(k)] + (sum_f + sum_r) / (weight_f + weight_r)
+
+
+@inlined
+def _interpolate_axially(tile: _Tile, code: np.float32) -> None:
+    m, other = tile.m, tile.other
+    for i in range(MARGIN, tile.height + MARGIN):
+        for k in range(i * PITCH + MARGIN, i * PITCH + tile.width + MARGIN):
+            sum_h, weight_h = _difference(tile, m, code, k, 1)
+            sum_v, weight_v = _difference(tile, other, code, k, PITCH)
+            tile.along[_U(k)] = m[_U(k)] + (sum_h + sum_v) / (weight_h + weight_v)
+        for k in range(i * PITCH + MARGIN, i * PITCH + tile.width + MARGIN):
+            sum_h, weight_h = _difference(tile, other, code, k, 1)
+            sum_v, weight_v = _difference(tile, m, code, k, PITCH)
+            tile.across[_U(k)] = m[_U(k)] + (sum_h + sum_v) / (weight_h + weight_v)
 
 
 @inlined
@@ -147,14 +182,10 @@ def _green(
 
 @inlined
 def _difference(
-    c: NDArray[np.float32],
-    m: NDArray[np.float32],
-    g: NDArray[np.float32],
-    code: np.float32,
-    k: int,
-    step: int,
+    tile: _Tile, c: NDArray[np.float32], code: np.float32, k: int, step: int
 ) -> tuple[np.float32, np.float32]:
     """Return weighted sum and weight of colour c minus green at the two neighbours on one axis."""
+    m, g = tile.m, tile.g
     ahead, behind = c[_U(k + step)], c[_U(k - step)]
     green_ahead, green_behind = g[_U(k + step)], g[_U(k - step)]
     common = code + abs(ahead - behind)
@@ -167,34 +198,21 @@ def _difference(
 
 
 @inlined
-def _write(
-    m: NDArray[np.float32],
-    g: NDArray[np.float32],
-    other: NDArray[np.float32],
-    along: NDArray[np.float32],
-    across: NDArray[np.float32],
-    i: int,
-    width: int,
-    red_row: int,
-    red_column: int,
-    y: int,
-    x: int,
-    out: NDArray[np.float32],
-) -> None:
-    """Write row i of a tile: at red and blue sites, then at green ones."""
-    row_colour = 2 * ((y + i + red_row) & 1)  # red in red rows, blue in blue rows
-    start = (y + i + x + red_row + red_column) & 1
+def _write(given: Frame, tile: _Tile, i: int, start: int) -> None:
+    """Write row i of a tile, first at red and blue sites, then at green ones."""
+    y = tile.y + i
+    row_colour = 2 * ((y + given.red_row) & 1)  # red in red rows, blue in blue rows
     base = (i + MARGIN) * PITCH + MARGIN
-    for j in range(start, width - 2 * MARGIN, 2):
-        result = out[y + i, x + j]
-        result[row_colour] = m[_U(base + j)]
-        result[1] = g[_U(base + j)]
-        result[2 - row_colour] = other[_U(base + j)]
-    for j in range(1 - start, width - 2 * MARGIN, 2):
-        result = out[y + i, x + j]
-        result[row_colour] = along[_U(base + j)]
-        result[1] = m[_U(base + j)]
-        result[2 - row_colour] = across[_U(base + j)]
+    for j in range(start, tile.width, 2):
+        pixel = given.out[y, tile.x + j]
+        pixel[row_colour] = tile.m[_U(base + j)]
+        pixel[1] = tile.g[_U(base + j)]
+        pixel[2 - row_colour] = tile.other[_U(base + j)]
+    for j in range(1 - start, tile.width, 2):
+        pixel = given.out[y, tile.x + j]
+        pixel[row_colour] = tile.along[_U(base + j)]
+        pixel[1] = tile.m[_U(base + j)]
+        pixel[2 - row_colour] = tile.across[_U(base + j)]
 
 
 @kernel
@@ -206,20 +224,25 @@ def _filter_differences(image: NDArray[np.float32]) -> None:
     """
     height, width, _ = image.shape
     lines = np.empty((3, 2, width), np.float32)
-    for i in (0, 1):
-        _load_differences(image, i, lines[i])
+    _load_differences(image, 0, lines)
+    _load_differences(image, 1, lines)
     for i in range(height):
-        here, below, above = lines[i % 3], lines[(i + 1) % 3], lines[(i + 2) % 3]
-        if i == 0:
-            above = below
-        if i == height - 1:
-            below = above
-        elif i > 0:
-            _load_differences(image, i + 1, below)
+        if 0 < i < height - 1:
+            _load_differences(image, i + 1, lines)
+        here = lines[i % 3]
+        above = lines[(i - 1) % 3] if i > 0 else lines[1]
+        below = lines[(i + 1) % 3] if i < height - 1 else above
         for j in range(width):
-            before, after = max(j - 1, 1 - j), min(j + 1, 2 * width - 3 - j)
-            for k in (0, 1):
-                here[k, j] = _median(above[k], here[k], below[k], before, j, after)
+            before, after = abs(j - 1), width - 1 - abs(width - 2 - j)
+            for c in (0, 1):
+                low_a, middle_a, high_a = _sorted(
+                    above[c, before], here[c, before], below[c, before]
+                )
+                low_b, middle_b, high_b = _sorted(above[c, j], here[c, j], below[c, j])
+                low_c, middle_c, high_c = _sorted(above[c, after], here[c, after], below[c, after])
+                # The median is the middle of the largest low, the middle middle, the smallest high.
+                low, high = max(low_a, low_b, low_c), min(high_a, high_b, high_c)
+                here[c, j] = _sorted(low, _sorted(middle_a, middle_b, middle_c)[1], high)[1]
             green = _HALF * ((image[i, j, 0] + here[0, j]) + (image[i, j, 2] + here[1, j]))
             image[i, j, 0] = green - here[0, j]
             image[i, j, 1] = green
@@ -227,30 +250,11 @@ def _filter_differences(image: NDArray[np.float32]) -> None:
 
 
 @kernel
-def _load_differences(image: NDArray[np.float32], i: int, line: NDArray[np.float32]) -> None:
+def _load_differences(image: NDArray[np.float32], i: int, lines: NDArray[np.float32]) -> None:
+    """Put green minus red and green minus blue of row i of the image into line i modulo 3."""
     for j in range(image.shape[1]):
-        line[0, j] = image[i, j, 1] - image[i, j, 0]
-        line[1, j] = image[i, j, 1] - image[i, j, 2]
-
-
-@kernel
-def _median(
-    above: NDArray[np.float32],
-    here: NDArray[np.float32],
-    below: NDArray[np.float32],
-    a: int,
-    b: int,
-    c: int,
-) -> np.float32:
-    """Return the median of 3 x 3 samples: of the largest low, the middle one and smallest high."""
-    low_a, middle_a, high_a = _sorted(above[a], here[a], below[a])
-    low_b, middle_b, high_b = _sorted(above[b], here[b], below[b])
-    low_c, middle_c, high_c = _sorted(above[c], here[c], below[c])
-    low = max(low_a, low_b, low_c)
-    high = min(high_a, high_b, high_c)
-    _, middle, _ = _sorted(middle_a, middle_b, middle_c)
-    _, median, _ = _sorted(low, middle, high)
-    return median
+        lines[i % 3, 0, j] = image[i, j, 1] - image[i, j, 0]
+        lines[i % 3, 1, j] = image[i, j, 1] - image[i, j, 2]
 
 
 @kernel

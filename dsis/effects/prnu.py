@@ -17,7 +17,7 @@ class Prnu(Effect):
     """
 
     kind: Literal["prnu"] = "prnu"
-    sigma_percent: Annotated[float, Field(ge=0, lt=100)]
+    sigma_percent: Annotated[float, Field(ge=0, lt=100, examples=[1.5])]
 
     stage: ClassVar[Stage] = Stage.LIGHT
     reference: ClassVar[str] = "EMVA Standard 1288, release 3.1, section 4"

@@ -17,7 +17,7 @@ class RowNoise(Effect):
     """
 
     kind: Literal["row_noise"] = "row_noise"
-    sigma_dn: Annotated[float, Field(ge=0)]
+    sigma_dn: Annotated[float, Field(ge=0, examples=[6.0])]
 
     stage: ClassVar[Stage] = Stage.READ_OUT
     reference: ClassVar[str] = "Wei et al., A physics-based noise formation model (ELD), CVPR 2020"
@@ -43,7 +43,7 @@ class ColumnNoise(Effect):
     """
 
     kind: Literal["column_noise"] = "column_noise"
-    sigma_dn: Annotated[float, Field(ge=0)]
+    sigma_dn: Annotated[float, Field(ge=0, examples=[6.0])]
 
     stage: ClassVar[Stage] = Stage.READ_OUT
     reference: ClassVar[str] = "Wei et al., A physics-based noise formation model (ELD), CVPR 2020"

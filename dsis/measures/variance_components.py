@@ -33,8 +33,7 @@ class Estimate:
 def measure(stack: NDArray[np.float32]) -> dict[str, Estimate]:
     """Return every measure of a stack (frame, row, column) of one channel, DN above black.
 
-    Needs two frames, rows and columns at least. Standard errors are those of Gaussian components;
-    of the level, those of the temporal noise alone.
+    Needs two frames, rows and columns at least. Standard errors are those of Gaussian components.
     """
     frames, rows, columns = stack.shape
     data = stack.astype(np.float64)
@@ -65,7 +64,8 @@ def measure(stack: NDArray[np.float32]) -> dict[str, Estimate]:
     pattern_error = spatial * np.sqrt(2 / (mean_frame.size - 1))
     return {
         "level": Estimate(
-            float(mean_frame.mean()), float(np.sqrt(max(ms_frame, 0) / (frames * rows * columns)))
+            float(mean_frame.mean()),
+            float(np.sqrt((ms_frame / frames + max(pattern, 0.0)) / mean_frame.size)),
         ),
         "pixel_variance": Estimate(ms_pixel, error((ms_pixel, dof_pixel))),
         "row_variance": Estimate(

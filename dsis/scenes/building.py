@@ -218,7 +218,7 @@ def _windows(
     pane = pane * (1 - np.float32(0.7) * pulse(floors + 0.36, 0.2, fv))[..., None]
     odd = texture.cell(axis + 13, floors + 5, salt)
     pane = pane + (one * (odd > 0.98))[..., None] * (LAMP - pane)
-    if direct > 0 and house.pick(53) < 0.5:
+    if direct > 0 and house.pick(53) < 0.32:
         pane = pane + (one * (odd < -0.95))[..., None] * (GLINT - pane)
     return glass, trim, pane
 
@@ -237,7 +237,7 @@ def _tiles(house: Building, texture: Texture, slant: float) -> Shade:
             return sky.hazed(tiled, distance)
         windows = pulse(u / 3.4, 0.3, pixel_u / 3.4) * pulse(v / 3.1 - 0.2, 0.38, pixel_v / 3.1)
         windows = windows * (texture.cell(u / 3.4, v / 3.1 - 0.2, int(salt)) > 0.4)
-        shine = GLINT if house.pick(83) < 0.06 and slant > 0 else GLASS[2]
+        shine = GLINT if house.pick(83) < 0.03 and slant > 0 else GLASS[2]
         return sky.hazed(tiled + windows[..., None] * (shine - tiled), distance)
 
     return shade

@@ -34,7 +34,7 @@ def paint(image: Field, seed: int) -> None:
     rows = image.shape[0]
     view = View(image, focal_px=2.75 * rows, horizon_row=0.28 * rows, eye_m=EYE_M)
     texture = Texture.of(np.random.Generator(np.random.PCG64(seed)))
-    sky.paint(view, texture, cover=0.45)
+    sky.paint(view, texture, cover=0.38)
     _hills(view, texture)
     _ground(view, texture)
     for thing, azimuth, lowest_row in reversed(list(_visible(view, _layout(seed, view)))):

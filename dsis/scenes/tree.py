@@ -9,7 +9,7 @@ from dsis.scenes import sky
 from dsis.scenes.texture import Texture, step
 from dsis.scenes.view import Point, View
 
-LOBES = 9
+LOBES = 14
 
 
 @dataclass(frozen=True)
@@ -43,36 +43,46 @@ class Tree:
         distance = math.hypot(self.x, self.y)
         scale = view.focal_px / distance  # pixels per metre
         column, foot = view.project((self.x, self.y, self.base), azimuth)
-        wide, tall = 0.36 * self.height, self.height
+        wide, tall = 0.4 * self.height, self.height
         reach = 1.35 * wide * scale
         top, bottom, left, right = view.box(
-            column - reach, foot - 1.1 * tall * scale, column + reach, min(foot + 1, lowest_row)
+            
+            column - reach,
+            foot - 1.1 * tall * scale,
+            column + 1.7 * reach,
+            min(foot + 0.05 * tall * scale, lowest_row),
+
         )
         if top >= bottom or left >= right:
             return
         x = ((np.arange(left, right) + 0.5 - column) / scale).astype(np.float32)[None, :]
         z = ((foot - np.arange(top, bottom) - 0.5) / scale).astype(np.float32)[:, None]
         pixel = 1 / scale
-        seed = 100 * self.style + 3 * azimuth
-        leaf = texture.fractal(0.9 * x + np.float32(seed), 1.1 * z + np.float32(seed), 6, pixel)
-        surface = np.full(leaf.shape, -1e3, np.float32)
-        light = np.zeros_like(leaf)
+        seed = np.float32(100 * self.style + 3 * azimuth)
+        leaf = texture.fractal(1.3 * x + seed, 1.5 * z + seed, 7, 1.3 * pixel)
+        # A smooth union of lobes: each weighs by how far its surface stands out.
+        weights, light, surface = np.zeros_like(leaf), np.zeros_like(leaf), -tall + 0 * leaf
         for n in range(LOBES):
-            angle, out = 2.4 * n + 6 * self.style, 0.62 * math.sqrt(n / LOBES)
-            radius = tall * (0.21 + 0.05 * math.sin(5 * angle))
-            dx = (x - wide * out * math.cos(angle)) / radius
-            dz = (z - tall * (0.62 + 0.3 * out * math.sin(angle))) / (0.85 * radius)
-            inside = radius * (1 - np.sqrt(dx * dx + dz * dz)) + np.float32(0.05 * tall) * leaf
-            toward = 0.8 * dz - 0.55 * dx + 0.1 * math.sin(9 * angle)
-            light = np.where(inside > surface, toward, light)
+            angle, out = 2.4 * n + 6 * self.style, math.sqrt((n + 0.5) / LOBES)
+            radius = tall * (0.2 - 0.07 * out + 0.04 * math.sin(5 * angle))
+            dx = (x - 0.78 * wide * out * math.cos(angle)) / radius
+            dz = (z - tall * (0.55 + 0.28 * out * math.sin(angle))) / (0.85 * radius)
+            inside = radius * (1 - np.sqrt(dx * dx + dz * dz))
+            weight = np.exp(np.clip(np.float32(40 / tall) * inside, -30, 30))
+            light += weight * (0.45 * dz - 0.4 * dx + np.float32(0.5 * math.sin(9 * angle)))
+            weights += weight
             surface = np.maximum(surface, inside)
-        crown = np.clip(surface / pixel + 0.5, 0, 1)
-        trunk = np.clip((0.022 * tall - np.abs(x)) / pixel + 0.5, 0, 1) * (z < 0.6 * tall)
-        brightness = step(light + 0.9 * leaf, -1.0, 1.7) ** 2
+        light = light / np.maximum(weights, 1e-9) + (0.9 * z / tall - 0.6 * x / wide - 0.55)
+        crown = np.clip((surface + np.float32(0.06 * tall) * leaf) / pixel + 0.5, 0, 1)
+        thick = 0.024 * tall * (1.3 - z / tall)
+        trunk = np.clip((thick - np.abs(x)) / pixel + 0.5, 0, 1) * ((z < 0.6 * tall) & (z > 0))
+        brightness = step(light + 1.1 * leaf, -1.5, 1.9) ** 2
         dark = np.array([0.004, 0.007, 0.003], np.float32)
-        green = np.array([0.15 + 0.12 * self.style, 0.24, 0.045], np.float32)
+        green = np.array([0.17 + 0.13 * self.style, 0.27, 0.05], np.float32)
         bark = np.array([0.03, 0.024, 0.018], np.float32)
         leaves = dark + brightness[..., None] * (green - dark)
         colour = np.where((crown > 0.02)[..., None], leaves, bark)
-        air = np.full(leaf.shape, distance, np.float32)
-        view.blend(top, left, sky.hazed(colour, air), np.maximum(crown, trunk))
+        far = np.full(leaf.shape, distance, np.float32)
+        shadow = step(1 - ((x - 0.4 * tall) / (0.5 * tall)) ** 2 - (z / (0.045 * tall)) ** 2, 0, 0.9)
+        view.blend(top, left, sky.hazed(0 * colour + dark, far, view.air), np.float32(0.7) * shadow)
+        view.blend(top, left, sky.hazed(colour, far, view.air), np.maximum(crown, trunk))

@@ -32,12 +32,15 @@ class View:
         Row of slope 0.
     eye_m
         Height of the eye.
+    air
+        Density of the haze, 1 = that of the city.
     """
 
     image: Field
     focal_px: float
     horizon_row: float
     eye_m: float
+    air: float = 1.0
 
     def azimuths(self, first: int = 0, last: int | None = None) -> Field:
         """Return the azimuth of the centres of columns first..last-1 in radians: (1, column)."""

@@ -3,7 +3,6 @@
 import hashlib
 import json
 import math
-import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import contextmanager
@@ -13,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from filelock import FileLock, Timeout
 from numpy.typing import NDArray
 
 import dsis
@@ -26,7 +26,7 @@ from dsis.spec import Content, Test
 from dsis.stimuli.clipfiles import clip_path, read_frame_bytes, write_frame
 from dsis.stimuli.conditions import CODE_MAX, Condition, Rendering, conditions_of
 from dsis.stimuli.figure import write_figures
-from dsis.stimuli.journal import JOURNAL, Journal, sha256
+from dsis.stimuli.journal import Journal, sha256
 from dsis.stimuli.match import matching_frames, solve_sigma
 from dsis.stimuli.quality import delivered, psnr_db, psnr_float_db
 from dsis.stimuli.source import Source, remarks_on, source_of
@@ -380,16 +380,14 @@ def _finite(value: float) -> float | None:
 @contextmanager
 def _locked(partial: Path) -> Iterator[None]:
     """Hold the unfinished folder for this process: a second build of it is refused."""
-    import fcntl
-
     partial.mkdir(parents=True, exist_ok=True)
-    handle = os.open(partial, os.O_RDONLY)
+    lock = FileLock(partial.with_name(partial.name + ".lock"))
     try:
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        os.close(handle)
+        lock.acquire(blocking=False)
+    except Timeout:
         raise InputError.of(partial, "", "another process is at work on it") from None
     try:
         yield
     finally:
-        os.close(handle)
+        lock.release()
+        Path(lock.lock_file).unlink(missing_ok=True)

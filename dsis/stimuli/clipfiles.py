@@ -1,7 +1,6 @@
 """Clips on disk: where each frame of a clip lies, written, read and hashed alike by all."""
 
 import hashlib
-import os
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -40,19 +39,11 @@ def write_frame(
         return hashlib.sha256(path.read_bytes()).hexdigest()
     data = delivered(display).tobytes()
     path.parent.mkdir(parents=True, exist_ok=True)
-    handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
-    try:
-        _write_all(handle, data, frame * len(data))
-    finally:
-        os.close(handle)
+    path.touch()
+    with path.open("r+b") as file:
+        file.seek(frame * len(data))
+        file.write(data)
     return hashlib.sha256(data).hexdigest()
-
-
-def _write_all(handle: int, data: bytes, offset: int) -> None:
-    view = memoryview(data)
-    while view:
-        written = os.pwrite(handle, view, offset)
-        view, offset = view[written:], offset + written
 
 
 def read_frame_bytes(folder: Path, stimulus: str, form: str, frame: int, size: Sequence) -> bytes:

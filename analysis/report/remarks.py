@@ -1,0 +1,189 @@
+"""What a reader of a report must know before believing it: counts and remarks."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from analysis.models import p910
+from analysis.scale import Scale
+from analysis.votes import SCORED_KINDS, complete, index_votes
+
+FEW_OBSERVERS = 15  # BT.500: fewer make an informal test
+MANY_REMOVED = 0.10
+NAMES_LISTED = 6
+# The 2-sigma rule: with the sample sd, |z| is at most (n - 1) / sqrt(n), below 2 up to n = 5.
+REMOVABLE_FROM = 6
+ALL_TOO_CONSISTENT = 1e-3  # inconsistency over the scale's width: the fit leans on one observer
+
+
+@dataclass(frozen=True)
+class Counts:
+    """Numbers of votes, by what became of them; each vote is counted once."""
+
+    rows: int
+    scored: int
+    invalid: int
+    training: int
+    dummy: int
+    missing: int
+    observers: int
+    stimuli: int
+    references: int
+    simulated_share: float
+
+    def not_scored(self) -> list[tuple[int, str]]:
+        """Return (number, what they are) of the votes that are not scored."""
+        kinds = (
+            (self.invalid, "invalid (dropped frames, repeated later)"),
+            (self.training, "training"),
+            (self.dummy, "dummy"),
+            (self.missing, "not given"),
+        )
+        return [(number, what) for number, what in kinds if number]
+
+
+def count_votes(votes: pd.DataFrame) -> Counts:
+    """Count the rows of a table of votes; `simulated_share` is that of the scored ones."""
+    whole = complete(votes)
+    valid, given = whole["valid"], whole["vote"].notna()
+    judged = whole["kind"].isin(SCORED_KINDS)
+    scored = whole[valid & judged & given]
+    stimuli = scored.drop_duplicates("stimulus")
+    return Counts(
+        rows=len(whole),
+        scored=len(scored),
+        invalid=int((~valid).sum()),
+        training=int((valid & (whole["kind"] == "training")).sum()),
+        dummy=int((valid & (whole["kind"] == "dummy")).sum()),
+        missing=int((valid & judged & ~given).sum()),
+        observers=len(scored.drop_duplicates(["lab", "observer"])),
+        stimuli=len(stimuli),
+        references=int((stimuli["kind"] == "reference").sum()),
+        simulated_share=float(scored["simulated"].mean()) if len(scored) else 0.0,
+    )
+
+
+def observer_name(table: pd.DataFrame) -> list[str]:
+    """Return the names of the `observer` column; with the laboratory where there are several."""
+    if len(table["lab"].unique()) < 2:
+        return [str(name) for name in table["observer"]]
+    return [f"{lab} / {name}" for lab, name in zip(table["lab"], table["observer"], strict=True)]
+
+
+def remarks(
+    votes: pd.DataFrame,
+    scale: Scale,
+    counts: Counts,
+    scores: pd.DataFrame,
+    observers: pd.DataFrame,
+) -> Iterator[str]:
+    """Yield the remarks of a report, one sentence or two each."""
+    yield from _about_the_test(votes, scale, counts)
+    yield from _about_the_removal(counts, scores)
+    yield from _about_intervals(scale, scores)
+    yield from _about_the_screens(observers)
+    yield from _about_the_model(votes, scale)
+
+
+def _about_the_test(votes: pd.DataFrame, scale: Scale, counts: Counts) -> Iterator[str]:
+    if counts.simulated_share > 0:
+        yield (
+            f"{100 * counts.simulated_share:.3g} % of the scored votes are simulated: they show "
+            "that the procedure works and say nothing about what people see."
+        )
+    if counts.observers < FEW_OBSERVERS:
+        yield (
+            f"{_number(counts.observers, 'observer')}: with fewer than {FEW_OBSERVERS} BT.500 "
+            "calls a test informal."
+        )
+    if (scale.low, scale.high) != (1, 5):
+        yield f"The scale is {scale}, not BT.500's impairment scale of five grades."
+    scored = index_votes(votes)
+    if len(scored.table["repetition"].unique()) > 1:
+        yield (
+            "Sequences were shown repeatedly to the same observers. Their votes are pooled, as if "
+            "independent: the intervals are too short."
+        )
+    labs = scored.observers["lab"].nunique()
+    if labs > 1:
+        yield f"Votes of {labs} laboratories are pooled."
+    most = int(scored.per_stimulus(np.ones(len(scored.vote))).max())
+    if len(scored.vote) < most * len(scored.stimuli):
+        yield "Not all sequences have the same number of votes: see n."
+
+
+def _about_the_removal(counts: Counts, scores: pd.DataFrame) -> Iterator[str]:
+    removed = int(scores["n_removed"].sum())
+    if removed > MANY_REMOVED * counts.scored:
+        yield (
+            f"The 2\u03c3 rule removes {100 * removed / counts.scored:.1f} % of the votes, more "
+            f"than {100 * MANY_REMOVED:.0f} %: the votes are far from normal, or observers did not "
+            "agree on what to judge."
+        )
+    small = scores[scores["n"] < REMOVABLE_FROM]
+    if len(small):
+        yield (
+            f"The 2\u03c3 rule cannot remove anything where there are {REMOVABLE_FROM - 1} votes "
+            f"or fewer: {_names(small['stimulus'])}."
+        )
+
+
+def _about_intervals(scale: Scale, scores: pd.DataFrame) -> Iterator[str]:
+    single = scores[scores["n"] == 1]
+    if len(single):
+        yield f"A single vote has no interval: {_names(single['stimulus'])}."
+    agreed = scores[scores["sd"] == 0]
+    if len(agreed):
+        yield (
+            f"All votes are equal on {_names(agreed['stimulus'])}: Student's interval has no width "
+            "there, which does not mean certainty; and BT.500's screening passes such a sequence "
+            "over."
+        )
+    beyond = scores[(scores["ci_low"] < scale.low) | (scores["ci_high"] > scale.high)]
+    if len(beyond):
+        yield (
+            f"The interval leaves the scale on {_names(beyond['stimulus'])}: near the ends of the "
+            "scale it is an approximation."
+        )
+
+
+def _about_the_screens(observers: pd.DataFrame) -> Iterator[str]:
+    proposed = observers[observers["bt500_rejected"] | observers["correlation_rejected"]]
+    if len(proposed):
+        yield (
+            f"Screening proposes to reject {_names(pd.Series(observer_name(proposed)))}: see "
+            "Observers."
+        )
+    if observers["bt500_rejected"].all():
+        yield "BT.500's screening rejects every observer: there is no MOS after it."
+    unknown = observers[observers["correlation"].isna()]
+    if len(unknown):
+        yield (
+            f"No correlation exists for {_names(pd.Series(observer_name(unknown)))}: the votes, or "
+            "the MOS of the sequences judged, are all equal; nobody is rejected for that."
+        )
+
+
+def _about_the_model(votes: pd.DataFrame, scale: Scale) -> Iterator[str]:
+    fit = p910(votes)
+    if not fit.converged:
+        yield f"The P.910 model did not converge in {fit.rounds} rounds."
+    limit = ALL_TOO_CONSISTENT * (scale.high - scale.low)
+    rigid = fit.observers[fit.observers["inconsistency"] < limit]
+    if len(rigid):
+        yield (
+            f"The P.910 model finds no inconsistency in {_names(pd.Series(observer_name(rigid)))}: "
+            "it then rests on these votes alone; do not use its scores."
+        )
+
+
+def _number(count: int, noun: str) -> str:
+    return f"{count} {noun}{'' if count == 1 else 's'}"
+
+
+def _names(names: "pd.Series[str]") -> str:
+    listed = [str(name) for name in names[:NAMES_LISTED]]
+    more = len(names) - len(listed)
+    return ", ".join(listed) + (f" and {more} more" if more else "")

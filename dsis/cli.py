@@ -1,0 +1,276 @@
+"""The command line: parse, call one function, print. The one file that knows both packages."""
+
+import argparse
+import os
+import shutil
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+from dsis import __version__
+from dsis.errors import DamagedError, DsisError, InputError
+
+DEMO_SPEC = "demo.toml"
+DEMO_OBSERVERS = 18
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command and return its exit status: 0 done, 1 damaged files, 2 bad input."""
+    options = _parser().parse_args(arguments)
+    try:
+        options.command(options)
+    except InputError as error:
+        _complain(str(error))
+        return 2
+    except DamagedError as error:
+        _complain(str(error))
+        return 1
+    except DsisError as error:
+        _complain(str(error))
+        return 1
+    except KeyboardInterrupt:
+        _complain("interrupted; the same command goes on where this one stopped")
+        return 130
+    except BrokenPipeError:
+        # Whoever read the output has gone (`| head`); nothing is left to say.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    return 0
+
+
+def _complain(message: str) -> None:
+    print("\n".join(f"dsis: {line}" for line in message.splitlines()), file=sys.stderr)
+
+
+def demo(options: argparse.Namespace) -> None:
+    """Run the whole chain in small."""
+    from analysis.report import write_report
+    from dsis.outdir import check_replaceable, finish, partial_of
+    from dsis.session import export_votes, run_robots
+    from dsis.spec import read_spec
+    from dsis.stimuli import build_stimuli, summary
+
+    out: Path = options.out
+    check_replaceable(out, "report/report.html")
+    partial = partial_of(out)
+    partial.mkdir(parents=True, exist_ok=True)
+    stimuli = partial / "stimuli"
+    for stale in (stimuli / "session", partial / "votes", partial / "report"):
+        shutil.rmtree(stale, ignore_errors=True)
+    test = read_spec(DEMO_SPEC, seed=options.seed)
+    print(f"1/3 stimuli: {test.spec.title}, four noise conditions")
+    with _progress("stimuli") as progress:
+        manifest = build_stimuli(test, stimuli, jobs=options.jobs, progress=progress)
+    print(summary(manifest))
+    print(f"2/3 session: {options.observers} SIMULATED observers (robots) vote")
+    run_robots(stimuli, options.observers, seed=test.spec.seed)
+    export_votes(stimuli, partial / "votes")
+    print("3/3 report")
+    write_report(partial / "votes" / "votes.csv", partial / "report")
+    finish(partial, out)
+    print(_mos_table(out / "report" / "mos.csv"))
+    print("All votes are SIMULATED: they show the tool at work, not what people see.")
+    print(f"report   {out / 'report' / 'report.html'}")
+    print(f"stimuli  {out / 'stimuli'} (pictures in figures/)")
+    print(f"vote     dsis session {out / 'stimuli'} --observer YOUR-NAME")
+
+
+def _mos_table(path: Path) -> str:
+    import pandas as pd
+
+    scores = pd.read_csv(path)
+    columns = ["stimulus", "n", "mos", "ci_low", "ci_high", "n_removed", "mos_trimmed"]
+    return str(scores[columns].round(2).to_string(index=False))
+
+
+def stimuli(options: argparse.Namespace) -> None:
+    """Build, check or estimate the stimuli of a test."""
+    from dsis.spec import read_spec
+    from dsis.stimuli import build_stimuli, check_stimuli, estimate, summary
+
+    if options.check is not None:
+        with _progress("check") as progress:
+            frames = check_stimuli(options.check, jobs=options.jobs, progress=progress)
+        print(f"{frames} frames agree with {options.check / 'manifest.json'}")
+        return
+    if options.spec is None:
+        raise InputError.of("dsis stimuli", "SPEC.toml", "is missing (or give --check DIR)")
+    test = read_spec(options.spec, options.source, options.seed)
+    out = options.out or Path(f"{Path(options.spec).stem}-stimuli")
+    if options.dry_run:
+        print(estimate(test, out, options.jobs))
+        return
+    with _progress("stimuli") as progress:
+        manifest = build_stimuli(test, out, jobs=options.jobs, progress=progress)
+    print(summary(manifest))
+    print(f"{len(manifest.clips)} clips in {out}")
+
+
+def session(options: argparse.Namespace) -> None:
+    """Run a session with people or robots, or say how far it is."""
+    from dsis import session as sessions
+
+    folder: Path = options.stimuli_dir
+    if options.status:
+        print(sessions.status(folder))
+    elif options.robots is not None:
+        sessions.run_robots(folder, options.robots, seed=options.seed or 1)
+        print(f"{options.robots} SIMULATED observers voted; export: dsis votes {folder} -o DIR")
+    elif options.observer is None:
+        fact = "give --observer ID, --robots N or --status"
+        raise InputError.of("dsis session", "", fact)
+    else:
+        sessions.serve(
+            folder,
+            options.observer,
+            port=options.port,
+            open_browser=not options.no_browser,
+            resume=options.resume,
+            seed=options.seed or 1,
+        )
+
+
+def votes(options: argparse.Namespace) -> None:
+    """Export the recorded votes."""
+    from dsis.session import export_votes
+
+    export_votes(options.stimuli_dir, options.out)
+    print(f"votes in {options.out / 'votes.csv'}; report: dsis report {options.out / 'votes.csv'}")
+
+
+def report(options: argparse.Namespace) -> None:
+    """Write the MOS report."""
+    from analysis.report import write_report
+
+    out = options.out or options.votes.with_name(options.votes.stem + "-report")
+    write_report(options.votes, out, tuple(options.scale) if options.scale else None)
+    print(_mos_table(out / "mos.csv"))
+    print(f"report in {out / 'report.html'}")
+
+
+@contextmanager
+def _progress(what: str) -> Iterator[Callable[[int, int, str], None]]:
+    """Show a bar on a terminal once the work has taken two seconds."""
+    from tqdm import tqdm
+
+    with tqdm(desc=what, delay=2, disable=None, leave=False, dynamic_ncols=True) as bar:
+
+        def tell(done: int, total: int, doing: str) -> None:
+            bar.total = total
+            bar.set_postfix_str(doing, refresh=False)
+            bar.update(done - bar.n)
+
+        yield tell
+
+
+def _cores() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _whole(low: int) -> Callable[[str], int]:
+    def whole(text: str) -> int:
+        if not text.isdigit() or int(text) < low:
+            message = f"is {text!r}, must be a whole number >= {low}"
+            raise argparse.ArgumentTypeError(message)
+        return int(text)
+
+    return whole
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="dsis",
+        description="Prepare, run and analyse a double-stimulus impairment test (ITU-R BT.500) "
+        "of real camera noise.",
+        epilog="Start with: dsis demo",
+    )
+    parser.add_argument("--version", action="version", version=f"dsis {__version__}")
+    commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
+
+    def command(
+        name: str, function: Callable[[argparse.Namespace], None], says: str, example: str
+    ) -> argparse.ArgumentParser:
+        sub = commands.add_parser(
+            name,
+            help=says,
+            description=says,
+            epilog=f"example:\n  {example}",
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
+        sub.set_defaults(command=function)
+        return sub
+
+    def working(sub: argparse.ArgumentParser) -> None:
+        sub.add_argument(
+            "--jobs", type=_whole(1), default=_cores(), metavar="N", help="threads (default: all)"
+        )
+
+    def seeded(sub: argparse.ArgumentParser, default: str) -> None:
+        sub.add_argument(
+            "--seed", type=_whole(0), metavar="N", help=f"fixes every random number ({default})"
+        )
+
+    sub = command(
+        "demo",
+        demo,
+        "The whole chain in small: stimuli, a session of simulated observers, the MOS report.",
+        "dsis demo --out my-demo",
+    )
+    sub.add_argument("--out", type=Path, default=Path("dsis-demo"), metavar="DIR")
+    sub.add_argument("--observers", type=_whole(1), default=DEMO_OBSERVERS, metavar="N")
+    working(sub)
+    seeded(sub, "default: the spec's")
+
+    sub = command(
+        "stimuli",
+        stimuli,
+        "Build the sequences that a test spec names, with a manifest.",
+        "dsis stimuli stills.toml --source photos/ --out stimuli",
+    )
+    sub.add_argument("spec", nargs="?", metavar="SPEC.toml", help="a file, a shipped spec's name, or a manifest.json")
+    sub.add_argument("--out", type=Path, metavar="DIR", help="default: SPEC-stimuli")
+    sub.add_argument("--source", nargs="+", default=[], metavar="FILES", help="your frames instead of the spec's content")
+    sub.add_argument("--dry-run", action="store_true", help="say disk, memory and time, build nothing")
+    sub.add_argument("--check", type=Path, metavar="DIR", help="verify every frame against the manifest")
+    working(sub)
+    seeded(sub, "default: the spec's")
+
+    sub = command(
+        "session",
+        session,
+        "Run the test with people in the browser, or with simulated observers.",
+        "dsis session stimuli --observer anna",
+    )
+    sub.add_argument("stimuli_dir", type=Path, metavar="STIMULI_DIR")
+    sub.add_argument("--observer", metavar="ID", help="pseudonym of the person who votes")
+    sub.add_argument("--robots", type=_whole(1), metavar="N", help="simulated observers instead")
+    sub.add_argument("--resume", action="store_true", help="go on with a session that was interrupted")
+    sub.add_argument("--status", action="store_true", help="how far the observers are; never scores")
+    sub.add_argument("--port", type=_whole(0), default=0, help="port on 127.0.0.1 (default: a free one)")
+    sub.add_argument("--no-browser", action="store_true", help="print the address only")
+    seeded(sub, "default: 1")
+
+    sub = command(
+        "votes",
+        votes,
+        "Export the recorded votes: votes.csv and the tables beside it.",
+        "dsis votes stimuli -o votes",
+    )
+    sub.add_argument("stimuli_dir", type=Path, metavar="STIMULI_DIR")
+    sub.add_argument("-o", "--out", type=Path, required=True, metavar="DIR")
+
+    sub = command(
+        "report",
+        report,
+        "Write the MOS report of a table of votes.",
+        "dsis report votes/votes.csv --out report",
+    )
+    sub.add_argument("votes", type=Path, metavar="VOTES.csv")
+    sub.add_argument("--out", type=Path, metavar="DIR", help="default: VOTES-report")
+    sub.add_argument("--scale", nargs=2, type=int, metavar=("LOW", "HIGH"), help="ends of the scale, worst first; default: datapackage.json")
+    return parser
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,7 @@
+"""Preparing a test: light through a camera becomes four versions of one sequence."""
+
+from dsis.stimuli.build import build_stimuli
+from dsis.stimuli.check import check_stimuli, summary
+from dsis.stimuli.estimate import estimate
+
+__all__ = ["build_stimuli", "check_stimuli", "estimate", "summary"]

@@ -1,0 +1,129 @@
+"""Promise: a draw is a function of (seed, purpose, frame, row, column, channel), and a good one."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy import stats
+
+from dsis.cfa import Cfa, mosaic
+from dsis.draw import Draw, philox
+from dsis.grid import PixelGrid
+
+Z_MAX = 5.0
+
+# Known answers published with Random123 (tests/kat_vectors, "philox4x32 10").
+KNOWN_ANSWERS = [
+    ("00000000 00000000 00000000 00000000 00000000 00000000",
+     "6627e8d5 e169c58d bc57ac4c 9b00dbd8"),
+    ("ffffffff ffffffff ffffffff ffffffff ffffffff ffffffff",
+     "408f276d 41c83b0e a20bc7c6 6d5451fd"),
+    ("243f6a88 85a308d3 13198a2e 03707344 a4093822 299f31d0",
+     "d16cfe09 94fdcceb 5001e420 24126ea1"),
+]  # fmt: skip
+
+FIELD = PixelGrid(1024, 1024)
+
+
+@pytest.fixture(scope="module")
+def field() -> np.ndarray:
+    return Draw(7).normal("test", FIELD).astype(np.float64)
+
+
+@pytest.mark.parametrize(("inputs", "answer"), KNOWN_ANSWERS)
+def test_generator_gives_the_published_answers(inputs: str, answer: str) -> None:
+    words = [np.uint64(int(word, 16)) for word in inputs.split()]
+    assert [f"{int(word):08x}" for word in philox(*words)] == answer.split()
+
+
+@given(
+    row=st.integers(0, 40),
+    column=st.integers(0, 40),
+    rows=st.integers(1, 30),
+    columns=st.integers(1, 30),
+    cfa=st.sampled_from([None, *Cfa]),
+    normal=st.booleans(),
+)
+def test_a_crop_of_a_field_is_the_field_of_the_crop(
+    row: int, column: int, rows: int, columns: int, cfa: Cfa | None, normal: bool
+) -> None:
+    draw = Draw(3)
+    make = draw.normal if normal else draw.uniform
+    whole = make("crop", PixelGrid(70, 70, cfa), 5)
+    crop = make("crop", PixelGrid(rows, columns, cfa, row, column), 5)
+    np.testing.assert_array_equal(crop, whole[row : row + rows, column : column + columns])
+
+
+@pytest.mark.parametrize("cfa", [cfa for cfa in Cfa if cfa is not Cfa.MONO])
+def test_a_mosaic_is_the_planes_sampled_at_the_filters(cfa: Cfa) -> None:
+    planes = Draw(1).normal("pair", PixelGrid(33, 47), 2)
+    sampled = Draw(1).normal("pair", PixelGrid(33, 47, cfa), 2)
+    np.testing.assert_array_equal(sampled, mosaic(planes, cfa))
+
+
+def test_threads_do_not_change_a_field() -> None:
+    grid = PixelGrid(500, 64)
+    one, two = (Draw(9).normal("threads", grid, 1, threads=n) for n in (1, 2))
+    np.testing.assert_array_equal(one, two)
+
+
+def test_normal_moments_to_order_four(field: np.ndarray) -> None:
+    n = field.size
+    assert abs(field.mean()) * np.sqrt(n) < Z_MAX
+    assert abs(field.var() - 1) * np.sqrt(n / 2) < Z_MAX
+    assert abs(stats.skew(field, axis=None)) * np.sqrt(n / 6) < Z_MAX
+    assert abs(stats.kurtosis(field, axis=None)) * np.sqrt(n / 24) < Z_MAX
+
+
+def test_normal_distribution_and_tails(field: np.ndarray) -> None:
+    assert stats.kstest(field.ravel(), "norm").pvalue > 1e-4
+    for sigma in (3.0, 4.0, 4.5):
+        expected = 2 * stats.norm.sf(sigma) * field.size
+        found = int((np.abs(field) > sigma).sum())
+        assert abs(found - expected) < Z_MAX * np.sqrt(expected), f"beyond {sigma} sigma"
+
+
+def test_uniform_distribution() -> None:
+    field = Draw(7).uniform("test", FIELD)
+    assert field.min() > 0
+    assert field.max() < 1
+    assert stats.kstest(field.ravel().astype(np.float64), "uniform").pvalue > 1e-4
+
+
+@pytest.mark.parametrize("lag", [(0, 1), (0, 2), (0, 4), (0, 8), (1, 0), (2, 0), (1, 1), (64, 0)])
+def test_no_correlation_between_neighbours(field: np.ndarray, lag: tuple[int, int]) -> None:
+    a = field[: FIELD.rows - lag[0], : FIELD.columns - lag[1]]
+    b = field[lag[0] :, lag[1] :]
+    assert abs((a * b).mean()) * np.sqrt(a.size) < Z_MAX
+
+
+def test_fields_of_other_channels_frames_purposes_seeds_and_scopes_are_independent(
+    field: np.ndarray,
+) -> None:
+    others = {
+        "channel": np.roll(field, 1, axis=2),
+        "frame": Draw(7).normal("test", FIELD, 1),
+        "purpose": Draw(7).normal("test2", FIELD),
+        "seed": Draw(8).normal("test", FIELD),
+        "scope": Draw(7).within("content").normal("test", FIELD),
+    }
+    for name, other in others.items():
+        z = float((field * other).mean()) * np.sqrt(field.size)
+        assert abs(z) < Z_MAX, name
+
+
+def test_squares_are_uncorrelated_too(field: np.ndarray) -> None:
+    # Box and Muller's pairs share a radius: their squares would betray a flaw.
+    squares = field**2 - 1
+    for lag in (2, 4, 6, 8):
+        z = (squares[:, lag:] * squares[:, :-lag]).mean() / 2 * np.sqrt(squares[:, lag:].size)
+        assert abs(z) < Z_MAX, lag
+
+
+def test_line_offsets_follow_the_sensor_not_the_crop() -> None:
+    whole = Draw(2).rows("rows", PixelGrid(50, 8))
+    crop = Draw(2).rows("rows", PixelGrid(10, 3, Cfa.RGGB, 20, 5))
+    np.testing.assert_array_equal(crop, whole[20:30])
+    columns = Draw(2).columns("columns", PixelGrid(8, 50))
+    part = Draw(2).columns("columns", PixelGrid(3, 10, None, 5, 21))
+    np.testing.assert_array_equal(part, columns[21:31])

@@ -82,8 +82,11 @@ def draw_mos(scores: pd.DataFrame, scale: Scale, simulated_share: float, path: P
         draw = _draw_conditions if has_conditions(scores) else _draw_list
         figure = draw(scores, scale)
         _mark_simulated(figure, simulated_share)
-        figure.savefig(path.with_suffix(".svg"), metadata={"Date": None, "Creator": "dsis"})
-        figure.savefig(path.with_suffix(".png"), dpi=200, metadata={"Software": "dsis"})
+        title = " ".join(["Mean opinion scores", simulated_mark(simulated_share)]).strip()
+        svg = {"Date": None, "Creator": "dsis", "Title": title}
+        figure.savefig(path.with_suffix(".svg"), metadata=svg)
+        png = {"Software": "dsis", "Title": title}
+        figure.savefig(path.with_suffix(".png"), dpi=200, metadata=png)
 
 
 def has_conditions(scores: pd.DataFrame) -> bool:

@@ -82,15 +82,14 @@ class Moments(NamedTuple):
 def moments(group: NDArray[np.intp], values: NDArray[np.float64], ddof: int) -> Moments:
     """Return the moments of the `values` of each group 0, 1 ...; sd nan where n <= ddof.
 
-    Values that are all equal have an sd of exactly zero, whatever rounding makes of their mean.
+    Values that are all equal have that mean and an sd of zero exactly, free of rounding.
     """
     n = np.bincount(group)
-    mean = np.bincount(group, values) / n
-    squares = np.bincount(group, (values - mean[group]) ** 2)
     lowest, highest = np.full(len(n), np.inf), np.full(len(n), -np.inf)
     np.minimum.at(lowest, group, values)
     np.maximum.at(highest, group, values)
-    squares[lowest == highest] = 0.0
+    mean = np.where(lowest == highest, lowest, np.bincount(group, values) / n)
+    squares = np.bincount(group, (values - mean[group]) ** 2)
     variance = np.full(len(n), np.nan)
     np.divide(squares, n - ddof, out=variance, where=n > ddof)
     return Moments(n.astype(np.int64), mean, np.sqrt(variance))

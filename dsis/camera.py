@@ -179,7 +179,9 @@ class BaseLink(Effect):
     """A link of the base model: no effect of the vocabulary."""
 
     model_config = {**Model.model_config, "arbitrary_types_allowed": True}
-    reference: ClassVar[str] = "Seybold et al., CIC 22, 2014, section 'Camera noise characteristics'"
+    reference: ClassVar[str] = (
+        "Seybold et al., CIC 22, 2014, section 'Camera noise characteristics'"
+    )
 
 
 class ShotNoise(BaseLink):

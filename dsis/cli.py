@@ -228,11 +228,26 @@ def _parser() -> argparse.ArgumentParser:
         "Build the sequences that a test spec names, with a manifest.",
         "dsis stimuli stills.toml --source photos/ --out stimuli",
     )
-    sub.add_argument("spec", nargs="?", metavar="SPEC.toml", help="a file, a shipped spec's name, or a manifest.json")
+    sub.add_argument(
+        "spec",
+        nargs="?",
+        metavar="SPEC.toml",
+        help="a file, a shipped spec's name, or a manifest.json",
+    )
     sub.add_argument("--out", type=Path, metavar="DIR", help="default: SPEC-stimuli")
-    sub.add_argument("--source", nargs="+", default=[], metavar="FILES", help="your frames instead of the spec's content")
-    sub.add_argument("--dry-run", action="store_true", help="say disk, memory and time, build nothing")
-    sub.add_argument("--check", type=Path, metavar="DIR", help="verify every frame against the manifest")
+    sub.add_argument(
+        "--source",
+        nargs="+",
+        default=[],
+        metavar="FILES",
+        help="your frames instead of the spec's content",
+    )
+    sub.add_argument(
+        "--dry-run", action="store_true", help="say disk, memory and time, build nothing"
+    )
+    sub.add_argument(
+        "--check", type=Path, metavar="DIR", help="verify every frame against the manifest"
+    )
     working(sub)
     seeded(sub, "default: the spec's")
 
@@ -245,9 +260,15 @@ def _parser() -> argparse.ArgumentParser:
     sub.add_argument("stimuli_dir", type=Path, metavar="STIMULI_DIR")
     sub.add_argument("--observer", metavar="ID", help="pseudonym of the person who votes")
     sub.add_argument("--robots", type=_whole(1), metavar="N", help="simulated observers instead")
-    sub.add_argument("--resume", action="store_true", help="go on with a session that was interrupted")
-    sub.add_argument("--status", action="store_true", help="how far the observers are; never scores")
-    sub.add_argument("--port", type=_whole(0), default=0, help="port on 127.0.0.1 (default: a free one)")
+    sub.add_argument(
+        "--resume", action="store_true", help="go on with a session that was interrupted"
+    )
+    sub.add_argument(
+        "--status", action="store_true", help="how far the observers are; never scores"
+    )
+    sub.add_argument(
+        "--port", type=_whole(0), default=0, help="port on 127.0.0.1 (default: a free one)"
+    )
     sub.add_argument("--no-browser", action="store_true", help="print the address only")
     seeded(sub, "default: 1")
 
@@ -268,7 +289,13 @@ def _parser() -> argparse.ArgumentParser:
     )
     sub.add_argument("votes", type=Path, metavar="VOTES.csv")
     sub.add_argument("--out", type=Path, metavar="DIR", help="default: VOTES-report")
-    sub.add_argument("--scale", nargs=2, type=int, metavar=("LOW", "HIGH"), help="ends of the scale, worst first; default: datapackage.json")
+    sub.add_argument(
+        "--scale",
+        nargs=2,
+        type=int,
+        metavar=("LOW", "HIGH"),
+        help="ends of the scale, worst first; default: datapackage.json",
+    )
     return parser
 
 

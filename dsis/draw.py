@@ -169,16 +169,12 @@ class Draw:
         """Return independent deviates, uniform on (0, 1), on `grid`: float32, `grid.shape`."""
         return self._field(purpose, grid, frame, threads, normal=False)
 
-    def rows(
-        self, purpose: str, grid: PixelGrid, frame: int = 0
-    ) -> NDArray[np.float32]:
+    def rows(self, purpose: str, grid: PixelGrid, frame: int = 0) -> NDArray[np.float32]:
         """Return one standard normal deviate per sensor row of `grid`, common to all channels."""
         line = PixelGrid(grid.rows, 1, Cfa.MONO, grid.first_row, 0)
         return self.normal(purpose, line, frame)[:, 0]
 
-    def columns(
-        self, purpose: str, grid: PixelGrid, frame: int = 0
-    ) -> NDArray[np.float32]:
+    def columns(self, purpose: str, grid: PixelGrid, frame: int = 0) -> NDArray[np.float32]:
         """Return one standard normal deviate per sensor column of `grid`, common to all channels."""
         line = PixelGrid(1, grid.columns, Cfa.MONO, 0, grid.first_column)
         return self.normal(purpose, line, frame)[0]

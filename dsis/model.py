@@ -73,7 +73,8 @@ def attempt(
             _fault(kind, item, file, prefix)
             for item in items
             # An array whose items are all at fault is not empty besides.
-            if item["type"] != "too_short" or sum(p[: len(item["loc"])] == item["loc"] for p in places) == 1
+            if item["type"] != "too_short"
+            or sum(p[: len(item["loc"])] == item["loc"] for p in places) == 1
         ]
 
 
@@ -99,7 +100,11 @@ def _fault(kind: Any, item: Any, file: str, prefix: str) -> Fault:
     if problem == "union_tag_not_found":
         return Fault(file, f"{key}.{context['discriminator'].strip(chr(39))}", "is missing")
     if problem in ("too_short", "too_long"):
-        bound = f"at least {context['min_length']}" if problem == "too_short" else f"at most {context['max_length']}"
+        bound = (
+            f"at least {context['min_length']}"
+            if problem == "too_short"
+            else f"at most {context['max_length']}"
+        )
         return Fault(file, key, f"has {context['actual_length']} items, must have {bound}")
     fact = item["msg"][:1].lower() + item["msg"][1:]
     fact = fact.removeprefix("input should be ").removeprefix("value should be ")

@@ -5,7 +5,6 @@ import re
 from collections import Counter
 from collections.abc import Mapping, Sequence as Many
 from dataclasses import dataclass, replace
-from importlib.resources import files as package_files
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -27,9 +26,13 @@ Seed = Annotated[int, Field(ge=0)]
 Format = Literal["player", "png8", "tiff16", "dpx16", "exr"]
 Noise = Literal["awgn", "sd"]
 
+# Beside the packages, in a checkout as in an installation.
+SHIPPED = Path(__file__).resolve().parents[1] / "stimuli_specs"
+
 NAME = re.compile(r"[A-Za-z0-9]+(?:[-_.]?[A-Za-z0-9]+)*")
 Globs = Annotated[
-    tuple[str, ...], BeforeValidator(lambda globs: (globs,) if isinstance(globs, str) else tuple(globs))
+    tuple[str, ...],
+    BeforeValidator(lambda globs: (globs,) if isinstance(globs, str) else tuple(globs)),
 ]
 FILE_NAME_RULE = "letters, digits and single '-', '_' or '.' between them"
 
@@ -256,13 +259,11 @@ def spec_path(name: str | Path) -> Path:
     path = Path(name)
     if path.exists() or path.is_absolute():
         return path
-    shipped = Path(str(package_files("stimuli_specs").joinpath(str(name))))
+    shipped = SHIPPED / name
     return shipped if shipped.is_file() else path
 
 
-def read_spec(
-    name: str | Path, source: Many[str | Path] = (), seed: int | None = None
-) -> Test:
+def read_spec(name: str | Path, source: Many[str | Path] = (), seed: int | None = None) -> Test:
     """Return the test that a spec describes; raise `InputError` with every fault in it.
 
     Parameters
@@ -288,7 +289,9 @@ def read_spec(
     for key, field in Spec.model_fields.items():
         name_in_file = field.alias or key
         if name_in_file in values:
-            kind = Annotated[field.annotation, *field.metadata] if field.metadata else field.annotation
+            kind = (
+                Annotated[field.annotation, *field.metadata] if field.metadata else field.annotation
+            )
             sections[key], more = attempt(
                 kind, values[name_in_file], str(path), name_in_file, path.parent.resolve()
             )
@@ -349,7 +352,7 @@ def _camera(section: object, path: Path, faults: list[Fault]) -> Camera | None:
     beside = path.parent / model
     file = beside if beside.exists() else spec_path(model)
     if not file.is_file():
-        shipped = sorted(p.name for p in Path(str(package_files("stimuli_specs"))).glob("cameras/*.toml"))
+        shipped = sorted(p.name for p in SHIPPED.glob("cameras/*.toml"))
         fact = f"is {model!r}: no such file, neither from {path.parent.resolve()} nor shipped"
         faults.append(Fault(str(path), "camera.model", f"{fact} (cameras/: {', '.join(shipped)})"))
         return None
@@ -441,7 +444,11 @@ def _too_small(
 
 def _too_long(session: Session, sequence: Sequence, file: str) -> list[Fault]:
     return [
-        Fault(file, f"session.{key}", f"is {value:g} s, must be <= sequence.seconds = {sequence.seconds:g}")
+        Fault(
+            file,
+            f"session.{key}",
+            f"is {value:g} s, must be <= sequence.seconds = {sequence.seconds:g}",
+        )
         for key, value in (("reference_s", session.reference_s), ("test_s", session.test_s))
         if value > sequence.seconds
     ]

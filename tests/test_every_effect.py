@@ -123,9 +123,7 @@ class TestLaws:
         sampled = mosaic(planes, Cfa.GBRG)
         effect = example_of(kind)
         full = effect.apply(planes, self.exposure(PixelGrid(20, 30), 1, planes))
-        single = effect.apply(
-            sampled, self.exposure(PixelGrid(20, 30, Cfa.GBRG), 1, sampled)
-        )
+        single = effect.apply(sampled, self.exposure(PixelGrid(20, 30, Cfa.GBRG), 1, sampled))
         np.testing.assert_array_equal(single, mosaic(full, Cfa.GBRG))
 
     def test_the_given_image_is_left_alone(self, kind: type[Effect]) -> None:

@@ -32,7 +32,11 @@ def registry() -> dict[str, type[Effect]]:
     found: dict[str, type[Effect]] = {}
     for module in iter_modules(__path__):
         for value in vars(import_module(f"{__name__}.{module.name}")).values():
-            if inspect.isclass(value) and issubclass(value, Effect) and not inspect.isabstract(value):
+            if (
+                inspect.isclass(value)
+                and issubclass(value, Effect)
+                and not inspect.isabstract(value)
+            ):
                 kind = value.model_fields["kind"].default
                 if found.setdefault(kind, value) is not value:
                     message = f"two effects of kind {kind}: {found[kind]} and {value}"

@@ -78,7 +78,10 @@ def measure(stack: NDArray[np.float32]) -> dict[str, Estimate]:
         "frame_variance": Estimate(
             (ms_frame - ms_row - ms_column + ms_pixel) / (rows * columns),
             error(
-                (ms_frame, dof_frame), (ms_row, dof_row), (ms_column, dof_column), (ms_pixel, dof_pixel)
+                (ms_frame, dof_frame),
+                (ms_row, dof_row),
+                (ms_column, dof_column),
+                (ms_pixel, dof_pixel),
             )
             / (rows * columns),
         ),

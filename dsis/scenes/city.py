@@ -1,43 +1,55 @@
-"""City: blocks of houses, towers and parks, seen from 62 m above the streets."""
+"""City: blocks of houses, towers, churches and parks, seen from 62 m above the streets."""
 
 import math
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
 from dsis.scenes import sky
-from dsis.scenes.building import STREET_M, Building
+from dsis.scenes.building import Building
+from dsis.scenes.light import rgb
+from dsis.scenes.surfaces import STREET_M
 from dsis.scenes.texture import Field, Texture, pulse, step
 from dsis.scenes.tree import Tree
 from dsis.scenes.view import Point, View
 
 EYE_M = 62.0
-PITCH_M = (98.0, 82.0)  # of the street grid
+BLOCK_M, ROW_M = 98.0, 82.0  # pitch of the street grid, along its axes a and b
 GRID_RAD = -0.3  # one street runs straight away from the eye, at this azimuth to the right
 NEAREST_M, HOUSES_M, FARTHEST_M = 150.0, 800.0, 2900.0
+HALF_A, HALF_B = (BLOCK_M - STREET_M) / 2, (ROW_M - STREET_M) / 2
 
 
 class Thing(Protocol):
     """What stands in the city."""
 
     @property
-    def x(self) -> float: ...
+    def x(self) -> float:
+        """Metres to the right of the eye."""
+
     @property
-    def y(self) -> float: ...
-    def occluder(self) -> list[Point]: ...
-    def paint(self, view: View, texture: Texture, azimuth: float, lowest_row: float) -> None: ...
+    def y(self) -> float:
+        """Metres ahead of the eye."""
+
+    def occluder(self) -> list[Point]:
+        """Return the points below which the thing hides what is behind it."""
+
+    def paint(self, view: View, texture: Texture, azimuth: float, lowest_row: float) -> None:
+        """Paint the thing."""
 
 
 def paint(image: Field, seed: int) -> None:
-    """Paint the city of a seed into float32 (row, column, 3)."""
+    """Paint the city of a seed into `image`, float32 (row, column, 3)."""
     rows = image.shape[0]
-    view = View(image, focal_px=2.75 * rows, horizon_row=0.28 * rows, eye_m=EYE_M)
-    texture = Texture.of(np.random.Generator(np.random.PCG64(seed)))
+    view = View(image, focal_px=2.75 * rows, horizon_row=0.28 * rows, eye_m=EYE_M, air=1.0)
+    texture = Texture.of(seed)
     sky.paint(view, texture, cover=0.38)
     _hills(view, texture)
     _ground(view, texture)
-    for thing, azimuth, lowest_row in reversed(list(_visible(view, _layout(seed, view)))):
+    things = list(_visible(view, _layout(view, seed)))
+    for thing, azimuth, lowest_row in reversed(things):
         thing.paint(view, texture, azimuth, lowest_row)
 
 
@@ -48,140 +60,164 @@ def _visible(view: View, things: list[Thing]) -> Iterator[tuple[Thing, float, fl
         distance = math.hypot(thing.x, thing.y)
         for azimuth in view.turns(math.atan2(thing.x, thing.y), 60 / distance):
             solid = [view.project(point, azimuth) for point in thing.occluder()]
-            columns = [c for c, _ in solid] or [azimuth * view.focal_px]
-            margin = 0 if solid else math.ceil(8 * view.focal_px / distance)
-            first = max(math.floor(min(columns)) - 1 - margin, 0)
-            last = max(math.ceil(max(columns)) + 1 + margin, 0)
-            behind = skyline[first:last]
-            if not behind.size:
-                continue
-            yield thing, azimuth, float(behind.max()) + 1
-            inner = behind[2:-2]
+            reach = max([abs(c - azimuth * view.focal_px) for c, _ in solid], default=0.0)
+            reach = reach or 20 * view.focal_px / distance
+            centre = azimuth * view.focal_px
+            first, last = max(int(centre - reach) - 1, 0), max(int(centre + reach) + 2, 0)
+            if skyline[first:last].size:
+                yield thing, azimuth, float(skyline[first:last].max()) + 1
             if solid:
-                np.minimum(inner, max(r for _, r in solid) + 1, out=inner)
+                columns = [c for c, _ in solid]
+                hidden = skyline[max(int(min(columns)) + 2, 0) : max(int(max(columns)) - 1, 0)]
+                np.minimum(hidden, max(r for _, r in solid) + 1, out=hidden)
 
 
 def _hills(view: View, texture: Texture) -> None:
     """Paint two wooded ridges behind the city."""
     azimuth = view.azimuths()
     rows = np.arange(view.image.shape[0], dtype=np.float32)[:, None]
-    for height, distance, salt in ((0.022, 16000.0, 0.0), (0.013, 9000.0, 50.0)):
-        profile = texture.fractal(azimuth * 5 + salt, np.float32([[salt]]), 7, 5 / view.focal_px)
+    for height, distance, shift in ((0.022, 16000, 0.0), (0.013, 9000, 50.0)):
+        across = 5 * azimuth + np.float32(shift)
+        profile = texture.fractal(across, np.full((1, 1), shift, np.float32), 7, 5 / view.focal_px)
         ridge = view.horizon_row - view.focal_px * height * (0.5 + 0.5 * profile)
         first, last = int(ridge.min()) - 1, int(view.horizon_row + 0.008 * view.focal_px)
-        cover = np.clip(rows[first:last] + 1 - ridge, 0, 1)
-        green = np.array([0.05, 0.08, 0.03], np.float32)
         slope = view.slopes(first, last)
-        speck = texture.fractal(azimuth * 300 + salt, slope * 700, 4, 300 / view.focal_px)
-        colour = (1 + np.float32(0.5) * speck)[..., None] * green
-        air = np.full(cover.shape, distance, np.float32)
-        view.blend(first, 0, sky.hazed(colour, air), cover)
+        trees = texture.fractal(60 * across, 700 * slope, 4, 300 / view.focal_px)
+        colour = (1 + np.float32(0.5) * trees)[..., None] * rgb(0.05, 0.08, 0.03)
+        far = np.full((1, 1), distance, np.float32)
+        view.blend(first, 0, colour, far, np.clip(rows[first:last] + 1 - ridge, 0, 1))
 
 
 def _ground(view: View, texture: Texture) -> None:
-    """Paint streets and courts in deep shadow from the horizon down, in bands of rows."""
+    """Paint streets and courts, in the shadow of the houses, from the horizon down."""
     azimuth = view.azimuths()
+    sin, cos = np.sin(azimuth + np.float32(GRID_RAD)), np.cos(azimuth + np.float32(GRID_RAD))
     start = math.ceil(view.horizon_row + view.focal_px * EYE_M / 9000)
-    along = azimuth + np.float32(GRID_RAD)
     for first in range(start, view.image.shape[0], sky.ROWS_AT_ONCE):
-        last = min(first + sky.ROWS_AT_ONCE, view.image.shape[0])
-        distance = EYE_M / -view.slopes(first, last)
-        a = distance * np.sin(along) / np.float32(PITCH_M[0])
-        b = distance * np.cos(along) / np.float32(PITCH_M[1])
-        pixel = distance * distance / np.float32(EYE_M * view.focal_px)  # along the view
-        fa = (np.abs(np.sin(along)) * pixel + distance / view.focal_px) / PITCH_M[0]
-        fb = (np.abs(np.cos(along)) * pixel + distance / view.focal_px) / PITCH_M[1]
-        built = pulse(a, 1 - STREET_M / PITCH_M[0], fa) * pulse(b, 1 - STREET_M / PITCH_M[1], fb)
-        kerb = pulse(a, 1 - 9 / PITCH_M[0], fa) * pulse(b, 1 - 9 / PITCH_M[1], fb)
-        line = 1 - (1 - pulse(a + 0.5, 0.3 / PITCH_M[0], fa)) * (
-            1 - pulse(b + 0.5, 0.3 / PITCH_M[1], fb)
+        distance = EYE_M / -view.slopes(first, first + sky.ROWS_AT_ONCE)
+        a, b = distance * sin / np.float32(BLOCK_M), distance * cos / np.float32(ROW_M)
+        deep = distance * distance / np.float32(EYE_M * view.focal_px)  # a pixel, along the view
+        wide = distance / np.float32(view.focal_px)
+        fa = (np.abs(sin) * deep + np.abs(cos) * wide) / BLOCK_M
+        fb = (np.abs(cos) * deep + np.abs(sin) * wide) / ROW_M
+        court, kerb = (
+            pulse(a, 1 - width / BLOCK_M, fa) * pulse(b, 1 - width / ROW_M, fb)
+            for width in (STREET_M, 9.0)
         )
-        stain = texture.fractal(a * 14, b * 14, 4, pixel / 7)
-        grey = 0.012 + 0.024 * kerb + (line * 0.05) * pulse(a * 12 + b * 12, 0.5, 12 * (fa + fb))
-        street = grey[..., None] * np.array([0.9, 1.0, 1.15], np.float32)
-        court = np.array([0.008, 0.011, 0.005], np.float32)
-        colour = (street + built[..., None] * (court - street)) * (1 + 0.4 * stain[..., None])
-        roofs = (0.10 + 0.06 * stain)[..., None] * np.array([1.1, 0.95, 0.75], np.float32)
-        colour += step(distance, FARTHEST_M * 0.7, FARTHEST_M)[..., None] * (roofs - colour)
-        view.image[first:last] = sky.hazed(colour, np.broadcast_to(distance, stain.shape))
+        line = np.maximum(pulse(a + 0.5, 0.3 / BLOCK_M, fa), pulse(b + 0.5, 0.3 / ROW_M, fb))
+        dashes = line * pulse(12 * (a + b), 0.5, 12 * (fa + fb))
+        stain = texture.fractal(14 * a, 14 * b, 4, deep / 7)
+        colour = (0.012 + 0.024 * kerb + 0.05 * dashes)[..., None] * rgb(0.9, 1.0, 1.15)
+        colour += court[..., None] * (rgb(0.008, 0.011, 0.005) - colour)
+        colour *= 1 + 0.4 * stain[..., None]
+        suburbs = (0.10 + 0.06 * stain)[..., None] * rgb(1.1, 0.95, 0.75)
+        outside = step(distance, 0.7 * FARTHEST_M, FARTHEST_M)
+        colour += outside[..., None] * (suburbs - colour)
+        view.blend(first, 0, colour, distance, np.ones_like(stain))
 
 
-def _layout(seed: int, view: View) -> list[Thing]:
-    """Return what may be in view; the content of a block depends on the seed and block alone."""
+def _layout(view: View, seed: int) -> list[Thing]:
+    """Return what may be in view; a block's content depends on the seed and the block alone."""
     things: list[Thing] = []
-    width = view.image.shape[1] / view.focal_px
-    reach = math.ceil(FARTHEST_M / min(PITCH_M))
-    for i in range(-reach, reach + 1):
-        for j in range(-reach, reach + 1):
-            a, b = (i + 0.5) * PITCH_M[0], (j + 0.5) * PITCH_M[1]
+    reach = math.ceil(FARTHEST_M / min(BLOCK_M, ROW_M))
+    for i in range(-reach, reach):
+        for j in range(-reach, reach):
+            a, b = (i + 0.5) * BLOCK_M, (j + 0.5) * ROW_M
             distance = math.hypot(a, b)
-            margin = 65 / max(distance, 65)
-            azimuth = (math.atan2(a, b) - GRID_RAD + margin) % math.tau
-            if NEAREST_M < distance < FARTHEST_M and azimuth < width + 2 * margin:
-                rng = np.random.Generator(np.random.PCG64([seed, i + 1000, j + 1000]))
-                things += _block(rng, a, b, distance)
+            in_view = view.turns(math.atan2(a, b) - GRID_RAD, 65 / max(distance, 65))
+            if NEAREST_M < distance < FARTHEST_M and in_view:
+                rng = np.random.Generator(np.random.PCG64([seed, i + reach, j + reach]))
+                things += Block(rng, a, b).things(distance)
     return things
 
 
-def _block(rng: np.random.Generator, a: float, b: float, distance: float) -> list[Thing]:
-    """Return the buildings and trees of the block centred at (a, b) of the street grid."""
-    u, v = (PITCH_M[0] - STREET_M) / 2, (PITCH_M[1] - STREET_M) / 2
-    c, s = math.cos(GRID_RAD), math.sin(GRID_RAD)
-    things: list[Thing] = []
+@dataclass(frozen=True)
+class Block:
+    """A block of the street grid, centred at (a, b) of its axes; `rng` decides what stands on it."""
 
-    def place(da: float, db: float) -> tuple[float, float]:
-        return c * (a + da) - s * (b + db), s * (a + da) + c * (b + db)
+    rng: np.random.Generator
+    a: float
+    b: float
 
-    def build(da, db, wide, deep, tall, roof, surface, quarter=False) -> None:
-        x, y = place(da, db)
-        yaw = GRID_RAD + (math.pi / 2 if quarter else 0)
-        things.append(Building(x, y, yaw, wide, deep, 0, tall, roof, surface, rng.random()))
+    def things(self, distance: float) -> Iterator[Thing]:
+        """Yield what stands on the block, in more or less detail."""
+        kind = self.rng.random()
+        if kind < 0.09:
+            for _ in range(24 if distance < HOUSES_M else 8):
+                yield self._tree(self._within(HALF_A), self._within(HALF_B), 9, 19)
+        elif kind < 0.19 and distance > 450:
+            wall = str(self.rng.choice(["glass", "house"]))
+            yield self._building(0, 5, self._between(18, 34), 24, (38, 105), ("flat",), wall)
+            yield self._building(0, -24, 70, 14, (9, 16), ("flat",), "glass")
+        elif kind < 0.24 and distance > 350:
+            yield self._building(8, 0, 42, 18, (17, 18), ("gable",))
+            yield self._building(-18, 0, 9, 9, (34, 42), ("spire",))
+        elif distance > HOUSES_M:  # rows of houses, in one piece
+            for db in (7 - HALF_B, HALF_B - 7):
+                for da in (-HALF_A / 2, HALF_A / 2):
+                    yield self._building(da, db, HALF_A, 13, (12, 23), ("gable", "flat"))
+        else:
+            yield from self._perimeter()
+        if distance < HOUSES_M:
+            yield from self._street()
 
-    def drive(da: float, db: float) -> None:
-        x, y = place(da, db)
-        style = rng.random()
-        things.append(Building(x, y, GRID_RAD, 1.8, 4.4, 0.3, 0.95, "flat", "car", style))
-        things.append(Building(x, y, GRID_RAD, 1.5, 2.2, 0.9, 1.5, "flat", "cabin", style))
-
-    def plant(da: float, db: float, low: float, high: float) -> None:
-        x, y = place(da, db)
-        things.append(Tree(x, y, 0, rng.uniform(low, high), rng.random()))
-
-    kind = rng.random()
-    if kind < 0.09:  # a park
-        for _ in range(24 if distance < HOUSES_M else 8):
-            plant(rng.uniform(-u, u), rng.uniform(-v, v), 9, 19)
-    elif kind < 0.19 and distance > 450:  # a tower
-        surface = rng.choice(["glass", "house"])
-        build(0, 5, rng.uniform(18, 34), rng.uniform(18, 30), rng.uniform(38, 105), "flat", surface)
-        build(0, -24, 70, 14, rng.uniform(9, 16), "flat", "glass")
-    elif kind < 0.24 and distance > 350:  # a church
-        build(8, 0, 42, 18, 17, "gable", "house")
-        build(-18, 0, 9, 9, rng.uniform(34, 42), "spire", "house")
-    elif distance > HOUSES_M:  # rows of houses, in one piece
-        for db in (-v + 7, v - 7):
-            for da in (-u / 2, u / 2):
-                roof = rng.choice(["gable", "flat"])
-                build(da, db, u, 13, rng.uniform(12, 23), roof, "house")
-    else:
-        for db in (-v + 6, v - 6):
-            da = -u
-            while da < u - 8:
-                wide = min(rng.uniform(11, 21), u - da)
-                roof = rng.choice(["gable", "gable", "gable", "flat"])
-                build(da + wide / 2, db, wide, 12, rng.uniform(11.5, 20), roof, "house")
+    def _perimeter(self) -> Iterator[Thing]:
+        """Yield houses around a court with trees."""
+        for db in (6 - HALF_B, HALF_B - 6):
+            da = -HALF_A
+            while da < HALF_A - 8:
+                wide = min(self._between(11, 21), HALF_A - da)
+                roofs = ("gable", "gable", "gable", "flat")
+                yield self._building(da + wide / 2, db, wide, 12, (11.5, 20), roofs)
                 da += wide
-        for da in (-u + 6, u - 6):
-            for db in (-v / 2 + 3, v / 2 - 3):
-                roof = rng.choice(["gable", "flat"])
-                build(da, db, v - 6, 12, rng.uniform(11.5, 19), roof, "house", quarter=True)
+        for da in (6 - HALF_A, HALF_A - 6):
+            for db in (3 - HALF_B / 2, HALF_B / 2 - 3):
+                roofs = ("gable", "flat")
+                yield self._building(da, db, HALF_B - 6, 12, (11.5, 19), roofs, quarter=True)
         for _ in range(4):
-            plant(rng.uniform(-u + 16, u - 16), rng.uniform(-8, 8), 9, 17)
-    if distance < HOUSES_M:
-        for db in np.arange(-v, v, 9.0):
-            if rng.random() < 0.6:
-                plant(-u - 3.5, float(db), 6, 10)
-            lane = float(rng.choice([-2.2, 2.2, 5.6, -5.6]))
-            if rng.random() < 0.5:
-                drive(-u - STREET_M / 2 + lane, float(db))
-    return things
+            yield self._tree(self._within(HALF_A - 16), self._within(8), 9, 17)
+
+    def _street(self) -> Iterator[Thing]:
+        """Yield trees and cars of the street along the block."""
+        for db in np.arange(-HALF_B, HALF_B, 9.0).tolist():
+            if self.rng.random() < 0.6:
+                yield self._tree(-HALF_A - 3.5, db, 6, 10)
+            if self.rng.random() < 0.5:
+                lane = -HALF_A - STREET_M / 2 + float(self.rng.choice([-5.6, -2.2, 2.2, 5.6]))
+                x, y = self._place(lane, db)
+                style = self.rng.random()
+                yield Building(x, y, GRID_RAD, 1.8, 4.4, 0.3, 0.95, "flat", "car", style)
+                yield Building(x, y, GRID_RAD, 1.5, 2.2, 0.9, 1.5, "flat", "cabin", style)
+
+    def _building(
+        self,
+        da: float,
+        db: float,
+        wide: float,
+        deep: float,
+        tall: tuple[float, float],
+        roofs: tuple[str, ...],
+        kind: str = "house",
+        *,
+        quarter: bool = False,
+    ) -> Building:
+        x, y = self._place(da, db)
+        yaw = GRID_RAD + (math.pi / 2 if quarter else 0)
+        roof = roofs[int(self.rng.integers(len(roofs)))]
+        eaves = self._between(*tall)
+        return Building(x, y, yaw, wide, deep, 0.0, eaves, roof, kind, self.rng.random())
+
+    def _tree(self, da: float, db: float, low: float, high: float) -> Tree:
+        x, y = self._place(da, db)
+        return Tree(x, y, 0.0, self._between(low, high), self.rng.random())
+
+    def _place(self, da: float, db: float) -> tuple[float, float]:
+        """Return world (x, y) of a point relative to the block's centre."""
+        a, b, c, s = self.a + da, self.b + db, math.cos(GRID_RAD), math.sin(GRID_RAD)
+        return c * a - s * b, s * a + c * b
+
+    def _between(self, low: float, high: float) -> float:
+        return float(self.rng.uniform(low, high))
+
+    def _within(self, half: float) -> float:
+        return self._between(-half, half)

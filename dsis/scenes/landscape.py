@@ -89,7 +89,9 @@ def _relief(view: View, texture: Texture, azimuth: Field) -> Land:
     height = level + relief * ((1 - far) * shape + far * (1 - 2 * np.abs(grand)))
     height = height.astype(np.float32)
     wood = texture.fractal(x / 600 + 40, y / 600, 4, RANGES / 200 / 600)
-    wood += np.interp(RANGES, [300, 1300, 2000, 3000, 6000, 15000], [-2, -0.7, -0.5, 0.6, 0.7, 0.5]).astype(np.float32)
+    wood += np.interp(
+        RANGES, [300, 1300, 2000, 3000, 6000, 15000], [-2, -0.7, -0.5, 0.6, 0.7, 0.5]
+    ).astype(np.float32)
     wood = step(wood, 0, 0.03) * step(height, 1.5, 3)
     crowns = texture.fractal(x / 11, y / 23, 2, RANGES / view.focal_px / 11)
     height = height + wood * (12 + 5 * crowns)
@@ -137,7 +139,14 @@ def _strip(view: View, texture: Texture, land: Land, first: int, azimuth: Field)
     flat = behind.reshape(-1, 3)
     flat[at] = sky.hazed(colour, distance, view.air)
     flat[at[wet]] = _water(
-        view, texture, behind, rows[row[wet], 0], column[wet], az[wet], distance[wet], between(land.bank)[wet]
+        view,
+        texture,
+        behind,
+        rows[row[wet], 0],
+        column[wet],
+        az[wet],
+        distance[wet],
+        between(land.bank)[wet],
     )
     view.image[:, first : first + count] = behind.reshape(-1, OVER, count, 3).mean(axis=1)
 
@@ -165,11 +174,15 @@ def _meadow(view: View, texture: Texture, az: Field, distance: Field) -> Field:
     blade = _upright(texture, az, distance, tall / 0.3, 0.10, 3, pixel)
     dry = step(texture.fractal(x / 14 + 70, y / 14, 4), -0.6, 1.0)
     grass, straw = np.float32([0.14, 0.20, 0.04]), np.float32([0.34, 0.30, 0.11])
-    colour = (grass + dry[..., None] * (straw - grass)) * np.exp(0.5 * tuft + 0.8 * blade)[..., None]
+    colour = (grass + dry[..., None] * (straw - grass)) * np.exp(0.5 * tuft + 0.8 * blade)[
+        ..., None
+    ]
     bloom = _upright(texture, az + 5, distance, tall / 0.13, 0.13, 1, pixel)
     where = step(texture.fractal(x / 9 + 30, y / 9 + 9, 2), 0.0, 0.9)
     flower = step(bloom + 0.35 * where, 0.8, 0.95) * step(where, 0, 0.3)
-    petal = np.where((tuft > 0)[..., None], np.float32([0.8, 0.78, 0.7]), np.float32([0.75, 0.6, 0.05]))
+    petal = np.where(
+        (tuft > 0)[..., None], np.float32([0.8, 0.78, 0.7]), np.float32([0.75, 0.6, 0.05])
+    )
     shaded: Field = colour + flower[..., None] * (petal - colour)
     return shaded
 
@@ -205,7 +218,13 @@ def _country(
 
 
 def _upright(
-    texture: Texture, az: Field, distance: Field, v: Field, size_m: float, octaves: int, pixel: Field
+    texture: Texture,
+    az: Field,
+    distance: Field,
+    v: Field,
+    size_m: float,
+    octaves: int,
+    pixel: Field,
 ) -> Field:
     """Return noise in features `size_m` wide across the view at every distance, not sheared by it.
 
@@ -222,7 +241,14 @@ def _upright(
 
 
 def _water(
-    view: View, texture: Texture, scene: Field, row: Field, column: NDArray[np.int64], az: Field, distance: Field, bank: Field
+    view: View,
+    texture: Texture,
+    scene: Field,
+    row: Field,
+    column: NDArray[np.int64],
+    az: Field,
+    distance: Field,
+    bank: Field,
 ) -> Field:
     """Return the lake: the mirrored scene in ripples, the deep below, glitter of the sun."""
     ripple = texture.fractal(az * 300, np.log(distance) * 160, 4, 300 / view.focal_px)

@@ -194,7 +194,7 @@ def _dummies(
         other = [clip for clip in ranked if alike(clip) != alike(dummies[0])]
         fitting = [clip for clip in other if clip in stratum]
         middle = ranked.index(stratum[0])
-        nearest = sorted(other, key=lambda clip: abs(ranked.index(clip) - middle))[:1]  # noqa: B023  used at once
+        nearest = sorted(other, key=lambda clip: abs(ranked.index(clip) - middle))[:1]
         pool = fitting or nearest or stratum
         dummies.insert(0, pool[rng.integers(len(pool))])
     return dummies[:-1]

@@ -19,7 +19,15 @@ import dsis
 from dsis.camera import camera_values
 from dsis.color import STUDIO_CONFIG, DisplayTransform
 from dsis.errors import InputError
-from dsis.manifest import MANIFEST, Clip, ClipFiles, Manifest, Quality, read_manifest, write_manifest
+from dsis.manifest import (
+    MANIFEST,
+    Clip,
+    ClipFiles,
+    Manifest,
+    Quality,
+    read_manifest,
+    write_manifest,
+)
 from dsis.outdir import check_replaceable, finish, partial_of
 from dsis.scenes import SCENES
 from dsis.spec import Content, Test
@@ -346,9 +354,7 @@ def spec_values(test: Test) -> dict[str, Any]:
     return values
 
 
-def _manifest(
-    test: Test, clips: tuple[Clip, ...], sigmas: dict[str, dict[str, float]]
-) -> Manifest:
+def _manifest(test: Test, clips: tuple[Clip, ...], sigmas: dict[str, dict[str, float]]) -> Manifest:
     spec = test.spec
     return Manifest(
         schema="dsis-manifest/1",  # type: ignore[call-arg] # the alias, as files have it

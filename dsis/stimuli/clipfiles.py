@@ -29,9 +29,7 @@ def frame_path(folder: Path, stimulus: str, form: str, frame: int) -> Path:
     return folder / path.replace("*", f"{frame:05d}")
 
 
-def write_frame(
-    folder: Path, stimulus: str, form: str, frame: int, display: Frame
-) -> str:
+def write_frame(folder: Path, stimulus: str, form: str, frame: int, display: Frame) -> str:
     """Write one frame of a clip and return the SHA-256 of its bytes."""
     path = frame_path(folder, stimulus, form, frame)
     if form != "player":

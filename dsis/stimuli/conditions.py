@@ -97,9 +97,7 @@ class Rendering:
         grid = PixelGrid(clean.shape[0], clean.shape[1])
         temporal = Draw(self.seed, ("content", content, f"level {level}"))
         sensor = Draw(self.seed, ("sensor",))
-        raw = self.camera.expose(
-            clean / stops, temporal, sensor, frame, grid, threads=self.threads
-        )
+        raw = self.camera.expose(clean / stops, temporal, sensor, frame, grid, threads=self.threads)
         return raw * stops
 
     def noisy_display(

@@ -29,7 +29,9 @@ def matching_frames(frames: int, count: int = FRAMES) -> tuple[int, ...]:
     return tuple(int(round(place)) for place in places)
 
 
-def solve_sigma(spec: Spec, source: Source, rendering: Rendering, content: str, level: int) -> float:
+def solve_sigma(
+    spec: Spec, source: Source, rendering: Rendering, content: str, level: int
+) -> float:
     """Return the standard deviation of the white noise in 8-bit codes for a content and level."""
     if spec.awgn.sigma is not None:
         return spec.awgn.sigma
@@ -38,7 +40,9 @@ def solve_sigma(spec: Spec, source: Source, rendering: Rendering, content: str, 
     for frame in matching_frames(spec.sequence.frames):
         clean = rendering.camera.clean_raw(source.light(frame))
         reference = rendering.reference(clean)
-        target = score(rendering.display(rendering.noisy_raw(clean, content, level, frame)), reference)
+        target = score(
+            rendering.display(rendering.noisy_raw(clean, content, level, frame)), reference
+        )
         unit = rendering.noisy_display(reference, 1.0, content, level, frame) / CODE_MAX - reference
         pairs.append((reference, unit, target))
 

@@ -63,7 +63,7 @@ def codebook() -> list[dict[str, str]]:
 
 
 def complete(votes: pd.DataFrame) -> pd.DataFrame:
-    """Return the table with every column of `COLUMNS`, in their types; others stay as they are.
+    """Return the table with every column of `COLUMNS`, in their types and defaults.
 
     Raises
     ------
@@ -72,12 +72,17 @@ def complete(votes: pd.DataFrame) -> pd.DataFrame:
     """
     whole = votes.copy()
     for column in COLUMNS:
+        if column.required and column.name not in whole:
+            raise InputError.of(TABLE, column.name, "column is missing")
         if column.name not in whole:
-            if column.required:
-                raise InputError.of(TABLE, column.name, "column is missing")
             whole[column.name] = column.default
+        values = whole[column.name]
+        if column.default is not None:
+            values = values.where(values.notna(), column.default)
+        elif column.filled and values.isna().any():
+            raise InputError.of(TABLE, column.name, "is blank in some rows")
         try:
-            whole[column.name] = whole[column.name].astype(DTYPES[column.kind])  # type: ignore[call-overload]  # the stubs want a literal
+            whole[column.name] = values.astype(DTYPES[column.kind])  # type: ignore[call-overload]  # the stubs want a literal
         except (TypeError, ValueError) as error:
             raise InputError.of(TABLE, column.name, str(error)) from None
     return whole

@@ -5,15 +5,13 @@ and the converter are links of it like every other, so physics beyond the base m
 between them.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 import tomli_w
-from numpy.typing import NDArray
-from pydantic import Field, model_validator
+from pydantic import ConfigDict, Field, model_validator
 
 from dsis.cfa import Cfa
 from dsis.color import white_balanced
@@ -97,7 +95,7 @@ class Camera(Model):
         )
 
     def clean_raw(self, scene: Image) -> Image:
-        """Return the clean raw signal of linear scene light: float32 (row, column, 3), DN above black.
+        """Return clean raw signals of linear scene light, float32 (row, column, 3), DN above black.
 
         raw_c = clip(black + k (M rgb)_c / g_c, 0, white) - black: M = `camera_from_scene`, g_c the
         white-balance gains, k = `diffuse_white_dn` (scene value 1.0 is diffuse white); also clipped
@@ -107,7 +105,7 @@ class Camera(Model):
         matrix = (np.array(self.camera_from_scene) * gain[:, np.newaxis]).astype(np.float32)
         top = self.white_level - self.black_level
         top = min(top, self.saturation_dn) if self.saturation_dn else top
-        signal = scene @ matrix.T
+        signal: Image = scene @ matrix.T
         return np.clip(signal, np.float32(-self.black_level), np.float32(top))
 
     def scene_light(self, raw: Image) -> Image:
@@ -133,7 +131,7 @@ class Camera(Model):
         exposure_time_s: float = 0.0,
         threads: int = 1,
     ) -> Image:
-        """Return one noisy frame of a clean signal: whole codes less black, float32, DN above black.
+        """Return one noisy frame of a clean signal: whole codes less black, float32.
 
         Parameters
         ----------
@@ -160,7 +158,7 @@ class Camera(Model):
         return image
 
     def chain(self) -> tuple[Effect, ...]:
-        """Return all links, base model included, in the order in which light and charge meet them."""
+        """Return all links, base model included, in the order that light and charge meet them."""
         base = (
             ShotNoise(segments=self.segments),
             ReadNoise(segments=self.segments),
@@ -178,7 +176,7 @@ class Camera(Model):
 class BaseLink(Effect):
     """A link of the base model: no effect of the vocabulary."""
 
-    model_config = {**Model.model_config, "arbitrary_types_allowed": True}
+    model_config = ConfigDict(arbitrary_types_allowed=True)  # Segments holds arrays
     reference: ClassVar[str] = (
         "Seybold et al., CIC 22, 2014, section 'Camera noise characteristics'"
     )
@@ -230,8 +228,8 @@ class Conversion(BaseLink):
         """Return whole codes less black; values below black stay negative."""
         del exposure
         black = np.float32(self.black_level)
-        codes = np.rint(image + black)
-        return np.clip(codes, np.float32(0), np.float32(self.white_level)) - black
+        codes: Image = np.clip(np.rint(image + black), np.float32(0), np.float32(self.white_level))
+        return codes - black
 
 
 def read_camera(path: Path) -> Camera:

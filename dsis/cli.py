@@ -95,7 +95,8 @@ def stimuli(options: argparse.Namespace) -> None:
         print(f"{frames} frames agree with {options.check / 'manifest.json'}")
         return
     if options.spec is None:
-        raise InputError.of("dsis stimuli", "SPEC.toml", "is missing (or give --check DIR)")
+        fact = "SPEC.toml is missing (or give --check DIR)"
+        raise InputError.of(fact, "", "")
     test = read_spec(options.spec, options.source, options.seed)
     out = options.out or Path(f"{Path(options.spec).stem}-stimuli")
     if options.dry_run:
@@ -119,7 +120,7 @@ def session(options: argparse.Namespace) -> None:
         print(f"{options.robots} SIMULATED observers voted; export: dsis votes {folder} -o DIR")
     elif options.observer is None:
         fact = "give --observer ID, --robots N or --status"
-        raise InputError.of("dsis session", "", fact)
+        raise InputError.of(fact, "", "")
     else:
         sessions.serve(
             folder,

@@ -10,6 +10,7 @@ same bytes wherever IEEE 754 holds. The largest deviate is 6.7.
 
 import hashlib
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +32,7 @@ _LN_2 = np.float32(np.log(2.0))
 
 
 @inlined
-def philox(c0, c1, c2, c3, k0, k1):  # type: ignore[no-untyped-def] # compiled per argument types
+def philox(c0: Any, c1: Any, c2: Any, c3: Any, k0: Any, k1: Any) -> Any:
     """Return the four 32-bit words of Philox4x32-10, each in a uint64."""
     for _ in range(10):
         p0 = _M0 * c0
@@ -43,7 +44,7 @@ def philox(c0, c1, c2, c3, k0, k1):  # type: ignore[no-untyped-def] # compiled p
 
 
 @inlined
-def log_of_uniform(word):  # type: ignore[no-untyped-def]
+def log_of_uniform(word: Any) -> Any:
     """Return ln of (word/2 + 1/2) / 2^31: Cephes' logf on mantissa and exponent, error 1e-7."""
     x = np.float32(_I(word >> _ONE)) + _F(0.5)
     bits = np.float32(x).view(np.int32)
@@ -63,7 +64,7 @@ def log_of_uniform(word):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def box_muller(word_radius, word_angle):  # type: ignore[no-untyped-def]
+def box_muller(word_radius: Any, word_angle: Any) -> Any:
     """Return two independent standard normal deviates (float32) from two 32-bit words."""
     radius = np.sqrt(max(_F(-2) * log_of_uniform(word_radius), _F(0)))
     quadrant = (word_angle + _EIGHTH_TURN) >> _THIRTY
@@ -77,13 +78,15 @@ def box_muller(word_radius, word_angle):  # type: ignore[no-untyped-def]
     odd = (quadrant & _ONE) != np.uint64(0)
     x = sine if odd else cosine
     y = cosine if odd else sine
-    x = -x if (quadrant == _ONE or quadrant == _TWO) else x  # noqa: PLR1714 # no tuples in kernels
+    x = -x if ((quadrant + _ONE) & _TWO) != np.uint64(0) else x
     y = -y if quadrant >= _TWO else y
     return radius * x, radius * y
 
 
 @inlined
-def _normal_lanes(lanes, groups, c0, c1, frame, channel, k0, k1):  # type: ignore[no-untyped-def]
+def _normal_lanes(
+    lanes: Any, groups: Any, c0: Any, c1: Any, frame: Any, channel: Any, k0: Any, k1: Any
+) -> Any:
     """Fill lanes (4, groups) with normal deviates of the counters c0, c0 + 2, c0 + 4 ..."""
     for g in range(groups):
         a, b, c, d = philox(c0 + np.uint64(2 * g), c1, frame, channel, k0, k1)
@@ -92,7 +95,9 @@ def _normal_lanes(lanes, groups, c0, c1, frame, channel, k0, k1):  # type: ignor
 
 
 @inlined
-def _uniform_lanes(lanes, groups, c0, c1, frame, channel, k0, k1):  # type: ignore[no-untyped-def]
+def _uniform_lanes(
+    lanes: Any, groups: Any, c0: Any, c1: Any, frame: Any, channel: Any, k0: Any, k1: Any
+) -> Any:
     """Fill lanes (4, groups) with deviates uniform on (0, 1), multiples of 2^-25."""
     for g in range(groups):
         a, b, c, d = philox(c0 + np.uint64(2 * g), c1, frame, channel, k0, k1)
@@ -170,12 +175,12 @@ class Draw:
         return self._field(purpose, grid, frame, threads, normal=False)
 
     def rows(self, purpose: str, grid: PixelGrid, frame: int = 0) -> NDArray[np.float32]:
-        """Return one standard normal deviate per sensor row of `grid`, common to all channels."""
+        """Return one standard normal deviate per sensor row, common to all channels."""
         line = PixelGrid(grid.rows, 1, Cfa.MONO, grid.first_row, 0)
         return self.normal(purpose, line, frame)[:, 0]
 
     def columns(self, purpose: str, grid: PixelGrid, frame: int = 0) -> NDArray[np.float32]:
-        """Return one standard normal deviate per sensor column of `grid`, common to all channels."""
+        """Return one standard normal deviate per sensor column, common to all channels."""
         line = PixelGrid(1, grid.columns, Cfa.MONO, 0, grid.first_column)
         return self.normal(purpose, line, frame)[0]
 
@@ -200,9 +205,12 @@ class Draw:
             _fill(out[first:last], place, channels, key, np.uint64(frame), normal)
 
         over_rows(block, grid.rows, threads)
-        return out.reshape(grid.shape)
+        field: NDArray[np.float32] = out.reshape(grid.shape)
+        return field
 
     def _key(self, purpose: str) -> NDArray[np.uint64]:
         name = "\x1f".join((str(self.seed), *self.scope, purpose)).encode()
-        words = np.frombuffer(hashlib.blake2b(name, digest_size=8).digest(), "<u4")
+        words: NDArray[np.uint32] = np.frombuffer(
+            hashlib.blake2b(name, digest_size=8).digest(), "<u4"
+        )
         return words.astype(np.uint64)

@@ -35,7 +35,7 @@ class PixelGrid:
         return (self.rows, self.columns) if self.cfa else (self.rows, self.columns, 3)
 
     def channels(self) -> NDArray[np.uint8]:
-        """Return the channel at absolute row parity, column parity and plane: uint8 (2, 2, planes)."""
+        """Return the channel at (row parity, column parity, plane): uint8 (2, 2, planes)."""
         if self.cfa is None:
             return np.broadcast_to(np.arange(3, dtype=np.uint8), (2, 2, 3)).copy()
         return pattern(self.cfa)[:, :, np.newaxis].copy()

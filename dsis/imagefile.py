@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import OpenImageIO as oiio
+import OpenImageIO as oiio  # noqa: N813 - the name that its own examples use
 from numpy.typing import NDArray
 
 from dsis.errors import InputError
@@ -43,7 +43,8 @@ def find_files(folder: Path, patterns: Iterable[str]) -> tuple[Path, ...]:
         elif path.is_file():
             hits = [path]
         else:
-            hits = [Path(p) for p in glob.glob(str(path)) if Path(p).is_file()]
+            # `Path.glob` takes no absolute patterns.
+            hits = [Path(p) for p in glob.glob(str(path)) if Path(p).is_file()]  # noqa: PTH207
         found += sorted(hits, key=natural_order)
     return tuple(found)
 

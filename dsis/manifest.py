@@ -6,6 +6,7 @@ A manifest may also be written by hand, for clips made elsewhere: `schema`, `seq
 
 import json
 from collections import Counter
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -116,8 +117,8 @@ class Manifest(Model):
     clips: Annotated[tuple[Clip, ...], Field(min_length=1)]
     remarks: tuple[str, ...] = ()
     spec: dict[str, Any] | None = None
-    awgn_sigma: dict[str, dict[str, float]] = {}
-    versions: dict[str, str] = {}
+    awgn_sigma: Mapping[str, dict[str, float]] = Field(default_factory=dict)
+    versions: Mapping[str, str] = Field(default_factory=dict)
 
     def clip(self, stimulus: str) -> Clip:
         """Return the clip of that name; raise `KeyError` where there is none."""

@@ -69,48 +69,55 @@ def attempt(
     except ValidationError as error:
         items = error.errors()
         places = [item["loc"] for item in items]
+
+        def alone(place: Sequence[object]) -> bool:
+            return sum(p[: len(place)] == place for p in places) == 1
+
         return None, [
             _fault(kind, item, file, prefix)
             for item in items
             # An array whose items are all at fault is not empty besides.
-            if item["type"] != "too_short"
-            or sum(p[: len(item["loc"])] == item["loc"] for p in places) == 1
+            if item["type"] != "too_short" or alone(item["loc"])
         ]
 
 
 def _fault(kind: Any, item: Any, file: str, prefix: str) -> Fault:
     key, parent = _walk(kind, item["loc"], prefix)
-    problem, value, context = item["type"], item.get("input"), item.get("ctx", {})
-    if problem == "extra_forbidden":
-        known = _keys(parent)
-        near = difflib.get_close_matches(str(item["loc"][-1]), known, 1)
-        hint = f"; did you mean {near[0]}?" if near else ""
-        return Fault(file, key, f"unknown key{hint} (allowed here: {', '.join(known)})")
-    if problem == "missing":
-        return Fault(file, key, "is missing")
-    if problem == "value_error":
-        return Fault(file, key, str(context["error"]))
-    if problem == "union_tag_invalid":
-        known = sorted(context["expected_tags"].replace("'", "").split(", "))
-        near = difflib.get_close_matches(context["tag"], known, 1)
-        hint = f" (did you mean {near[0]}?)" if near else ""
-        tag_key = context["discriminator"].strip("'")
-        fact = f"is {context['tag']!r}{hint}, must be one of: {', '.join(known)}"
-        return Fault(file, f"{key}.{tag_key}", fact)
-    if problem == "union_tag_not_found":
-        return Fault(file, f"{key}.{context['discriminator'].strip(chr(39))}", "is missing")
-    if problem in ("too_short", "too_long"):
-        bound = (
-            f"at least {context['min_length']}"
-            if problem == "too_short"
-            else f"at most {context['max_length']}"
-        )
-        return Fault(file, key, f"has {context['actual_length']} items, must have {bound}")
-    fact = item["msg"][:1].lower() + item["msg"][1:]
-    fact = fact.removeprefix("input should be ").removeprefix("value should be ")
-    shown = json.dumps(value, default=str, ensure_ascii=False)
+    problem, context = item["type"], item.get("ctx", {})
+    if problem.startswith("union_tag"):
+        key = f"{key}.{context['discriminator'].strip(chr(39))}"
+    return Fault(file, key, _fact(problem, item, context, parent))
+
+
+def _fact(problem: str, item: Any, context: Any, parent: Any) -> str:
+    """Return what is wrong, in words that name the value and what was allowed."""
+    match problem:
+        case "extra_forbidden":
+            known = _keys(parent)
+            hint = _near(str(item["loc"][-1]), known, "; did you mean {}?")
+            return f"unknown key{hint} (allowed here: {', '.join(known)})"
+        case "missing" | "union_tag_not_found":
+            return "is missing"
+        case "value_error":
+            return str(context["error"])
+        case "union_tag_invalid":
+            known = sorted(context["expected_tags"].replace("'", "").split(", "))
+            hint = _near(context["tag"], known, " (did you mean {}?)")
+            return f"is {context['tag']!r}{hint}, must be one of: {', '.join(known)}"
+        case "too_short" | "too_long":
+            least = context.get("min_length")
+            bound = f"at least {least}" if least else f"at most {context['max_length']}"
+            return f"has {context['actual_length']} items, must have {bound}"
+    must = item["msg"][:1].lower() + item["msg"][1:]
+    must = must.removeprefix("input should be ").removeprefix("value should be ")
+    shown = json.dumps(item.get("input"), default=str, ensure_ascii=False)
     shown = shown if len(shown) <= 60 else shown[:57] + "..."
-    return Fault(file, key, f"is {shown}, must be {fact}")
+    return f"is {shown}, must be {must}"
+
+
+def _near(word: str, known: Sequence[str], says: str) -> str:
+    near = difflib.get_close_matches(word, known, 1)
+    return says.format(near[0]) if near else ""
 
 
 def _walk(kind: Any, location: Sequence[object], prefix: str) -> tuple[str, Any]:

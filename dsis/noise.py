@@ -50,7 +50,9 @@ class Segments:
         """Return m x + t of the clean signal x: DN^2. Shot and read noise each count from 0."""
         i, zero = self.index(signal_dn), np.float32(0)
         t = self.intercept_dn2[i]
-        shot = np.maximum(self.slope_dn[i] * signal_dn + np.minimum(t, zero), zero)
+        shot: NDArray[np.float32] = np.maximum(
+            self.slope_dn[i] * signal_dn + np.minimum(t, zero), zero
+        )
         return shot + np.maximum(t, zero)
 
 

@@ -3,7 +3,8 @@
 import json
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence as Many
+from collections.abc import Mapping
+from collections.abc import Sequence as Many
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
@@ -244,8 +245,8 @@ class Test:
             if content.stills is None:
                 found.append(content)
             else:
-                for path in find_files(self.folder, content.stills):
-                    found.append(content.model_copy(update={"name": still_name(path)}))
+                names = [still_name(path) for path in find_files(self.folder, content.stills)]
+                found += [content.model_copy(update={"name": name}) for name in names]
         return tuple(found)
 
 
@@ -288,7 +289,9 @@ def read_spec(name: str | Path, source: Many[str | Path] = (), seed: int | None 
     sections: dict[str, Any] = {}
     for key, field in Spec.model_fields.items():
         name_in_file = field.alias or key
-        if name_in_file in values:
+        if key == "camera" and camera is not None and "schema" in values["camera"]:
+            sections[key] = CameraChoice(model=camera.name)
+        elif name_in_file in values:
             kind = (
                 Annotated[field.annotation, *field.metadata] if field.metadata else field.annotation
             )
@@ -343,12 +346,10 @@ def _camera(section: object, path: Path, faults: list[Fault]) -> Camera | None:
     if not isinstance(section, Mapping):
         return None
     if "schema" in section:
-        camera, more = attempt(Camera, section, str(path), "camera")
-        faults += more
-        return camera if isinstance(camera, Camera) else None
+        return _camera_of(section, str(path), "camera", faults)
     model = section.get("model")
     if not isinstance(model, str):
-        return None
+        return None  # the section's own fault
     beside = path.parent / model
     file = beside if beside.exists() else spec_path(model)
     if not file.is_file():
@@ -357,24 +358,26 @@ def _camera(section: object, path: Path, faults: list[Fault]) -> Camera | None:
         faults.append(Fault(str(path), "camera.model", f"{fact} (cameras/: {', '.join(shipped)})"))
         return None
     try:
-        camera, more = attempt(Camera, read_toml(file), str(file))
+        values = read_toml(file)
     except InputError as error:
         faults += error.faults
         return None
+    return _camera_of(values, str(file), "", faults)
+
+
+def _camera_of(
+    values: Mapping[str, Any], file: str, prefix: str, faults: list[Fault]
+) -> Camera | None:
+    """Return a camera that can make stimuli; its faults go into `faults`."""
+    camera, more = attempt(Camera, values, file, prefix)
     faults += more
-    if isinstance(camera, Camera):
-        faults += _unfit_camera(camera, file)
-        return camera
-    return None
-
-
-def _unfit_camera(camera: Camera, file: Path) -> list[Fault]:
-    faults = []
+    if not isinstance(camera, Camera):
+        return None
     if camera.cfa == "MONO":
-        faults.append(Fault(str(file), "cfa", "is MONO: stimuli need a colour filter array"))
+        faults.append(Fault(file, "cfa", "is MONO: stimuli need a colour filter array"))
     if camera.diffuse_white_dn is None:
-        faults.append(Fault(str(file), "diffuse_white_dn", "is missing: stimuli need it"))
-    return faults
+        faults.append(Fault(file, "diffuse_white_dn", "is missing: stimuli need it"))
+    return camera
 
 
 def _replaced(contents: object, source: Many[str | Path]) -> list[dict[str, Any]]:
@@ -424,7 +427,7 @@ def _misfits(
 def _too_small(
     paths: tuple[Path, ...], content: Content, sequence: Sequence, still: bool, file: str, key: str
 ) -> list[Fault]:
-    faults = []
+    faults: list[Fault] = []
     scale = content.oversampling or 1
     travel = abs(content.pan_px_per_frame) * (sequence.frames - 1) if still else 0.0
     rows, columns = scale * sequence.height, int(-(-scale * (sequence.width + travel) // 1))

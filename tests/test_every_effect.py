@@ -61,7 +61,7 @@ def test_background_measures_what_the_base_model_says(
     background: dict[float, dict[str, Estimate]], level: float
 ) -> None:
     variance = 0.5 * level + (80.0 if level >= 1000 else 30.0) + 1 / 12
-    expected = {name: 0.0 for name in MEASURES} | {"level": level, "pixel_variance": variance}
+    expected = dict.fromkeys(MEASURES, 0.0) | {"level": level, "pixel_variance": variance}
     for name, value in expected.items():
         found = background[level][name]
         assert abs(found.value - value) < Z_MAX * found.standard_error, name

@@ -1,7 +1,7 @@
 """What a physical effect is: simulation (`apply`) and evidence (`contributions`) in one value.
 
-An effect is a frozen model whose fields are its parameters, with units in their names, bounds, and an
-example of each (`Field(examples=[...])`) that the contract test uses: strong enough to be measured.
+An effect is a frozen model whose fields are its parameters, with units in their names, bounds, and
+an example of each (`Field(examples=[...])`), strong enough to be measured: the contract test's.
 Its stage says where light or charge meets it; the chain of a camera is sorted by (stage, rank):
 
 * LIGHT: what changes the *expected* signal, before shot noise (fixed gain, flicker, shading, dark

@@ -55,7 +55,7 @@ def measure(stack: NDArray[np.float32]) -> dict[str, Estimate]:
     ms_pixel = float((pixels**2).sum()) / dof_pixel
 
     def error(*terms: tuple[float, float]) -> float:
-        """Standard error of a sum of mean squares over their divisors: var MS = 2 MS^2 / dof."""
+        """Return the standard error of a sum of mean squares: var MS = 2 MS^2 / dof."""
         return float(np.sqrt(sum(2 * square**2 / dof for square, dof in terms)))
 
     spatial = float(mean_frame.var(ddof=1))

@@ -80,9 +80,7 @@ class Building:
             outline = [foot[side], foot[n], top[n], top[side]]
             if gable:
                 outline.insert(3, right if side == 1 else left)
-            wall = Wall(
-                texture, kind, self.style, side, self.base, self.eaves, length, sunny
-            )
+            wall = Wall(texture, kind, self.style, side, self.base, self.eaves, length, sunny)
             view.facet(outline, azimuth, wall.shade, lowest_row)
             if self.roof == "spire" or (self.roof == "gable" and not gable):
                 slanted = (self.pitch * sunny + SUNWARD[2]) / math.hypot(self.pitch, 1)
@@ -112,7 +110,9 @@ class Building:
             yield box(0.6 * a - 2, -0.25 * self.deep, 1.6, 1.2, 0, 1.1, "plain")
         if self.roof == "gable":
             ridge = self.pitch * self.deep / 2
-            yield box(shift * (self.wide - 2), 0.3, 1.3, 0.8, 0.7 * ridge, 0.3 * ridge + 1.3, "brick")
+            yield box(
+                shift * (self.wide - 2), 0.3, 1.3, 0.8, 0.7 * ridge, 0.3 * ridge + 1.3, "brick"
+            )
             c, s = math.cos(self.yaw), math.sin(self.yaw)
             facing = (c * self.y - s * self.x) / math.hypot(self.x, self.y)
             if facing > 0.6 and pick(self.style, 19) < 0.6:

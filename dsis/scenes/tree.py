@@ -59,7 +59,7 @@ class Tree:
         leaf += 0.5 * texture.fractal(7 * u, 8 * v, 4, 7 * pixel)
         surface, light = self._crown(x, z)
         crown = np.clip((surface + np.float32(0.05) * leaf) * size + 0.5, 0, 1)
-        trunk = np.clip((0.024 * (1.3 - z) - np.abs(x)) * size + 0.5, 0, 1) * ((0 < z) & (z < 0.6))
+        trunk = np.clip((0.024 * (1.3 - z) - np.abs(x)) * size + 0.5, 0, 1) * ((z > 0) & (z < 0.6))
         green = rgb(0.16 + 0.12 * self.style, 0.26, 0.05)
         leaves = DARK + (step(light + 1.3 * leaf, -1.7, 2.1) ** 2)[..., None] * (green - DARK)
         colour = np.where((crown > 0.02)[..., None], leaves, BARK)

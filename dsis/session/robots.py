@@ -60,7 +60,9 @@ def expected_vote(visible_noise: ArrayLike, session: Session) -> _Grades:
     grade = latent_grade(visible_noise, session)
     bias_sd, inconsistency = _spread(grade, session)
     steps = np.arange(worst, best) + 0.5
-    reached = ndtr((grade[..., np.newaxis] - steps) / np.hypot(bias_sd, inconsistency)[..., np.newaxis])
+    reached = ndtr(
+        (grade[..., np.newaxis] - steps) / np.hypot(bias_sd, inconsistency)[..., np.newaxis]
+    )
     attentive = worst + reached.sum(axis=-1)
     return np.asarray((1.0 - LAPSES) * attentive + LAPSES * (worst + best) / 2)
 

@@ -1,4 +1,4 @@
-"""Test spec -> four conditions -> frames and manifest; resumable, the same bytes from any worker."""
+"""Test spec -> four conditions -> frames and manifest; resumable, whatever the workers."""
 
 import hashlib
 import json
@@ -25,7 +25,6 @@ from dsis.manifest import (
     ClipFiles,
     Manifest,
     Quality,
-    read_manifest,
     write_manifest,
 )
 from dsis.outdir import check_replaceable, finish, partial_of
@@ -87,7 +86,7 @@ def training_content(test: Test) -> Content:
     shown = [content for content in test.spec.content if content.scene is not None]
     unused = [scene for scene in SCENES if scene not in {c.scene for c in shown}]
     model = shown[0] if shown else Content(name=TRAINING, scene=SCENES[0])
-    scene = (unused or [model.scene])[0]
+    scene = unused[0] if unused else model.scene
     seed = max((c.scene_seed for c in shown), default=0) + _TRAINING_SEED_STEP
     return model.model_copy(update={"name": TRAINING, "scene": scene, "scene_seed": seed})
 
@@ -125,7 +124,7 @@ def build_stimuli(
         journal = Journal(partial, digest)
         work = jobs_of(test)
         total = len(work) * test.spec.sequence.frames
-        tell = progress or (lambda done, total, what: None)
+        tell = progress or _silent
         clips: list[Clip] = []
         sigmas: dict[str, dict[str, float]] = {}
         for i, job in enumerate(work):
@@ -133,7 +132,7 @@ def build_stimuli(
             tell(done, total, f"{job.name}: light")
             builder = Builder(test, job, partial, journal)
             sigmas[job.name] = {str(level): s for level, s in builder.sigma.items()}
-            builder.build(jobs, lambda n, d=done, j=job: tell(d + n, total, j.name))
+            builder.build(jobs, _from(tell, done, total, job.name))
             clips += builder.clips(jobs)
             write_figures(builder.figure_frames(), partial / "figures", job.name)
         manifest = _manifest(test, tuple(clips), sigmas)
@@ -220,7 +219,7 @@ class Builder:
                 yield name, display, clean_dem[noise, condition.demosaic]
 
     def figure_frames(self) -> dict[tuple[str, int], dict[str, Frame]]:
-        """Return the middle frame of every clip, {(noise, level): {demosaic: frame}}, reference too."""
+        """Return the middle frames, {(noise, level): {"reference" or demosaic: frame}}."""
         shown = {name: display for name, display, _ in self.frame(self.size.frames // 2)}
         found: dict[tuple[str, int], dict[str, Frame]] = {}
         for c in self.job.conditions:
@@ -267,7 +266,7 @@ class Builder:
         )
 
     def _files(self, name: str) -> dict[str, ClipFiles]:
-        found = {}
+        found: dict[str, ClipFiles] = {}
         for form in self.test.spec.formats:
             whole = hashlib.sha256()
             for frame in range(self.size.frames):
@@ -330,6 +329,15 @@ class Builder:
         shown = delivered(display).astype(np.float32) / CODE_MAX
         difference = self.eye.difference(shown, seen)
         return [difference.lightness, difference.colour]
+
+
+def _silent(done: int, total: int, what: str) -> None:
+    """Tell nobody."""
+
+
+def _from(tell: Progress, start: int, total: int, what: str) -> Callable[[int], None]:
+    """Return what tells that so many frames after `start` are done."""
+    return lambda done: tell(start + done, total, what)
 
 
 def build_digest(test: Test) -> str:

@@ -30,7 +30,7 @@ def check_stimuli(
     faults: list[str] = []
     frames = 0
     with ThreadPoolExecutor(max(1, jobs)) as pool:
-        results = pool.map(lambda job: _check(folder, *job, manifest.sequence), work)
+        results = pool.map(lambda job: _check(folder, job[0], job[1], manifest.sequence), work)
         for n, ((clip, _), (agreeing, wrong)) in enumerate(zip(work, results, strict=True), 1):
             frames += agreeing
             faults += wrong

@@ -19,14 +19,14 @@ from dsis.visibility import Eye, pixels_per_degree
 
 Frame = NDArray[np.float32]
 
-FRAMES = 4
+FRAMES = 8
 SIGMA_MAX = 200.0
 
 
 def matching_frames(frames: int, count: int = FRAMES) -> tuple[int, ...]:
     """Return up to `count` frame numbers, evenly spaced over the clip."""
     places = np.linspace(0, frames - 1, min(count, frames))
-    return tuple(int(round(place)) for place in places)
+    return tuple(round(float(place)) for place in places)
 
 
 def solve_sigma(

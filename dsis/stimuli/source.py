@@ -28,7 +28,7 @@ class Source(ABC):
 
     @abstractmethod
     def light(self, frame: int) -> Light:
-        """Return frame `frame` (from 0): float32 (row, column, 3), scene-linear, 1 diffuse white."""
+        """Return frame `frame` (from 0): float32 (row, column, 3), linear, 1 diffuse white."""
 
 
 class Window(Source):
@@ -122,10 +122,9 @@ def remarks_on(content: Content, test: Test) -> tuple[str, ...]:
     paths = test.footage.get(content.name or "", ())
     if content.scene is not None or is_linear(content, paths):
         return ()
-    return (
-        f"{content.name}: not noise-free, display-referred: the footage carries noise and rendering "
-        "of its own, so references are not noise-free and linear light is an inversion of the view",
-    )
+    says = "not noise-free, display-referred: the footage carries noise and rendering of its own, "
+    says += "so the reference is not noise-free and linear light is an inversion of the view"
+    return (f"{content.name}: {says}",)
 
 
 def _as_they_are(image: Light) -> Light:

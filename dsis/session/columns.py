@@ -1,0 +1,154 @@
+"""Columns of the tables that a session exports: declared once, written and explained from here."""
+
+from dataclasses import dataclass
+from operator import attrgetter
+from typing import Any
+
+from dsis.manifest import Clip
+from dsis.session.plan import Presentation
+from dsis.session.store import Vote
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column: type as in Table Schema (Frictionless), unit, meaning, where its cells lie."""
+
+    name: str
+    type: str
+    unit: str
+    description: str
+    path: str
+
+    def cell(self, entry: object) -> str:
+        """Return the cell of a row: blank where nothing is known, the shortest exact number."""
+        value: Any = attrgetter(self.path)(entry)
+        if value is None:
+            return ""
+        if isinstance(value, bool):
+            return "true" if value else "false"
+        return repr(value).removesuffix(".0") if isinstance(value, float) else str(value)
+
+    def field(self) -> dict[str, str]:
+        """Return the column as a field of a Table Schema."""
+        return {
+            "name": self.name,
+            "type": self.type,
+            "unit": self.unit,
+            "description": self.description,
+        }
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A presentation of an observer with its clip: a row of `PRESENTATIONS`."""
+
+    observer: str
+    presentation: Presentation
+    clip: Clip
+    vote: Vote | None
+
+    @property
+    def state(self) -> str:
+        """`planned`, `voted`, or `invalid`: voted on, but with dropped frames."""
+        if self.vote is None:
+            return "planned"
+        return "voted" if self.vote.valid else "invalid"
+
+    @property
+    def sha256(self) -> str | None:
+        """Hash of the clip as the player shows it, where the manifest has it."""
+        player = self.clip.files.get("player")
+        return None if player is None else player.sha256
+
+
+_OBSERVER = Column("observer", "string", "", "pseudonym of the observer", "observer")
+_STIMULUS = Column("stimulus", "string", "", "name of the clip judged", "clip.stimulus")
+_KIND = Column(
+    "kind",
+    "string",
+    "",
+    "test; reference: hidden reference; training, dummy: never scored",
+    "presentation.kind",
+)
+_PLACES = (
+    Column("session", "string", "", "viewing session, from 1", "presentation.session"),
+    Column(
+        "presentation", "integer", "", "place in the observer's order, from 1", "presentation.place"
+    ),
+    Column(
+        "repetition",
+        "integer",
+        "",
+        "which showing to this observer, from 1",
+        "presentation.repetition",
+    ),
+    Column(
+        "attempt",
+        "integer",
+        "",
+        "from 1; more where a showing had dropped frames",
+        "presentation.attempt",
+    ),
+)
+_SIMULATED = "true: a simulated observer"
+STIMULUS_SHA256 = Column(
+    "stimulus_sha256", "string", "", "SHA-256 of the clip's frames (player format)", "sha256"
+)
+
+VOTES = (
+    _OBSERVER,
+    _STIMULUS,
+    Column("vote", "integer", "grade", "the vote; blank: none was given", "vote.vote"),
+    Column("content", "string", "", "what the clip shows", "clip.content"),
+    Column("noise", "string", "", "noise model: awgn, sd (signal-dependent)", "clip.noise"),
+    Column("demosaic", "string", "", "demosaicking; none: never mosaicked", "clip.demosaic"),
+    Column("level", "integer", "stop", "stops of under-exposure", "clip.level"),
+    *_PLACES,
+    Column(
+        "valid",
+        "boolean",
+        "",
+        "false: shown with dropped frames and repeated later; never scored",
+        "vote.valid",
+    ),
+    _KIND,
+    Column(
+        "reaction_ms", "number", "ms", "from the end of the clip to the vote", "vote.reaction_ms"
+    ),
+    Column(
+        "voted_at",
+        "datetime",
+        "",
+        "ISO 8601 with offset; robots' clocks start in 1970",
+        "vote.voted_at",
+    ),
+    Column(
+        "dropped_frames",
+        "integer",
+        "frame",
+        "frames that never were on the screen; blank: nothing was shown",
+        "vote.dropped_frames",
+    ),
+    Column("simulated", "boolean", "", _SIMULATED, "vote.simulated"),
+)
+PRESENTATIONS = (
+    _OBSERVER,
+    _STIMULUS,
+    Column("reference", "string", "", "name of its reference", "presentation.reference"),
+    _KIND,
+    *_PLACES,
+    Column("seed", "integer", "", "seed of the plan", "presentation.seed"),
+    Column("state", "string", "", "planned, voted, or invalid (dropped frames)", "state"),
+)
+OBSERVERS = (
+    _OBSERVER,
+    Column("simulated", "boolean", "", _SIMULATED, "simulated"),
+    Column("seed", "integer", "", "seed of the plan", "seed"),
+    Column(
+        "created_at",
+        "datetime",
+        "",
+        "when the plan was drawn, ISO 8601 with offset; robots' clocks start in 1970",
+        "created_at",
+    ),
+)

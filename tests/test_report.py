@@ -1,0 +1,334 @@
+"""The report: what it writes, that it says what must be said, and that it repeats itself."""
+
+import base64
+import os
+import re
+import subprocess
+import sys
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from matplotlib.image import imread
+
+import analysis
+from analysis.report import analyse
+from analysis.scale import Description, Scale
+from dsis.errors import InputError
+
+PAPER = (1, 10)
+FILES = {"report.html", "mos.svg", "mos.png", "mos.csv", "observers.csv", "removed_votes.csv"}
+MOS_HEADER = (
+    "stimulus,content,noise,demosaic,level,n,mos,sd,ci_low,ci_high,"
+    "n_removed,mos_trimmed,sd_trimmed,ci_trimmed_low,ci_trimmed_high,"
+    "mos_bt500,mos_p913,score_p910,p910_ci_low,p910_ci_high"
+)
+OBSERVERS_HEADER = (
+    "observer,n,bias,inconsistency,bt500_p,bt500_q,bt500_rejected,correlation,correlation_rejected"
+)
+MARK = "SIMULATED VOTES"
+
+
+def make_votes(contents=("city", "landscape"), methods=("none", "bilinear"), observers=18):
+    """Votes of a test like the paper's, with hidden references."""
+    random = np.random.default_rng(1)
+    rows = []
+    for content in contents:
+        conditions = [(n, d, 0) for n in ("awgn", "sd") for d in methods] + [("", "", None)]
+        for noise, demosaic, level in conditions:
+            name = f"{content}__{noise}__{demosaic}" if noise else f"{content}-ref"
+            kind = "test" if noise else "reference"
+            expected = 7.5 - 2 * (demosaic != "none") if noise else 9.5
+            votes = np.clip(np.rint(random.normal(expected, 1.2, observers)), 1, 10)
+            rows += [
+                (f"s{o}", name, content, noise, demosaic, level, kind, vote)
+                for o, vote in enumerate(votes, 1)
+            ]
+    columns = ["observer", "stimulus", "content", "noise", "demosaic", "level", "kind", "vote"]
+    return pd.DataFrame(rows, columns=columns)
+
+
+def report(folder, votes, scale=PAPER, name="report"):
+    file = folder / "votes.csv"
+    analysis.write_votes(votes, file)
+    analysis.write_report(file, folder / name, scale)
+    return folder / name
+
+
+def page(out):
+    return (out / "report.html").read_text()
+
+
+class Page(HTMLParser):
+    """Checks that elements nest, and gathers captions and the text of the remarks."""
+
+    VOID = ("meta", "img", "br")
+
+    def __init__(self, text):
+        super().__init__()
+        self.open, self.captions, self.tables, self.remarks = [], [], 0, ""
+        self.feed(text)
+        self.close()
+        assert self.open == []
+
+    def handle_starttag(self, tag, attrs):
+        if tag not in self.VOID:
+            self.open.append((tag, dict(attrs).get("class", "")))
+        self.tables += tag == "table" and "id" in dict(attrs)
+        if tag in ("caption", "figcaption"):
+            self.captions.append("")
+
+    def handle_endtag(self, tag):
+        assert self.open.pop()[0] == tag
+
+    def handle_data(self, data):
+        tags = [tag for tag, _ in self.open]
+        if "caption" in tags or "figcaption" in tags:
+            self.captions[-1] += data
+        if ("section", "remarks") in self.open:
+            self.remarks += data
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("people")
+    votes = make_votes()
+    extra = pd.concat(
+        [
+            votes.iloc[:3].assign(valid=False, vote=1),
+            votes.iloc[:4].assign(kind="training", vote=1),
+            votes.iloc[:5].assign(kind="dummy", vote=1),
+        ]
+    )
+    return report(folder, pd.concat([votes, extra], ignore_index=True)), votes
+
+
+def test_files_and_columns_of_the_contract(written):
+    out, __ = written
+    assert {file.name for file in out.iterdir()} == FILES
+    assert not out.with_name("report.partial").exists()
+    assert (out / "mos.csv").read_text().startswith(MOS_HEADER + ",simulated,kind\n")
+    assert (out / "observers.csv").read_text().startswith(OBSERVERS_HEADER + ",simulated,lab\n")
+    removed = pd.read_csv(out / "removed_votes.csv")
+    assert {"observer", "stimulus", "vote", "z", "mean", "sd", "n"} <= set(removed.columns)
+
+
+def test_numbers_are_those_of_the_functions_and_only_of_scored_votes(written):
+    out, votes = written
+    table = pd.read_csv(out / "mos.csv")
+    by_hand = votes.groupby("stimulus")["vote"]
+    rows = table.set_index("stimulus")
+    np.testing.assert_allclose(rows["mos"], by_hand.mean()[rows.index], rtol=1e-12)
+    np.testing.assert_allclose(rows["sd"], by_hand.std(ddof=1)[rows.index], rtol=1e-12)
+    assert table["n_removed"].sum() == len(pd.read_csv(out / "removed_votes.csv"))
+    text = page(out)
+    assert "3 invalid" in text
+    assert "4 training" in text
+    assert "5 dummy" in text
+    for mos in table["mos"]:
+        assert f"<b>{mos:.2f}</b>" in text
+
+
+def test_removed_votes_point_to_their_lines(written):
+    out, __ = written
+    lines = (out.parent / "votes.csv").read_text().splitlines()
+    header = lines[0].split(",")
+    removed = pd.read_csv(out / "removed_votes.csv", dtype={"row": int})
+    assert len(removed) > 0
+    for row in removed.itertuples():
+        cells = dict(zip(header, lines[row.row - 1].split(","), strict=True))
+        assert (cells["observer"], cells["stimulus"]) == (row.observer, row.stimulus)
+        assert float(cells["vote"]) == row.vote
+
+
+def test_page_is_well_formed_and_needs_no_network(written):
+    out, __ = written
+    text = page(out)
+    parsed = Page(text)
+    assert parsed.tables == 4
+    assert len(parsed.captions) == 5
+    assert not re.search(r"https?:|//[a-z]|<script|<link|@import|url\(", text)
+    assert all(source.startswith("data:") for source in re.findall(r'src="([^"]*)', text))
+    embedded = re.search(r"data:image/svg\+xml;base64,([^\"]*)", text)[1]
+    assert base64.b64decode(embedded) == (out / "mos.svg").read_bytes()
+    assert "@media print" in text
+
+
+def test_trimmed_scores_stand_beside_untrimmed_ones(written):
+    out, __ = written
+    scores = page(out).split('<table id="scores">')[1].split("</table>")[0]
+    for row in pd.read_csv(out / "mos.csv").itertuples():
+        both = rf"<b>{row.mos:.2f}</b>.*<td>{row.mos_trimmed:.2f}</td>"
+        assert re.search(both, scores)
+    assert "too short" in scores
+
+
+def test_same_votes_same_bytes(written, tmp_path):
+    """In another process, folder and hash seed."""
+    out, __ = written
+    again = tmp_path / "again"
+    code = (
+        "import sys; from pathlib import Path; from analysis.report import write_report; "
+        "write_report(Path(sys.argv[1]), Path(sys.argv[2]), (1, 10))"
+    )
+    subprocess.run(
+        [sys.executable, "-c", code, out.parent / "votes.csv", again],
+        check=True,
+        env=os.environ | {"PYTHONHASHSEED": "5"},
+        cwd=Path(__file__).parents[1],
+    )
+    for name in FILES:
+        assert (again / name).read_bytes() == (out / name).read_bytes(), name
+
+
+def marks_in_figure(out):
+    """Texts of the SVG (matplotlib writes each as a comment), and red pixels of the PNG."""
+    svg = (out / "mos.svg").read_text()
+    red, green, blue = np.moveaxis(imread(out / "mos.png")[..., :3], -1, 0)
+    strong = (red > 0.6) & (green < 0.1) & (blue < 0.2)
+    pale = (red > 0.9) & (green > 0.85) & (green < 0.95) & (red - green > 0.05)
+    return svg.count(MARK), int(strong.sum()), int(pale.sum())
+
+
+def test_real_votes_carry_no_mark_of_simulation(written):
+    out, __ = written
+    assert marks_in_figure(out)[0] == 0
+    assert marks_in_figure(out)[1] == 0
+    assert MARK not in page(out)
+    assert not pd.read_csv(out / "mos.csv")["simulated"].any()
+
+
+@pytest.mark.parametrize("share", [1.0, 0.5])
+def test_simulated_votes_are_marked_in_every_table_and_figure(tmp_path, share):
+    votes = make_votes()
+    robots = votes["observer"].str[1:].astype(int) <= share * 18
+    out = report(tmp_path, votes.assign(simulated=robots))
+    mark = MARK if share == 1 else f"50 % {MARK}"
+    parsed = Page(page(out))
+    assert len(parsed.captions) == 5
+    assert all(f"{mark}." in caption for caption in parsed.captions)
+    assert f'role="alert">{mark}.' in page(out)
+    texts, strong, pale = marks_in_figure(out)
+    assert texts >= 2  # title and across
+    assert strong > 500
+    assert pale > 5000
+    assert mark.encode() in (out / "mos.png").read_bytes()  # among its properties
+    for name in ("mos.csv", "observers.csv", "removed_votes.csv"):
+        flags = pd.read_csv(out / name)["simulated"]
+        assert flags.dtype == bool
+        assert flags.all() if share == 1 or name == "mos.csv" else flags.any()
+    assert "say nothing about what people see" in parsed.remarks
+
+
+def table(rows, **columns):
+    """Votes from one list per stimulus, in the order of the observers."""
+    return pd.DataFrame(
+        [(f"o{o}", f"s{s}", vote) for s, row in enumerate(rows) for o, vote in enumerate(row)],
+        columns=["observer", "stimulus", "vote"],
+    ).assign(**columns)
+
+
+# Votes on eight stimuli by sixteen observers, nothing remarkable about them.
+TYPICAL = np.clip(
+    np.rint(np.random.default_rng(2).normal(np.linspace(2, 4, 8)[:, None], 0.8, (8, 16))), 1, 5
+).tolist()
+
+
+@pytest.mark.parametrize(
+    ("votes", "remark"),
+    [
+        (table([row[:14] for row in TYPICAL]), "14 observers: with fewer than 15"),
+        (table([[5, 4, 5, 5, 1], *TYPICAL]), "cannot remove anything where there are 5 votes"),
+        (table([[5, 5, 5, 5, 5, 5, 5, 1]] * 3), "removes 12.5 % of the votes, more than 10 %"),
+        (table([[4] * 16, *TYPICAL]), "All votes are equal on s0"),
+        (table([[4], *TYPICAL]), "A single vote has no interval: s0"),
+        (table([[5] * 15 + [4], *TYPICAL]), "The interval leaves the scale on s0"),
+        (table([[4] * 16] * 2), "No correlation exists for o0"),
+        (table(TYPICAL), ""),
+        (table([[5, 4, 4], *TYPICAL]), "Not all sequences have the same number of votes"),
+        (
+            pd.concat([table(TYPICAL), table(TYPICAL, repetition=2)]),
+            "shown repeatedly to the same observers",
+        ),
+        (
+            pd.concat([table(TYPICAL, lab="x"), table(TYPICAL, lab="y")]),
+            "Votes of 2 laboratories are pooled",
+        ),
+        (table([[4, 5]]), "finds no inconsistency"),
+    ],
+)
+def test_remarks(votes, remark):
+    found = " ".join(analyse(votes, Description(Scale(1, 5))).remarks)
+    assert remark in found if remark else found == ""
+
+
+def test_votes_without_conditions_are_listed(shared_data, tmp_path):
+    votes = pd.read_csv(shared_data / "votes" / "nflx_public_last4outliers_votes.csv")
+    votes = votes.rename(columns={"subject": "observer"})
+    votes["kind"] = votes["is_reference"].map({0: "test", 1: "reference"})
+    out = report(tmp_path, votes, (1, 5))
+    figure, text = (out / "mos.svg").read_text(), page(out)
+    for stimulus in votes["stimulus"].unique():
+        assert f"<!-- {stimulus} -->" in figure
+    assert "would reject s27, s30; the correlation screen s27, s28, s29, s30" in text
+    assert "Far above on BigBuckBunny_30_384_550" in text
+    assert "hidden reference" in text
+
+
+def test_many_contents_have_a_panel_each(tmp_path):
+    contents = [f"kodim{n:02}" for n in range(1, 25)]
+    out = report(tmp_path, make_votes(contents, observers=6))
+    figure = (out / "mos.svg").read_text()
+    for content in contents:
+        assert f"<!-- {content} -->" in figure
+    assert figure.count("<!-- without -->") == 24
+
+
+def test_names_are_text_wherever_they_stand(tmp_path):
+    """Neither markup nor formula; a label may start with an underscore."""
+    votes = make_votes(methods=("none", "$x_1$")).replace(
+        {"content": {"city": "_<b>a&b"}, "observer": {"s1": "<script>alert(1)</script>"}}
+    )
+    out = report(tmp_path, votes)
+    Page(page(out))
+    assert "<script" not in page(out)
+    assert "&lt;script&gt;" in page(out)
+    assert "_&lt;b&gt;a&amp;b" in page(out)
+
+
+def test_an_earlier_report_is_replaced_and_anything_else_refused(tmp_path):
+    votes = make_votes(observers=3)
+    out = report(tmp_path, votes)
+    before = (out / "mos.csv").read_text()
+    (tmp_path / "report.partial").mkdir()  # of a killed run
+    (tmp_path / "report.partial" / "mos.csv").write_text("half")
+    report(tmp_path, votes.assign(vote=5))
+    assert (out / "mos.csv").read_text() != before
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["report", "votes.csv"]
+    with pytest.raises(InputError, match="row 2, vote"):
+        report(tmp_path, votes.assign(vote=11))
+    assert {file.name for file in out.iterdir()} == FILES
+    (out / "notes.txt").write_text("mine")
+    with pytest.raises(InputError, match=r"notes.txt"):
+        report(tmp_path, votes)
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other" / "thesis.txt").write_text("mine")
+    with pytest.raises(InputError, match=r"holds no mos.csv"):
+        report(tmp_path, votes, name="other")
+    with pytest.raises(InputError, match="is a file"):
+        report(tmp_path, votes, name="votes.csv")
+
+
+def test_a_file_without_scored_votes_is_refused(tmp_path):
+    with pytest.raises(InputError, match="no valid vote"):
+        report(tmp_path, make_votes(observers=2).assign(kind="training"))
+    assert not (tmp_path / "report").exists()
+
+
+def test_public_names_load():
+    for name in analysis.__all__:
+        assert callable(getattr(analysis, name))
+    with pytest.raises(AttributeError, match="no_such"):
+        _ = analysis.no_such

@@ -129,5 +129,5 @@ def write_codes(path: Path, pixels: NDArray[np.generic]) -> None:
 
 def codes(display: NDArray[np.float32], top: int) -> NDArray[np.float32]:
     """Return display values 0..1 as whole codes 0..top, rounded half up, clipped."""
-    scaled = np.clip(display, 0, 1) * np.float32(top)
-    return np.floor(scaled + np.float32(0.5))
+    scaled: NDArray[np.float32] = np.clip(display, 0, 1) * np.float32(top) + np.float32(0.5)
+    return np.floor(scaled)

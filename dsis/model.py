@@ -53,7 +53,7 @@ def structure(
         Handed to the validators (`ValidationInfo.context`): the folder that paths start from.
     """
     found, faults = attempt(kind, values, file, prefix, context)
-    if found is None:
+    if not isinstance(found, kind):
         raise InputError(faults)
     return found
 

@@ -8,7 +8,8 @@ from dsis.errors import InputError
 
 def partial_of(out: Path) -> Path:
     """Return the folder in which work on `out` goes on."""
-    return out.with_name(out.name + ".partial")
+    whole = out.absolute()
+    return whole.with_name(whole.name + ".partial")
 
 
 def check_replaceable(out: Path, mark: str, kept: str | None = None) -> None:

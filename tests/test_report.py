@@ -230,9 +230,11 @@ def table(rows, **columns):
     ).assign(**columns)
 
 
-# Votes on eight stimuli by sixteen observers, nothing remarkable about them.
+# Votes on 24 stimuli by sixteen observers, nothing remarkable about them.
 TYPICAL = np.clip(
-    np.rint(np.random.default_rng(2).normal(np.linspace(2, 4, 8)[:, None], 0.8, (8, 16))), 1, 5
+    np.rint(np.random.default_rng(0).normal(np.linspace(1.8, 4.2, 24)[:, None], 0.5, (24, 16))),
+    1,
+    5,
 ).tolist()
 
 
@@ -257,6 +259,11 @@ TYPICAL = np.clip(
             "Votes of 2 laboratories are pooled",
         ),
         (table([[4, 5]]), "finds no inconsistency"),
+        (table([[1, 5, 1, 2], [2, 1, 2, 3], [3, 3, 2, 4]]), "Screening proposes to reject o2"),
+        (
+            table([[1, 5, 1, 2], [2, 1, 2, 3], [3, 3, 2, 4]]),
+            "over 3 sequences is uncertain by 0.36",
+        ),
     ],
 )
 def test_remarks(votes, remark):

@@ -257,7 +257,7 @@ def table(rows):
     )
 
 
-@settings(deadline=None)
+@settings(max_examples=50, deadline=None)
 @given(st.lists(st.floats(1, 10), min_size=1, max_size=5))
 def test_two_sigma_removes_nothing_from_five_votes(row):
     assert analysis.remove_outliers(table([row])).removed.empty
@@ -311,7 +311,7 @@ def test_repetitions_are_presentations_of_their_own():
 VOTES = st.lists(st.lists(st.integers(1, 10), min_size=8, max_size=8), min_size=3, max_size=8)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=12, deadline=None)
 @given(rows=VOTES, shift=st.floats(-50, 50), stretch=st.sampled_from([0.1, 1 / 3, 2.5, 11.0]))
 def test_another_scale_changes_nothing_but_the_numbers(rows, shift, stretch):
     """Scores follow vote -> shift + stretch vote; the same votes and observers are rejected."""

@@ -12,6 +12,7 @@ from analysis.votes import SCORED_KINDS, complete, index_votes
 
 FEW_OBSERVERS = 15  # BT.500: fewer make an informal test
 MANY_REMOVED = 0.10
+FEW_SEQUENCES = 20  # below, the standard error of a correlation of 0.7 is over 0.11
 NAMES_LISTED = 6
 # The 2-sigma rule: with the sample sd, |z| is at most (n - 1) / sqrt(n), below 2 up to n = 5.
 REMOVABLE_FROM = 6
@@ -83,7 +84,7 @@ def remarks(
     yield from _about_the_test(votes, scale, counts)
     yield from _about_the_removal(counts, scores)
     yield from _about_intervals(scale, scores)
-    yield from _about_the_screens(observers)
+    yield from _about_the_screens(observers, counts)
     yield from _about_the_model(votes, scale)
 
 
@@ -149,12 +150,18 @@ def _about_intervals(scale: Scale, scores: pd.DataFrame) -> Iterator[str]:
         )
 
 
-def _about_the_screens(observers: pd.DataFrame) -> Iterator[str]:
+def _about_the_screens(observers: pd.DataFrame, counts: Counts) -> Iterator[str]:
     proposed = observers[observers["bt500_rejected"] | observers["correlation_rejected"]]
     if len(proposed):
         yield (
             f"Screening proposes to reject {_names(pd.Series(observer_name(proposed)))}: see "
             "Observers."
+        )
+    if observers["correlation_rejected"].any() and counts.stimuli < FEW_SEQUENCES:
+        error = (1 - 0.7**2) / np.sqrt(max(counts.stimuli - 1, 1))
+        yield (
+            f"A correlation of 0.7 over {_number(counts.stimuli, 'sequence')} is uncertain by "
+            f"{error:.2f} (standard error): the correlation screen meets faultless observers too."
         )
     if observers["bt500_rejected"].all():
         yield "BT.500's screening rejects every observer: there is no MOS after it."

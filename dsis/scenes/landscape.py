@@ -24,7 +24,7 @@ OVER = 2  # samples per row, averaged: ridges are the only edges without a footp
 PROFILE = np.array(  # distance, height of the land, height of its relief in metres
     [
         [20, 92, 0.3], [60, 88, 1], [140, 74, 2], [260, 44, 3], [420, 12, 4], [560, 5, 7],
-        [680, -5, 12], [1200, -6, 14], [1400, 5, 7], [2000, 9, 10], [2700, 40, 45],
+        [680, -7, 12], [1200, -8, 14], [1400, 5, 7], [2000, 9, 10], [2700, 40, 45],
         [4200, 120, 90], [5600, 100, 110], [8500, 330, 260], [12000, 560, 420], [15000, 300, 200],
     ]
 )  # fmt: skip
@@ -133,7 +133,7 @@ def _strip(view: View, texture: Texture, land: Land, first: int, azimuth: Field)
     albedo[close] = _meadow(view, texture, az[close], distance[close])
     albedo[away] = _country(view, texture, az[away], distance[away], height[away], wood[away])
     light = seen(land.sunny)[:, None] * SUN + AMBIENT
-    scene[row, column] = hazed(np.float32(1.25) * albedo * light, distance, view.air)
+    scene[row, column] = hazed(np.float32(1.1) * albedo * light, distance, view.air)
     at = row[wet], column[wet]
     scene[at] = _water(view, texture, scene, at, az[wet], distance[wet], seen(land.bank)[wet])
     view.image[:, first : first + count] = scene.reshape(-1, OVER, count, 3).mean(axis=1)
@@ -182,7 +182,7 @@ def _meadow(view: View, texture: Texture, az: Field, distance: Field) -> Field:
     blade = _upright(texture, az, distance, tall / 0.3, 0.10, 4, pixel)
     dry = step(texture.fractal(x / 14 + 70, y / 14, 4), -0.6, 1.0)
     green, straw = rgb(0.15, 0.21, 0.04), rgb(0.33, 0.30, 0.11)
-    colour = (green + dry[:, None] * (straw - green)) * np.exp(0.35 * tuft + 0.5 * blade)[:, None]
+    colour = (green + dry[:, None] * (straw - green)) * np.exp(0.3 * tuft + 0.42 * blade)[:, None]
     bloom = _upright(texture, az + 5, distance, tall / 0.09, 0.09, 1, pixel)
     patch = step(texture.fractal(x / 9 + 30, y / 9 + 9, 2), 0.0, 0.9)
     flowers = step(bloom + 0.35 * patch, 0.8, 0.95) * step(patch, 0, 0.3)
@@ -210,7 +210,7 @@ def _country(
     alp = rgb(0.17, 0.21, 0.07) * (1 + 0.3 * patchy[:, None])
     colour += step(height, 60, 110)[:, None] * (alp - colour)
     crown = _upright(texture, az, distance, (height + 0.3 * distance) / 4.5, 6.5, 4, pixel)
-    trees = (0.06 + step(crown, -0.9, 1.1) ** 1.5)[:, None] * rgb(0.11, 0.155, 0.045)
+    trees = (0.1 + step(crown, -1.0, 1.2) ** 1.5)[:, None] * rgb(0.11, 0.155, 0.045)
     colour += np.minimum(8 * wood, 1)[:, None] * (trees - colour)
     rock = rgb(0.34, 0.32, 0.30) * (0.9 + 0.3 * crown[:, None])
     colour += step(height + 60 * crown, 400, 620)[:, None] * (rock - colour)
@@ -235,11 +235,11 @@ def _water(
     mirrored = np.abs(2 * view.horizon_row - row + 0.012 * view.focal_px * ripple)
     above = np.minimum((OVER * mirrored).astype(np.int64), scene.shape[0] - 1)
     deep = rgb(0.008, 0.018, 0.022)
-    colour = deep + (0.42 + 0.2 * calm)[:, None] * (scene[above, at[1]] - deep)
+    colour = deep + (0.36 + 0.16 * calm)[:, None] * (scene[above, at[1]] - deep)
     colour += step(bank + 0.25 * ripple, 0.3, 0.7)[:, None] * (rgb(0.02, 0.035, 0.03) - colour)
     colour *= (1 + 0.25 * ripple * (1 - calm))[:, None]
-    spark = texture.value(180 * az + 7, 800 * slope) + 0.2 * texture.value(5 * az, 40 * slope)
-    glitter: Field = colour + step(spark, 0.85, 1.05)[:, None] * (GLINT - colour)
+    spark = texture.value(180 * az + 7, 900 * slope) + 0.1 * texture.value(5 * az, 40 * slope)
+    glitter: Field = colour + step(spark, 0.80, 1.03)[:, None] * (GLINT - colour)
     return glitter
 
 
@@ -260,7 +260,8 @@ def _things(
             size, style = rng.random(), rng.random()
             land = _land(view, texture, np.full((1, 1), azimuth, np.float32))
             point = int(np.searchsorted(RANGES[:, 0], distance))
-            base, lowest = float(land.height[point, 0]), float(land.row[: point + 1].min()) + 2
+            base, ridge = float(land.height[point, 0]), float(land.row[:point].min())
+            lowest = ridge + 2 if ridge < land.row[point, 0] else math.inf
             x, y = distance * math.sin(azimuth), distance * math.cos(azimuth)
             if base < 0.5:
                 continue

@@ -15,7 +15,7 @@ def rgb(red: float, green: float, blue: float) -> Field:
     return np.array([red, green, blue], np.float32)
 
 
-SUN = rgb(0.80, 0.74, 0.64)  # on a surface that faces it
+SUN = rgb(0.87, 0.83, 0.76)  # on a surface that faces it
 AMBIENT = rgb(0.13, 0.17, 0.24)  # of the open sky on an upright surface
 GLINT = rgb(3.8, 3.3, 2.5)  # the sun in glass or water, as much of it as a pixel holds
 _AZIMUTH, _ELEVATION = -1.88, 0.46

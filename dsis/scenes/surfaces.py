@@ -118,7 +118,7 @@ class Wall:
         glass = pulse(axis, wide, fu) * pulse(floors, tall, fv) * under_eaves
         if not glazed:
             glass = glass * (1 - pulse(axis, 0.03, fu))  # the bar between the casements
-        timber = np.float32(0.25 if glazed else 0.75)
+        timber = np.float32(0.25 if glazed else 0.85)
         colour = (albedo + 0.8 * frame[..., None] * (timber - albedo)) * light
         colour += glass[..., None] * (self._panes(axis, floors, v, max(fu, fv), fv) - colour)
         return colour

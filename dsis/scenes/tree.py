@@ -10,7 +10,7 @@ from dsis.scenes.texture import Field, Texture, step
 from dsis.scenes.view import Point, View
 
 LOBES = 14
-DARK, BARK = rgb(0.004, 0.007, 0.003), rgb(0.03, 0.024, 0.018)
+DARK, BARK = rgb(0.003, 0.005, 0.002), rgb(0.03, 0.024, 0.018)
 
 
 @dataclass(frozen=True)
@@ -61,8 +61,8 @@ class Tree:
         crown = np.clip((surface + np.float32(0.05) * leaf) * size + 0.5, 0, 1)
         trunk = np.clip((0.024 * (1.3 - z) - np.abs(x)) * size + 0.5, 0, 1) * ((z > 0) & (z < 0.6))
         green = rgb(0.16 + 0.12 * self.style, 0.26, 0.05)
-        leaves = DARK + (step(light + 1.3 * leaf, -1.7, 2.1) ** 2)[..., None] * (green - DARK)
-        colour = np.where((crown > 0.02)[..., None], leaves, BARK)
+        leaves = DARK + (step(light + 0.9 * leaf, -1.6, 2.0) ** 2)[..., None] * (green - DARK)
+        colour = np.where((crown > 0.02)[..., None], leaves, BARK * (1 + 0.5 * leaf)[..., None])
         shadow = step(1 - ((x - 0.4) / 0.5) ** 2 - (z / 0.045) ** 2, 0, 0.9)
         far = np.full((1, 1), distance, np.float32)
         view.blend(top, left, DARK, far, np.float32(0.7) * shadow)

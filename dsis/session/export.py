@@ -82,13 +82,14 @@ def _tables(store: Store, manifest: Manifest) -> dict[str, _Table]:
 
 def _package(store: Store, manifest: Manifest, tables: dict[str, _Table]) -> dict[str, Any]:
     """Return what `datapackage.json` says of the test and of every column."""
-    kinds = {row.vote.simulated for row in store.rows() if row.vote is not None}
+    simulated = [row.vote.simulated for row in store.rows() if row.vote is not None]
+    some = "some" if any(simulated) else "none"
     return {
         "schema": SCHEMA,
         "title": manifest.title,
         "scale": list(manifest.session.scale),
         "labels": list(manifest.session.labels),
-        "simulated": {(True,): "all", (False,): "none"}.get(tuple(kinds), "some"),
+        "simulated": "all" if all(simulated) else some,
         "manifest_sha256": store.manifest_sha256,
         "resources": [
             {

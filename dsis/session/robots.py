@@ -5,9 +5,9 @@ assumptions, and every vote of a robot is marked as simulated. On a scale from w
 
 - **Quality.** With d the root mean square S-CIELAB difference (the root of the visible noise
   energy), the mean observer's latent grade is L + (H - L) / (1 + (d / d_half)^2): imperceptible at
-  none, a logistic function of log d. A difference of 1 is meant to be just noticeable; there half of
-  all observers see something and give one grade less. On the paper's ten grades that is half a grade
-  below the top, hence d_half = 4.
+  none, a logistic function of log d. A difference of 1 is meant to be just noticeable: half of all
+  observers see something there and give one grade less. On ten grades that is half a grade below
+  the top, hence d_half = 4.
 - **Spread.** Total variance a (H - x)(x - L) at latent grade x, the SOS law (Hossfeld, Schatz &
   Egger, QoMEX 2011), and an observer's bias N(0, s_b^2) common to all that the observer votes on;
   what bias leaves of the total is inconsistency from vote to vote. Both numbers are those of the

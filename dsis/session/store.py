@@ -238,7 +238,7 @@ class Store:
         for table, *_ in self._db.execute("PRAGMA foreign_key_check"):
             faults.append(f"a row of {table} refers to nothing")
         faults += events.broken_links(self._db, self.manifest_sha256)
-        logged = [(facts["presentation"], facts["vote"]) for facts in self.events("voted")]
+        logged = [(facts.get("presentation"), facts.get("vote")) for facts in self.events("voted")]
         stored = self._db.execute("SELECT presentation, vote FROM votes").fetchall()
         if sorted(map(repr, logged)) != sorted(map(repr, stored)):
             faults.append("the votes are not those in the log of events")

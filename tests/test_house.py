@@ -12,9 +12,7 @@ import dsis
 from dsis.cli import _parser, main
 
 ROOT = Path(__file__).resolve().parents[1]
-COMMANDS = next(
-    action.choices for action in _parser()._subparsers._group_actions if action.choices
-)
+COMMANDS = next(action.choices for action in _parser()._subparsers._group_actions if action.choices)
 
 
 @pytest.mark.parametrize("command", COMMANDS)

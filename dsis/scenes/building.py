@@ -97,7 +97,9 @@ class Building:
     def _on_the_roof(self) -> Iterator["Building"]:
         """Yield lift housings or chimneys and dormers, the far ones first."""
 
-        def box(a: float, b: float, wide: float, deep: float, rise: float, tall: float, kind: str):
+        def box(
+            a: float, b: float, wide: float, deep: float, rise: float, tall: float, kind: str
+        ) -> "Building":
             x, y, base = self.at(a, b, self.eaves + rise)
             return Building(
                 x, y, self.yaw, wide, deep, base, base + tall, "flat", kind, pick(self.style, 11)

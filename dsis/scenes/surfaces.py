@@ -130,7 +130,7 @@ class Wall:
         salt = int(1e4 * self.style) + 31 * self.side
         one = np.float32(1 - min(max(1.6 * footprint - 0.4, 0.0), 1.0))
         shown = 3.999 * (1 + self.texture.cell(axis, floors, salt))
-        pane = MEAN_PANE + one * (PANES.take(shown.astype(np.int32), axis=0) - MEAN_PANE)
+        pane: Field = MEAN_PANE + one * (PANES.take(shown.astype(np.int32), axis=0) - MEAN_PANE)
         if self.kind == "glass":
             pane = pane * (0.35 + 0.65 * step(v, 0, 60))[..., None]
         pane = pane * (1 - np.float32(0.7) * pulse(floors + 0.36, 0.2, footprint_v))[..., None]

@@ -6,12 +6,12 @@ before sampling, so that nothing twinkles when the picture moves.
 """
 
 from dataclasses import dataclass
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-Field = NDArray[np.float32]
+Field = NDArray[np.floating[Any]]  # float32; for the stubs, times a Python float is float64
 CELLS = 256  # the lattice repeats after this many cells, in both directions
 
 

@@ -152,7 +152,8 @@ def _footprint(axis: Field) -> float:
     rows, columns = axis.shape
     down = abs(float(axis[-1, columns // 2] - axis[0, columns // 2])) / max(rows - 1, 1)
     across = abs(float(axis[rows // 2, -1] - axis[rows // 2, 0])) / max(columns - 1, 1)
-    return down + across
+    width: float = down + across
+    return width
 
 
 def _coverage(spots: Sequence[tuple[float, float]], columns: Field, top: int, bottom: int) -> Field:

@@ -1,0 +1,81 @@
+"""Promise: one command runs the whole chain, from frames to a MOS report, for a newcomer."""
+
+import csv
+import json
+from pathlib import Path
+
+import pytest
+
+from dsis.cli import main
+from dsis.spec import SHIPPED
+
+
+@pytest.fixture(scope="module")
+def demo(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the demo's result, from frames of 96 x 64 instead of 480 x 270."""
+    folder = tmp_path_factory.mktemp("demo")
+    text = (SHIPPED / "demo.toml").read_text(encoding="utf-8")
+    for old, new in (
+        ("width = 480", "width = 96"),
+        ("height = 270", "height = 64"),
+        ("seconds = 2", "seconds = 0.2"),
+        ("reference_s = 2.0", "reference_s = 0.2"),
+        ("test_s = 2.0", "test_s = 0.2"),
+    ):
+        assert old in text
+        text = text.replace(old, new)
+    (folder / "demo.toml").write_text(text, encoding="utf-8")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        assert main(["demo"]) == 0
+    return folder / "dsis-demo"
+
+
+def test_it_leaves_stimuli_votes_and_a_report(demo: Path) -> None:
+    clips = json.loads((demo / "stimuli" / "manifest.json").read_text(encoding="utf-8"))["clips"]
+    tests = [clip["stimulus"] for clip in clips if clip["role"] == "test"]
+    assert len(tests) == 8
+    with (demo / "report" / "mos.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert sorted(row["stimulus"] for row in rows) == sorted(tests)
+    assert {row["n"] for row in rows} == {"18"}
+    assert "<html" in (demo / "report" / "report.html").read_text(encoding="utf-8")
+    assert (demo / "report" / "mos.svg").stat().st_size > 0
+    assert (demo / "stimuli" / "figures" / "fig5__city__sd__2.png").stat().st_size > 0
+    assert not demo.with_name("dsis-demo.partial").exists()
+
+
+def test_simulated_votes_say_so_everywhere(demo: Path) -> None:
+    for table in ("votes/votes.csv", "report/mos.csv", "report/observers.csv"):
+        with (demo / table).open(encoding="utf-8") as file:
+            assert {row["simulated"] for row in csv.DictReader(file)} == {"true"}, table
+    for text in ("report/report.html", "report/mos.svg"):
+        assert "SIMULATED" in (demo / text).read_text(encoding="utf-8"), text
+
+
+def test_training_clips_are_not_the_tests_and_not_scored(demo: Path) -> None:
+    with (demo / "votes" / "votes.csv").open(encoding="utf-8") as file:
+        votes = list(csv.DictReader(file))
+    training = {v["stimulus"] for v in votes if v["kind"] == "training"}
+    assert training
+    assert all(name.startswith("training__") for name in training)
+    assert not training & {v["stimulus"] for v in votes if v["kind"] == "test"}
+    with (demo / "report" / "mos.csv").open(encoding="utf-8") as file:
+        assert not training & {row["stimulus"] for row in csv.DictReader(file)}
+
+
+def test_content_never_repeats_in_succession(demo: Path) -> None:
+    with (demo / "votes" / "votes.csv").open(encoding="utf-8") as file:
+        votes = list(csv.DictReader(file))
+    for observer in {v["observer"] for v in votes}:
+        shown = [v for v in votes if v["observer"] == observer and v["kind"] != "training"]
+        shown.sort(key=lambda v: int(v["presentation"]))
+        contents = [v["content"] for v in shown]
+        assert all(a != b for a, b in zip(contents, contents[1:], strict=False)), observer
+
+
+def test_it_can_be_run_again(demo: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    before = (demo / "report" / "report.html").read_bytes()
+    monkeypatch.chdir(demo.parent)
+    assert main(["demo"]) == 0
+    assert (demo / "report" / "report.html").read_bytes() == before

@@ -54,6 +54,9 @@ class Quality(Model):
         As `psnr_db`, against the demosaicked noise-free frame.
     visible_noise, visible_lightness, visible_colour
         Mean squared visible difference (S-CIELAB Delta E^2) over `visible_frames`, and its parts.
+    base_psnr_db, base_visible_noise
+        What the camera without its effects beyond the base model would give in `visible_frames`;
+        absent where the camera has none, or the noise is not the camera's.
     """
 
     psnr_db: tuple[Db, ...] = ()
@@ -63,6 +66,8 @@ class Quality(Model):
     visible_noise: float | None = None
     visible_lightness: float | None = None
     visible_colour: float | None = None
+    base_psnr_db: tuple[Db, ...] = ()
+    base_visible_noise: float | None = None
 
 
 class Clip(Model):

@@ -18,7 +18,7 @@ from dsis.color import Color, DisplayTransform
 from dsis.errors import DamagedError, InputError
 from dsis.imagefile import read, write
 from dsis.manifest import read_manifest
-from dsis.spec import read_spec
+from dsis.spec import SHIPPED, read_spec
 from dsis.stimuli import build_stimuli, check_stimuli
 from dsis.stimuli.conditions import Rendering
 
@@ -187,7 +187,6 @@ class Identity(DisplayTransform):
 
 def rendering(camera: str, transform: type[DisplayTransform], seed: int = 1) -> Rendering:
     from dsis.camera import read_camera
-    from dsis.spec import SHIPPED
 
     model: Camera = read_camera(SHIPPED / "cameras" / f"{camera}.toml")
     return Rendering(model, transform(Color()), seed)
@@ -321,7 +320,7 @@ def test_a_numbered_sequence_is_read_in_natural_order(tmp_path: Path) -> None:
 def test_stills_are_contents_of_their_own_with_a_remark(tmp_path: Path) -> None:
     for name in ("one", "two"):
         write(tmp_path / f"{name}.png", np.clip(scene(300, 520), 0, 1), "png8")
-    text = (read_spec.__globals__["SHIPPED"] / "stills.toml").read_text(encoding="utf-8")
+    text = (SHIPPED / "stills.toml").read_text(encoding="utf-8")
     text = text.replace("seconds = 0.4", "seconds = 0.04").replace("_s = 0.4", "_s = 0.04")
     (tmp_path / "s.toml").write_text(text.replace("training = 4", "training = 0"), encoding="utf-8")
     manifest = build_stimuli(read_spec(tmp_path / "s.toml", [tmp_path]), tmp_path / "out")
@@ -332,6 +331,36 @@ def test_stills_are_contents_of_their_own_with_a_remark(tmp_path: Path) -> None:
     data = np.fromfile(tmp_path / "out" / "player" / "one__reference.rgb", np.uint8)
     still = read(tmp_path / "one.png")[15:285, 20:500]
     assert np.abs(data.reshape(270, 480, 3) / 255 - still).mean() < 0.01
+
+
+def test_a_camera_with_effects_says_what_they_do(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Row noise of 120 DN on about 50 must lower PSNR and be seen; AWGN knows no camera."""
+    spec = write_spec(tmp_path, camera="striped", awgn="sigma = 4")
+    shipped = (SHIPPED / "cameras" / "dual_gain_cinema.toml").read_text(encoding="utf-8")
+    camera = tmp_path / "cameras" / "striped.toml"
+    camera.parent.mkdir()
+    camera.write_text(
+        shipped + '[[effect]]\nkind = "row_noise"\nsigma_dn = 120\n', encoding="utf-8"
+    )
+    assert main(["stimuli", str(spec), "--out", str(tmp_path / "out")]) == 0
+    said = capsys.readouterr().out
+    manifest = read_manifest(tmp_path / "out")
+    for name in ("ramp__sd__none__0", "ramp__sd__bilinear__0"):
+        quality = manifest.clip(name).quality
+        with_effects = [quality.psnr_db[frame] for frame in quality.visible_frames]
+        assert np.mean(with_effects) < np.mean(quality.base_psnr_db) - 0.3
+        assert quality.visible_noise > 1.2 * quality.base_visible_noise
+        assert f"effects on {name}: PSNR" in said
+    assert manifest.clip("ramp__awgn__none__0").quality.base_psnr_db == ()
+    # The base model alone is the same test without the effect, bit for bit.
+    camera.write_text(shipped, encoding="utf-8")
+    plain = build_stimuli(read_spec(spec), tmp_path / "plain")
+    before = plain.clip("ramp__sd__none__0").quality
+    after = manifest.clip("ramp__sd__none__0").quality
+    assert [before.psnr_db[frame] for frame in before.visible_frames] == list(after.base_psnr_db)
+    assert before.visible_noise == pytest.approx(after.base_visible_noise, rel=1e-12)
 
 
 @pytest.mark.parametrize("damage", ["flip", "missing", "short", "long"])

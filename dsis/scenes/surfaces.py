@@ -107,7 +107,8 @@ class Wall:
     ) -> Field:
         """Return the colour of the wall with frames and panes."""
         glazed = self.kind == "glass"
-        storey = 1.9 if self.kind == "dormer" else 3.1 + 0.8 * pick(self.style, 71)
+        storeys = max(round((self.eaves - self.base - 0.4) / (3.1 + 0.8 * pick(self.style, 71))), 1)
+        storey = (self.eaves - self.base - 0.4) / storeys
         bay = 2.2 + 1.3 * pick(self.style, 37)
         bays = 1 if self.kind == "dormer" else max(round(self.length / bay), 1)
         wide, tall = (0.9, 0.72) if glazed else (0.36 + 0.16 * pick(self.style, 17), 0.56)

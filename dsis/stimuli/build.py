@@ -1,13 +1,9 @@
 """Test spec -> four conditions -> frames and manifest; resumable, whatever the workers."""
 
 import hashlib
-import json
-import math
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import contextmanager
-from dataclasses import dataclass
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -15,80 +11,25 @@ import numpy as np
 from filelock import FileLock, Timeout
 from numpy.typing import NDArray
 
-import dsis
-from dsis.camera import camera_values
-from dsis.color import STUDIO_CONFIG, DisplayTransform
 from dsis.errors import InputError
-from dsis.manifest import (
-    MANIFEST,
-    Clip,
-    ClipFiles,
-    Manifest,
-    Quality,
-    write_manifest,
-)
+from dsis.manifest import MANIFEST, Clip, ClipFiles, Manifest, Quality, write_manifest
 from dsis.outdir import check_replaceable, finish, partial_of
-from dsis.scenes import SCENES
-from dsis.spec import Content, Test
+from dsis.spec import TRAINING, Test
+from dsis.stimuli.assess import Assessor
 from dsis.stimuli.clipfiles import clip_path, read_frame_bytes, write_frame
-from dsis.stimuli.conditions import CODE_MAX, Condition, Rendering, conditions_of
+from dsis.stimuli.conditions import Condition
 from dsis.stimuli.figure import write_figures
+from dsis.stimuli.frames import FrameMaker
+from dsis.stimuli.jobs import Job, jobs_of
 from dsis.stimuli.journal import Journal, sha256
-from dsis.stimuli.match import matching_frames, solve_sigma
-from dsis.stimuli.quality import delivered, psnr_db, psnr_float_db
-from dsis.stimuli.source import Source, remarks_on, source_of
-from dsis.visibility import Eye, pixels_per_degree
+from dsis.stimuli.match import matching_frames
+from dsis.stimuli.resolved import build_digest, manifest_of
 
 Frame = NDArray[np.float32]
 Progress = Callable[[int, int, str], None]
 
-TRAINING = "training"
 VISIBLE_FRAMES = 3
 VOTES = "session"
-_TRAINING_SEED_STEP = 1_000_003
-
-
-@dataclass(frozen=True)
-class Job:
-    """A content with the conditions that it is shown in."""
-
-    content: Content
-    role: str
-    conditions: tuple[Condition, ...]
-
-    @property
-    def name(self) -> str:
-        """Name of the content."""
-        return self.content.name or ""
-
-    @property
-    def reference(self) -> str:
-        """Name of the content's reference stimulus."""
-        return f"{self.name}__reference"
-
-
-def jobs_of(test: Test) -> tuple[Job, ...]:
-    """Return what is to be built: the test's contents in all conditions, and the training's.
-
-    Training shows another scene, or the same with another seed: never a clip of the test.
-    """
-    conditions = conditions_of(test.spec)
-    jobs = [Job(content, "test", conditions) for content in test.contents()]
-    wanted = min(test.spec.session.training, len(conditions))
-    if wanted:
-        places = np.linspace(0, len(conditions) - 1, wanted).round().astype(int)
-        jobs.append(Job(training_content(test), TRAINING, tuple(conditions[i] for i in places)))
-    return tuple(jobs)
-
-
-def training_content(test: Test) -> Content:
-    """Return the content of the training: a scene that the test does not show."""
-    shown = [content for content in test.spec.content if content.scene is not None]
-    unused = [scene for scene in SCENES if scene not in {c.scene for c in shown}]
-    model = shown[0] if shown else Content(name=TRAINING, scene=SCENES[0])
-    scene = unused[0] if unused else model.scene
-    seed = max((c.scene_seed for c in shown), default=0) + _TRAINING_SEED_STEP
-    return model.model_copy(update={"name": TRAINING, "scene": scene, "scene_seed": seed})
 
 
 def build_stimuli(
@@ -131,11 +72,15 @@ def build_stimuli(
             done = i * test.spec.sequence.frames
             tell(done, total, f"{job.name}: light")
             builder = Builder(test, job, partial, journal)
-            sigmas[job.name] = {str(level): s for level, s in builder.sigma.items()}
+            sigmas[job.name] = {str(level): s for level, s in builder.maker.sigma.items()}
             builder.build(jobs, _from(tell, done, total, job.name))
             clips += builder.clips(jobs)
-            write_figures(builder.figure_frames(), partial / "figures", job.name)
-        manifest = _manifest(test, tuple(clips), sigmas)
+            write_figures(
+                builder.maker.figure_frames(test.spec.sequence.frames // 2),
+                partial / "figures",
+                job.name,
+            )
+        manifest = manifest_of(test, tuple(clips), sigmas)
         write_manifest(manifest, partial)
         journal.remove()
         finish(partial, out)
@@ -147,23 +92,10 @@ class Builder:
 
     def __init__(self, test: Test, job: Job, folder: Path, journal: Journal) -> None:
         self.test, self.job, self.folder, self.journal = test, job, folder, journal
-        spec = test.spec
-        self.size = spec.sequence
-        transform = DisplayTransform(spec.color)
-        self.rendering = Rendering(test.camera, transform, spec.seed)
-        self.source: Source = source_of(job.content, test, transform)
-        self.eye = Eye(pixels_per_degree(spec.viewing, self.size.height))
-        self.visible = matching_frames(self.size.frames, VISIBLE_FRAMES)
-        self.sigma = {
-            level: self._sigma(level)
-            for level in sorted({c.level for c in job.conditions if c.noise == "awgn"})
-        }
-
-    def _sigma(self, level: int) -> float:
-        known = self.test.sigma.get((self.job.name, level))
-        if known is not None:
-            return known
-        return solve_sigma(self.test.spec, self.source, self.rendering, self.job.name, level)
+        self.size = test.spec.sequence
+        self.maker = FrameMaker.of(test, job)
+        visible = matching_frames(self.size.frames, VISIBLE_FRAMES)
+        self.assessor = Assessor(test.spec, self.maker, visible)
 
     def build(self, jobs: int, done: Callable[[int], None]) -> None:
         """Write every frame that is not there yet."""
@@ -180,53 +112,6 @@ class Builder:
                 pool.shutdown(cancel_futures=True)
                 raise
 
-    def frame(self, frame: int) -> Iterator[tuple[str, Frame, Frame | None]]:
-        """Yield (stimulus, display frame 0..1, demosaicked noise-free frame) of all clips.
-
-        The first is the reference.
-        """
-        make, job = self.rendering, self.job
-        clean = make.camera.clean_raw(self.source.light(frame))
-        reference = make.reference(clean)
-        yield job.reference, reference, None
-        methods = sorted({c.demosaic for c in job.conditions} - {"none"})
-        noises = {c.noise for c in job.conditions}
-        clean_dem: dict[tuple[str, str], Frame] = {}
-        for method in methods:
-            if "sd" in noises:
-                clean_dem["sd", method] = make.display_demosaicked(clean, method)
-            if "awgn" in noises:
-                codes = make.mosaicked_display(reference * CODE_MAX, method)
-                clean_dem["awgn", method] = codes / CODE_MAX
-        fields: dict[tuple[str, int], Frame] = {}
-        for condition in job.conditions:
-            noise, level = condition.noise, condition.level
-            if (noise, level) not in fields:
-                fields[noise, level] = (
-                    make.noisy_raw(clean, job.name, level, frame)
-                    if noise == "sd"
-                    else make.noisy_display(reference, self.sigma[level], job.name, level, frame)
-                )
-            field = fields[noise, level]
-            name = condition.stimulus(job.name)
-            if condition.demosaic == "none":
-                yield name, make.display(field) if noise == "sd" else field / CODE_MAX, reference
-            elif noise == "sd":
-                display = make.display_demosaicked(field, condition.demosaic)
-                yield name, display, clean_dem[noise, condition.demosaic]
-            else:
-                display = make.mosaicked_display(field, condition.demosaic) / CODE_MAX
-                yield name, display, clean_dem[noise, condition.demosaic]
-
-    def figure_frames(self) -> dict[tuple[str, int], dict[str, Frame]]:
-        """Return the middle frames, {(noise, level): {"reference" or demosaic: frame}}."""
-        shown = {name: display for name, display, _ in self.frame(self.size.frames // 2)}
-        found: dict[tuple[str, int], dict[str, Frame]] = {}
-        for c in self.job.conditions:
-            row = found.setdefault((c.noise, c.level), {"reference": shown[self.job.reference]})
-            row[c.demosaic] = shown[c.stimulus(self.job.name)]
-        return found
-
     def clips(self, jobs: int) -> list[Clip]:
         """Return the manifest's entries of all clips, from what the journal holds."""
         conditions = {c.stimulus(self.job.name): c for c in self.job.conditions}
@@ -241,9 +126,7 @@ class Builder:
     def _clip(self, name: str, condition: Condition | None, files: dict[str, ClipFiles]) -> Clip:
         if condition is None:
             return Clip(stimulus=name, content=self.job.name, role="reference", files=files)
-        records = [self._record(name, frame) for frame in range(self.size.frames)]
-        seen = [r["visible"] for r in records if r["visible"] is not None]
-        lightness, colour = np.mean(seen, axis=0)
+        white = condition.noise == "awgn"
         return Clip(
             stimulus=name,
             content=self.job.name,
@@ -252,17 +135,26 @@ class Builder:
             noise=condition.noise,
             demosaic=condition.demosaic,
             level=condition.level,
-            awgn_sigma=self.sigma[condition.level] if condition.noise == "awgn" else None,
+            awgn_sigma=self.maker.sigma[condition.level] if white else None,
             files=files,
-            quality=Quality(
-                psnr_db=tuple(r["psnr_db"] for r in records),
-                psnr_float_db=tuple(r["psnr_float_db"] for r in records),
-                psnr_demosaicked_db=tuple(r["psnr_demosaicked_db"] for r in records),
-                visible_frames=self.visible,
-                visible_noise=float(lightness + colour),
-                visible_lightness=float(lightness),
-                visible_colour=float(colour),
-            ),
+            quality=self._quality(name),
+        )
+
+    def _quality(self, name: str) -> Quality:
+        records = [self._record(name, frame) for frame in range(self.size.frames)]
+        seen = [records[frame] for frame in self.assessor.visible]
+        lightness, colour = np.mean([r["visible"] for r in seen], axis=0)
+        base = [r["without_effects"] for r in seen if "without_effects" in r]
+        return Quality(
+            psnr_db=tuple(r["psnr_db"] for r in records),
+            psnr_float_db=tuple(r["psnr_float_db"] for r in records),
+            psnr_demosaicked_db=tuple(r["psnr_demosaicked_db"] for r in records),
+            visible_frames=self.assessor.visible,
+            visible_noise=float(lightness + colour),
+            visible_lightness=float(lightness),
+            visible_colour=float(colour),
+            base_psnr_db=tuple(r["psnr_db"] for r in base),
+            base_visible_noise=float(np.mean([sum(r["visible"]) for r in base])) if base else None,
         )
 
     def _files(self, name: str) -> dict[str, ClipFiles]:
@@ -294,41 +186,28 @@ class Builder:
         )
 
     def _write(self, frame: int) -> None:
-        records: dict[str, Any] = {}
-        reference: Frame | None = None
-        for name, display, clean_dem in self.frame(frame):
-            record: dict[str, Any] = {
-                "sha256": {
-                    form: write_frame(self.folder, name, form, frame, display)
-                    for form in self.test.spec.formats
-                }
-            }
-            if clean_dem is None or reference is None:
-                reference = display
-                seen = self._seen(display) if frame in self.visible else None
-            else:
-                record |= self._quality(display, reference, clean_dem)
-                record["visible"] = self._visible(display, seen)
+        clips = self.maker.frame(frame)
+        name, reference, _ = next(clips)
+        records = {name: {"sha256": self._written(name, frame, reference)}}
+        seen = self.assessor.seen(reference) if frame in self.assessor.visible else None
+        for name, display, clean_dem in clips:
+            record: dict[str, Any] = {"sha256": self._written(name, frame, display)}
+            record |= self.assessor.compare(display, reference, clean_dem)
+            if seen is not None:
+                record["visible"] = self.assessor.visible_noise(display, seen)
             records[name] = record
+        if seen is not None:
+            base = self.assessor.without_effects(frame, reference, seen)
+            for name, found in base.items():
+                records[name]["without_effects"] = found
         self.journal.add(self.job.name, frame, records)
 
-    def _quality(self, display: Frame, reference: Frame, clean_dem: Frame) -> dict[str, Any]:
-        test = delivered(display)
+    def _written(self, name: str, frame: int, display: Frame) -> dict[str, str]:
+        """Write one frame of a clip in all formats and return the digests."""
         return {
-            "psnr_db": _finite(psnr_db(test, delivered(reference))),
-            "psnr_float_db": _finite(psnr_float_db(display, reference)),
-            "psnr_demosaicked_db": _finite(psnr_db(test, delivered(clean_dem))),
+            form: write_frame(self.folder, name, form, frame, display)
+            for form in self.test.spec.formats
         }
-
-    def _seen(self, display: Frame) -> Frame:
-        return self.eye.seen(delivered(display).astype(np.float32) / CODE_MAX)
-
-    def _visible(self, display: Frame, seen: Frame | None) -> list[float] | None:
-        if seen is None:
-            return None
-        shown = delivered(display).astype(np.float32) / CODE_MAX
-        difference = self.eye.difference(shown, seen)
-        return [difference.lightness, difference.colour]
 
 
 def _silent(done: int, total: int, what: str) -> None:
@@ -338,57 +217,6 @@ def _silent(done: int, total: int, what: str) -> None:
 def _from(tell: Progress, start: int, total: int, what: str) -> Callable[[int], None]:
     """Return what tells that so many frames after `start` are done."""
     return lambda done: tell(start + done, total, what)
-
-
-def build_digest(test: Test) -> str:
-    """Return the digest of all that decides the bytes: spec, camera, footage, versions."""
-    footage = {
-        name: [(str(path), path.stat().st_size, path.stat().st_mtime_ns) for path in paths]
-        for name, paths in test.footage.items()
-    }
-    sigma = sorted((name, level, value) for (name, level), value in test.sigma.items())
-    everything = [spec_values(test), footage, sigma, _versions()]
-    return sha256(json.dumps(everything, sort_keys=True).encode())
-
-
-def spec_values(test: Test) -> dict[str, Any]:
-    """Return the spec as resolved: the camera model in full, files with their whole paths."""
-    values: dict[str, Any] = test.spec.model_dump(mode="json", by_alias=True, exclude_none=True)
-    values["camera"] = camera_values(test.camera)
-    for content in values["content"]:
-        for key in ("files", "stills"):
-            if key in content:
-                content[key] = [str(test.folder / path) for path in content[key]]
-    return values
-
-
-def _manifest(test: Test, clips: tuple[Clip, ...], sigmas: dict[str, dict[str, float]]) -> Manifest:
-    spec = test.spec
-    return Manifest(
-        schema="dsis-manifest/1",  # type: ignore[call-arg] # the alias, as files have it
-        title=spec.title,
-        sequence=spec.sequence,
-        viewing=spec.viewing,
-        session=spec.session,
-        clips=clips,
-        remarks=tuple(r for content in test.contents() for r in remarks_on(content, test)),
-        spec=spec_values(test),
-        awgn_sigma={name: per for name, per in sigmas.items() if per},
-        versions=_versions(),
-    )
-
-
-def _versions() -> dict[str, str]:
-    packages = ("numpy", "scipy", "numba", "opencolorio", "OpenImageIO")
-    return {
-        "dsis": dsis.__version__,
-        "ocio_config": STUDIO_CONFIG,
-        **{name: version(name) for name in packages},
-    }
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None
 
 
 @contextmanager

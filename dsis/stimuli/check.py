@@ -68,7 +68,21 @@ def summary(manifest: Manifest) -> str:
         + "".join(f"  {cell:>{width}}" for cell, width in zip(row[1:], widths[1:], strict=True))
         for row in rows
     ]
-    return "\n".join([*lines, *_grouped(manifest.remarks)])
+    return "\n".join([*lines, *_effects(manifest), *_grouped(manifest.remarks)])
+
+
+def _effects(manifest: Manifest) -> list[str]:
+    """Return one line per clip on what physics beyond the base model does to it."""
+    lines = []
+    for clip in manifest.clips:
+        q = clip.quality
+        if q.visible_noise is not None and q.base_visible_noise:
+            with_effects = _mean(tuple(q.psnr_db[frame] for frame in q.visible_frames))
+            lines.append(
+                f"effects on {clip.stimulus}: PSNR {_mean(q.base_psnr_db)} -> {with_effects} dB, "
+                f"visible noise {q.base_visible_noise:.2f} -> {q.visible_noise:.2f}"
+            )
+    return lines
 
 
 def _grouped(remarks: tuple[str, ...]) -> list[str]:

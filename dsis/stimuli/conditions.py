@@ -87,6 +87,14 @@ class Rendering:
         )
         return self.transform.display_from_scene(self.camera.scene_light_of_balanced(full))
 
+    def shown(self, noise: str, field: Frame, method: str) -> Frame:
+        """Return the display frame 0..1 of a field: raw data (`sd`) or code values (`awgn`)."""
+        if noise == "sd":
+            return (
+                self.display(field) if method == "none" else self.display_demosaicked(field, method)
+            )
+        return (field if method == "none" else self.mosaicked_display(field, method)) / CODE_MAX
+
     def reference(self, clean: Frame) -> Frame:
         """Return the reference of a clean raw frame: clipped to what the display can show."""
         return np.clip(self.display(clean), np.float32(0), np.float32(1))

@@ -1,14 +1,13 @@
 """What a build will take, before it is started: disk, memory, time."""
 
 import shutil
-import tempfile
 import time
 from dataclasses import dataclass
 from pathlib import Path
 
 from dsis.spec import Test
-from dsis.stimuli.build import Builder, jobs_of
-from dsis.stimuli.journal import Journal
+from dsis.stimuli.frames import FrameMaker
+from dsis.stimuli.jobs import jobs_of
 from dsis.stimuli.source import SCENE_OVERSAMPLING
 
 _BYTES_PER_SAMPLE = {"player": 1.0, "tiff16": 2.0, "dpx16": 2.0, "exr": 2.0, "png8": 1.0}
@@ -43,14 +42,12 @@ def estimate(test: Test, out: Path, jobs: int = 1) -> Estimate:
     clips = sum(1 + len(job.conditions) for job in work)
     samples = size.width * size.height * 3
     disk = clips * size.frames * samples * sum(_BYTES_PER_SAMPLE[f] for f in spec.formats)
-    with tempfile.TemporaryDirectory() as scratch:
-        folder = Path(scratch)
-        begun = time.perf_counter()
-        builder = Builder(test, work[0], folder, Journal(folder, ""))
-        list(builder.frame(0))  # compiles what is not compiled yet
-        ready = time.perf_counter()
-        list(builder.frame(0))
-        per_frame = time.perf_counter() - ready
+    begun = time.perf_counter()
+    maker = FrameMaker.of(test, work[0])
+    list(maker.frame(0))  # compiles what is not compiled yet
+    ready = time.perf_counter()
+    list(maker.frame(0))
+    per_frame = time.perf_counter() - ready
     seconds = len(work) * (ready - begun) + len(work) * size.frames * per_frame / max(1, jobs)
     travel = max(abs(job.content.pan_px_per_frame) for job in work) * size.frames
     source = SCENE_OVERSAMPLING**2 * (size.width + travel) * size.height * 3 * 4 * 3

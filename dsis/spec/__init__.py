@@ -1,0 +1,16 @@
+"""A test spec: one TOML file = one subjective test (`dsis-test/1`)."""
+
+from dsis.spec.reading import SHIPPED, read_spec, spec_path
+from dsis.spec.schema import TRAINING, Content, Sequence, Session, Spec, Test
+
+__all__ = [
+    "SHIPPED",
+    "TRAINING",
+    "Content",
+    "Sequence",
+    "Session",
+    "Spec",
+    "Test",
+    "read_spec",
+    "spec_path",
+]

@@ -1,0 +1,175 @@
+"""Reading a test spec: all faults in one message."""
+
+import json
+import re
+from collections.abc import Mapping
+from collections.abc import Sequence as Many
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Any
+
+from dsis.camera import Camera
+from dsis.errors import Fault, InputError
+from dsis.imagefile import find_files
+from dsis.model import attempt, read_toml
+from dsis.spec.fits import misfits, too_long
+from dsis.spec.schema import CameraChoice, Content, Spec, Test, still_name
+
+# Beside the packages, in a checkout as in an installation.
+SHIPPED = Path(__file__).resolve().parents[2] / "stimuli_specs"
+
+
+def spec_path(name: str | Path) -> Path:
+    """Return the file of a spec or camera: as given, or of that name among those shipped."""
+    path = Path(name)
+    if path.exists() or path.is_absolute():
+        return path
+    shipped = SHIPPED / name
+    return shipped if shipped.is_file() else path
+
+
+def read_spec(name: str | Path, source: Many[str | Path] = (), seed: int | None = None) -> Test:
+    """Return the test that a spec describes; raise `InputError` with every fault in it.
+
+    Parameters
+    ----------
+    name
+        A TOML file, one of those shipped with dsis (`seybold.toml`), or a `manifest.json`: the same
+        stimuli again.
+    source
+        Image files, globs or folders that take the place of the spec's contents, from the current
+        folder.
+    seed
+        Takes the place of the spec's seed.
+    """
+    path = spec_path(name)
+    values, sigma = _values(path)
+    if seed is not None:
+        values["seed"] = seed
+    if source:
+        _check_source(source)
+        values["content"] = _replaced(values.get("content"), source)
+    faults: list[Fault] = []
+    camera = _camera(values.get("camera"), path, faults)
+    sections: dict[str, Any] = {}
+    for key, field in Spec.model_fields.items():
+        name_in_file = field.alias or key
+        if key == "camera" and camera is not None and "schema" in values["camera"]:
+            sections[key] = CameraChoice(model=camera.name)
+        elif name_in_file in values:
+            kind = (
+                Annotated[field.annotation, *field.metadata] if field.metadata else field.annotation
+            )
+            sections[key], more = attempt(
+                kind, values[name_in_file], str(path), name_in_file, path.parent.resolve()
+            )
+            faults += more
+        elif field.is_required():
+            faults.append(Fault(str(path), name_in_file, "is missing"))
+        else:
+            sections[key] = field.default
+    faults += [
+        Fault(str(path), key, f"unknown key (allowed here: {', '.join(_names())})")
+        for key in values
+        if key not in _names()
+    ]
+    folder = path.parent.resolve()
+    if sections.get("content") and sections.get("sequence"):
+        faults += misfits(sections["content"], sections["sequence"], folder, str(path))
+    if sections.get("session") and sections.get("sequence"):
+        faults += too_long(sections["session"], sections["sequence"], str(path))
+    if faults or camera is None:
+        raise InputError(faults)
+    test = Test(Spec.model_construct(**sections), camera, folder, {}, sigma)
+    footage = {c.name or "": _footage(c, folder) for c in test.contents()}
+    return replace(test, footage={name: paths for name, paths in footage.items() if paths})
+
+
+def _names() -> list[str]:
+    return [field.alias or key for key, field in Spec.model_fields.items()]
+
+
+def _values(path: Path) -> tuple[dict[str, Any], dict[tuple[str, int], float]]:
+    """Return what a spec or the spec inside a manifest holds, and the sigmas that are solved."""
+    if path.suffix != ".json":
+        return read_toml(path), {}
+    try:
+        manifest = json.loads(path.read_text(encoding="utf-8"))
+        values = dict(manifest["spec"])
+        solved = manifest["awgn_sigma"]
+        sigma = {(name, int(n)): float(s) for name, per in solved.items() for n, s in per.items()}
+    except OSError as error:
+        raise InputError.of(path, "", f"cannot be read: {error.strerror}") from None
+    except (ValueError, KeyError, TypeError, AttributeError):
+        fact = "holds no spec to build from: only manifests that `dsis stimuli` wrote do"
+        raise InputError.of(path, "spec", fact) from None
+    return values, sigma
+
+
+def _camera(section: object, path: Path, faults: list[Fault]) -> Camera | None:
+    """Return the camera of the section: a file, or the whole model as manifests hold it."""
+    if not isinstance(section, Mapping):
+        return None
+    if "schema" in section:
+        return _camera_of(section, str(path), "camera", faults)
+    model = section.get("model")
+    if not isinstance(model, str):
+        return None  # the section's own fault
+    beside = path.parent / model
+    file = beside if beside.exists() else spec_path(model)
+    if not file.is_file():
+        shipped = sorted(p.name for p in SHIPPED.glob("cameras/*.toml"))
+        fact = f"is {model!r}: no such file, neither from {path.parent.resolve()} nor shipped"
+        faults.append(Fault(str(path), "camera.model", f"{fact} (cameras/: {', '.join(shipped)})"))
+        return None
+    try:
+        values = read_toml(file)
+    except InputError as error:
+        faults += error.faults
+        return None
+    return _camera_of(values, str(file), "", faults)
+
+
+def _camera_of(
+    values: Mapping[str, Any], file: str, prefix: str, faults: list[Fault]
+) -> Camera | None:
+    """Return a camera that can make stimuli; its faults go into `faults`."""
+    camera, more = attempt(Camera, values, file, prefix)
+    faults += more
+    if not isinstance(camera, Camera):
+        return None
+    if camera.cfa == "MONO":
+        faults.append(Fault(file, "cfa", "is MONO: stimuli need a colour filter array"))
+    if camera.diffuse_white_dn is None:
+        faults.append(Fault(file, "diffuse_white_dn", "is missing: stimuli need it"))
+    return camera
+
+
+def _check_source(source: Many[str | Path]) -> None:
+    empty = [str(s) for s in source if not find_files(Path.cwd(), [str(s)])]
+    if empty:
+        raise InputError(
+            Fault("--source", "", f"is {name!r}: no image file found there") for name in empty
+        )
+
+
+def _replaced(contents: object, source: Many[str | Path]) -> list[dict[str, Any]]:
+    """Return the contents that the user's files make: as the spec's first content treats files."""
+    first = contents[0] if isinstance(contents, list) and contents else {}
+    first = dict(first) if isinstance(first, Mapping) else {}
+    paths = [str(Path(s).expanduser().resolve()) for s in source]
+    kept = {key: first[key] for key in ("pan_px_per_frame", "oversampling") if key in first}
+    if "scene" in first:
+        kept.pop("oversampling", None)
+    elif "encoding" in first:
+        kept["encoding"] = first["encoding"]
+    if "stills" in first:
+        return [{**kept, "stills": paths}]
+    stem = re.sub(r"[\d*?\[\]]+$", "", Path(paths[0]).stem)
+    return [{**kept, "name": still_name(Path(stem or "footage")), "files": paths}]
+
+
+def _footage(content: Content, folder: Path) -> tuple[Path, ...]:
+    if content.stills is not None:
+        return tuple(p for p in find_files(folder, content.stills) if still_name(p) == content.name)
+    return find_files(folder, content.files or ())

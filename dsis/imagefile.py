@@ -87,6 +87,91 @@ def read(path: Path) -> NDArray[np.float32]:
     return np.ascontiguousarray(image)
 
 
+@dataclass(frozen=True)
+class CodesInfo:
+    """What the header of an image file says of the codes in it.
+
+    Attributes
+    ----------
+    rows, columns, channels
+        Size in pixels, and samples per pixel.
+    pixel_type
+        Type of a sample in OpenImageIO's words: `uint8`, `uint16`, `uint`, `int16`, `half` ...
+    bits
+        Bits of a sample that the file holds; 12 for a packed 12-bit TIFF.
+    images
+        2 where the file holds more than one image, else 1.
+    """
+
+    rows: int
+    columns: int
+    channels: int
+    pixel_type: str
+    bits: int
+    images: int
+
+
+def codes_info(path: Path) -> CodesInfo:
+    """Return what the header says of a file's codes; raise `InputError` where it is no image."""
+    opened = _opened(path)
+    spec = opened.spec()
+    images = 2 if opened.seek_subimage(1, 0) else 1
+    opened.geterror()  # asking for a second image leaves a complaint where there is none
+    opened.close()
+    kind = str(spec.format)
+    bits = spec.get_int_attribute("oiio:BitsPerSample", 8 * spec.format.size())
+    return CodesInfo(spec.height, spec.width, spec.nchannels, kind, bits, images)
+
+
+def read_codes(path: Path) -> NDArray[np.unsignedinteger]:
+    """Return the codes of a single-channel file as they were recorded: unsigned, (row, column).
+
+    OpenImageIO stretches 10 bits to 16 and a Netpbm maximum of 4095 to 65535; that is undone, so
+    codes are right-aligned. Raises `InputError` where the file is damaged or holds no such codes.
+    """
+    opened = _opened(path)
+    spec = opened.spec()
+    kind = str(spec.format)
+    if kind not in ("uint8", "uint16", "uint") or spec.nchannels != 1:
+        opened.close()
+        fact = f"holds {spec.nchannels} channels of type {kind}, must hold one of unsigned codes"
+        raise InputError.of(path, "", fact)
+    pixels = opened.read_image(format=spec.format)
+    error = opened.geterror().strip()
+    opened.close()
+    if pixels is None or error:
+        raise InputError.of(path, "", f"is damaged: {error or 'no pixels'}")
+    stored: NDArray[np.unsignedinteger] = np.asarray(pixels)[:, :, 0]
+    if path.suffix.lower() in (".pgm", ".pnm"):
+        return _unstretched(stored, _netpbm_maximum(path))
+    container = 8 * stored.itemsize
+    spare = container - spec.get_int_attribute("oiio:BitsPerSample", container)
+    return stored >> stored.dtype.type(spare) if spare else stored
+
+
+def _opened(path: Path) -> oiio.ImageInput:
+    opened = oiio.ImageInput.open(str(path))
+    if opened is None:
+        reason = oiio.geterror().strip().splitlines() or ["unknown"]
+        raise InputError.of(path, "", f"is no readable image: {reason[0]}")
+    return opened
+
+
+def _netpbm_maximum(path: Path) -> int:
+    """Return the largest code that the header of a Netpbm file allows."""
+    with path.open("rb") as file:
+        head = re.sub(rb"#[^\n]*", b"", file.read(4096))
+    return int(head.split(maxsplit=4)[3])
+
+
+def _unstretched(stored: NDArray[np.unsignedinteger], most: int) -> NDArray[np.unsignedinteger]:
+    """Return the codes 0..most that were stretched to the full range and rounded down."""
+    top = np.iinfo(stored.dtype).max
+    if most == top:
+        return stored
+    return ((stored.astype(np.uint64) * most + top - 1) // top).astype(stored.dtype)
+
+
 def write(path: Path, display: NDArray[np.float32], form: str) -> None:
     """Write a display frame, float32 0..1 (row, column, 3), whole or not at all.
 

@@ -53,9 +53,8 @@ def test_a_seed_fixes_every_byte_and_another_seed_is_another_place(name: str) ->
 @SCENE
 def test_a_wider_strip_shows_more_of_the_same(name: str) -> None:
     narrow, wide = panorama(name, 2, 200, 120), panorama(name, 2, 200, 260)
-    # A facet that the picture's edge cuts takes its footprint from the part in view.
-    assert np.abs(wide[:, :120] - narrow).max() < 0.03
-    assert np.mean(wide[:, :120] == narrow) > 0.9
+    # Vectorised sine and exponential may round otherwise at another place in the array.
+    assert np.mean(np.abs(wide[:, :120] - narrow) > 1e-4) < 1e-3
 
 
 @SCENE

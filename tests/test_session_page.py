@@ -469,10 +469,13 @@ def test_serve_listens_on_the_loopback_and_ends_when_the_test_is_done(folder):
     )
     said = []
     session = threading.Thread(
-        target=serve, args=(folder, "anna"), kwargs={"open_browser": False, "say": said.append}
+        target=serve,
+        args=(folder, "anna"),
+        kwargs={"open_browser": False, "say": said.append},
+        daemon=True,
     )
     session.start()
-    while not any("http" in line for line in said):
+    while session.is_alive() and not any("http" in line for line in said):
         time.sleep(0.01)
     url = next(line for line in said if "http" in line).split()[1].rstrip("/")
 

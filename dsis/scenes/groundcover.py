@@ -106,5 +106,5 @@ def water(
     colour += step(bank + 0.25 * ripple, 0.3, 0.7)[:, None] * (rgb(0.02, 0.035, 0.03) - colour)
     colour *= (1 + 0.25 * ripple * (1 - calm))[:, None]
     spark = texture.value(180 * az + 7, 900 * slope) + 0.1 * texture.value(5 * az, 40 * slope)
-    glitter: Field = colour + step(spark, 0.80, 1.03)[:, None] * (GLINT - colour)
+    glitter: Field = colour + step(spark, 0.82, 1.03)[:, None] * (GLINT - colour)
     return glitter

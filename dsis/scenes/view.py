@@ -126,7 +126,11 @@ class View:
         distance = offset / np.minimum(seen_along(normal), -1e-4)
         u = distance * seen_along(along) - _dot(along, origin)
         v = distance * seen_along(up) - _dot(up, origin)
-        colour = shade(u, v, _footprint(u), _footprint(v))
+        middle = (sum(c) / len(c) / self.focal_px, self.horizon_row - sum(r) / len(r))
+        pixel_u, pixel_v = (
+            _footprint(axis, normal, offset, middle, self.focal_px) for axis in (along, up)
+        )
+        colour = shade(u, v, pixel_u, pixel_v)
         self.blend(top, left, colour, distance, _coverage(spots, az * self.focal_px, top, bottom))
 
 
@@ -147,13 +151,22 @@ def _unit(p: Point) -> Point:
     return p[0] / length, p[1] / length, p[2] / length
 
 
-def _footprint(axis: Field) -> float:
-    """Return the width of a pixel along an axis of a facet, in the facet's middle."""
-    rows, columns = axis.shape
-    down = abs(float(axis[-1, columns // 2] - axis[0, columns // 2])) / max(rows - 1, 1)
-    across = abs(float(axis[rows // 2, -1] - axis[rows // 2, 0])) / max(columns - 1, 1)
-    width: float = down + across
-    return width
+def _footprint(
+    axis: Point, normal: Point, offset: float, middle: tuple[float, float], focal_px: float
+) -> float:
+    """Return the width of a pixel along an axis of a facet, in the facet's middle.
+
+    It is the sum of the steps to the next column and to the next row; `middle` is (azimuth, rows
+    above the horizon).
+    """
+
+    def along_axis(columns: float, rows: float) -> float:
+        az = middle[0] + columns / focal_px
+        ray = (math.sin(az), math.cos(az), (middle[1] + rows) / focal_px)
+        return offset * _dot(axis, ray) / min(_dot(normal, ray), -1e-4)
+
+    here = along_axis(0, 0)
+    return abs(along_axis(1, 0) - here) + abs(along_axis(0, 1) - here)
 
 
 def _coverage(spots: Sequence[tuple[float, float]], columns: Field, top: int, bottom: int) -> Field:

@@ -127,6 +127,9 @@ def create_app(
     async def page(request: Request) -> Response:
         return FileResponse(PAGE / FILES[request.url.path])
 
+    async def icon(_: Request) -> Response:
+        return Response(status_code=204)  # browsers ask for one
+
     async def session(_: Request) -> Response:
         return JSONResponse(observation.describe())
 
@@ -153,6 +156,7 @@ def create_app(
     app = Starlette(
         routes=[
             *(Route(path, page) for path in FILES),
+            Route("/favicon.ico", icon),
             Route("/api/session", session),
             Route("/api/next", following),
             Route("/api/presentations/{id:int}/{show:str}/{frame:int}", frame),
@@ -217,6 +221,7 @@ def _listening(port: int) -> socket.socket:
     listening = socket.socket()
     try:
         listening.bind((ADDRESS, port))
+        listening.listen()  # from here on a browser waits, however long the server takes to start
     except (OSError, OverflowError) as error:
         listening.close()
         raise InputError.of("port", "", f"{port} cannot be used: {error}") from None

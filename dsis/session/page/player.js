@@ -163,27 +163,33 @@ function element(tag, properties, ...children) {
   return node;
 }
 
-function box(tag, grade, ...before) {
-  const [worst, best] = test.scale;
-  const end = grade === worst ? test.labels[0] : grade === best ? test.labels[1] : "";
-  const number = element("span", {}, String(grade));
-  return element(tag, { className: "grade" }, ...before, number, element("small", {}, end));
+// The words of the ends stand below the scale, and in the name of the first and the last grade.
+function ends() {
+  const texts = test.labels.map((label) => element("span", { ariaHidden: !longScale() }, label));
+  return element("div", { className: "ends" }, ...texts);
+}
+
+function nameOf(grade) {
+  const end = grade === test.scale[0] ? test.labels[0] : grade === test.scale[1] ? test.labels[1] : "";
+  return end ? `${grade}, ${end}` : String(grade);
 }
 
 function buildScale() {
   const [worst, best] = test.scale;
   if (longScale()) {
-    const ends = `${worst} ${test.labels[0]} … ${best} ${test.labels[1]}`;
-    $("example").append(element("li", {}, ends));
+    const range = test.scale.map((grade, i) => `${grade} (${test.labels[i]})`).join(" to ");
+    $("example").append(range);
     const input = element("input", { id: "number", name: "grade", type: "number", min: worst, max: best, step: 1, autocomplete: "off" });
-    $("grades").append(element("label", {}, `${ends}: `, input));
+    $("grades").append(element("label", {}, `${range}: `, input));
     return;
   }
   for (const grade of grades()) {
-    $("example").append(box("li", grade));
-    const input = element("input", { type: "radio", name: "grade", value: grade });
-    $("grades").append(box("label", grade, input));
+    $("example").append(element("div", { className: "grade" }, element("span", {}, String(grade))));
+    const input = element("input", { type: "radio", name: "grade", value: grade, ariaLabel: nameOf(grade) });
+    $("grades").append(element("label", { className: "grade" }, input, element("span", {}, String(grade))));
   }
+  $("example").after(ends());
+  $("grades").after(ends());
 }
 
 function chosen() {
@@ -306,7 +312,9 @@ function describe() {
   $("again").hidden = !test.begun;
   buildScale();
   const ten = best >= 10 && worst > 0 ? ", 0 for 10" : "";
-  const keys = longScale() ? "Type the number, Enter confirms." : `Keys: the digits${ten}, or the mouse; Enter confirms.`;
+  const keys = longScale()
+    ? "Type the number; Enter confirms."
+    : `Keys: the digits${ten}, or the arrows; or the mouse. Enter confirms.`;
   $("keys").textContent = keys;
   $("keys-start").textContent = keys;
   canvas.width = test.width;

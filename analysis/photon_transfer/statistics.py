@@ -1,0 +1,338 @@
+"""Sufficient statistics of one exposure, streaming: level, temporal variance, fixed pattern.
+
+Frames are read once; whole numbers are added exactly, so the order of the sums does not matter. The
+temporal variance is the sum of squares within pixels, less the frames' common change, over
+(T - 1)(n - 1): for two frames equation (1) of Seybold et al. (2014) with the change of the mean
+removed. Its standard error is that of the balanced row x column model with a term for the kurtosis,
+so row and column noise do not make it too small.
+"""
+
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.photon_transfer.recorded import Recorded, channel_names
+from dsis.compiled import kernel
+
+Ints = NDArray[np.int64]
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class LevelStatistics:
+    """One CFA channel of one exposure; DN of the raw codes, rounding included.
+
+    Attributes
+    ----------
+    exposure, kind, exposure_time_s, light, channel
+        Where it comes from.
+    frames, rows, columns
+        T and the size of the channel's plane.
+    level_dn, level_se_dn
+        Mean code; error from pixel, row and column noise (not from a wander of the frames).
+    variance_dn2, variance_se_dn2
+        Temporal variance, the change of the frame mean removed.
+    pair_variance_dn2
+        Equation (1) over the disjoint pairs of successive frames, nothing removed.
+    removed_dn2
+        What removing the change of the mean takes from equation (1).
+    frame_sd_dn
+        Standard deviation of the frame means.
+    wander
+        Variance of the frame means over what pixel, row and column noise explain; 1 = no wander.
+    kurtosis
+        Excess kurtosis of the temporal noise, from the pair differences; nan where there is none.
+    clipped_low, clipped_high
+        Share of samples at code 0 and at the white level or above.
+    fixed_dn2, fixed_se_dn2
+        Spatial variance of the mean frame less what temporal noise leaves in it.
+    """
+
+    exposure: str
+    kind: str
+    exposure_time_s: float
+    light: float | None
+    channel: str
+    frames: int
+    rows: int
+    columns: int
+    level_dn: float
+    level_se_dn: float
+    variance_dn2: float
+    variance_se_dn2: float
+    pair_variance_dn2: float
+    removed_dn2: float
+    frame_sd_dn: float
+    wander: float
+    kurtosis: float
+    clipped_low: float
+    clipped_high: float
+    fixed_dn2: float
+    fixed_se_dn2: float
+
+    @property
+    def pixels(self) -> int:
+        """Number of pixels of the plane."""
+        return self.rows * self.columns
+
+
+@dataclass
+class _Sums:
+    """Running sums of one exposure; columns keep their place, rows their parity."""
+
+    reference: int
+    total: NDArray[np.int32]  # (R, C): sum over frames of code - reference
+    rows: list[Ints]  # per frame (R, 2): row sums by column parity
+    columns: list[Ints]  # per frame (2, C): column sums by row parity
+    squares: Ints  # (2, C)
+    clipped: Ints  # (2, 2, C): low, high
+    pairs: list[tuple[Ints, Ints, Floats]]  # per pair (2, C): d, d^2, d^4
+
+
+def expose_statistics(recording: Recorded, exposure: Any) -> list[LevelStatistics]:
+    """Return the statistics of each CFA channel of one exposure; empty where it has no frames."""
+    white = int(recording.sensor.white_level)
+    sums: _Sums | None = None
+    previous: NDArray[np.uint16] | None = None
+    count = 0
+    for frame in recording.frames(exposure):
+        if sums is None:
+            sums = _begin(frame)
+        row, column = np.empty((frame.shape[0], 2), np.int64), np.zeros((2, frame.shape[1]), np.int64)
+        _add_frame(frame, sums.reference, white, sums.total, row, column, sums.squares, sums.clipped)
+        sums.rows.append(row)
+        sums.columns.append(column)
+        if previous is not None and count % 2:
+            shape = (2, frame.shape[1])
+            d1, d2, d4 = np.zeros(shape, np.int64), np.zeros(shape, np.int64), np.zeros(shape)
+            _add_pair(frame, previous, d1, d2, d4)
+            sums.pairs.append((d1, d2, d4))
+        previous = frame
+        count += 1
+    if sums is None:
+        return []
+    pattern = np.zeros((2, sums.total.shape[1]), np.int64)
+    _square_total(sums.total, pattern)
+    names = channel_names(recording.sensor.cfa)
+    found = dict.fromkeys(names[i][j] for i, j in product((0, 1), (0, 1)))
+    return [_channel(exposure, name, names, sums, pattern) for name in found]
+
+
+def _begin(frame: NDArray[np.uint16]) -> _Sums:
+    rows, columns = frame.shape
+    return _Sums(
+        # Near the data, so that the integers stay small.
+        round(float(frame.mean())),
+        np.zeros((rows, columns), np.int32),
+        [],
+        [],
+        np.zeros((2, columns), np.int64),
+        np.zeros((2, 2, columns), np.int64),
+        [],
+    )
+
+
+@kernel
+def _add_frame(
+    frame: NDArray[np.uint16],
+    reference: int,
+    white: int,
+    total: NDArray[np.int32],
+    row_sums: Ints,
+    column_sums: Ints,
+    squares: Ints,
+    clipped: Ints,
+) -> None:
+    rows, columns = frame.shape
+    line = np.empty(columns, np.int32)
+    ref, top = np.int32(reference), np.int32(white)
+    for r in range(rows):
+        p = r % 2
+        source, kept = frame[r], total[r]
+        sums, square, low, high = column_sums[p], squares[p], clipped[0, p], clipped[1, p]
+        for c in range(np.uintp(columns)):
+            code = np.int32(source[c])
+            x = np.int32(code - ref)
+            line[c] = x
+            kept[c] += x
+            sums[c] += x
+            square[c] += np.int64(x) * np.int64(x)
+        extremes = np.int32(0)
+        for c in range(np.uintp(columns)):
+            code = np.int32(source[c])
+            extremes += np.int32(code == 0) + np.int32(code >= top)
+        if extremes > 0:
+            for c in range(columns):
+                low[c] += source[c] == 0
+                high[c] += source[c] >= top
+        even = np.int64(0)
+        odd = np.int64(0)
+        for c in range(columns // 2):
+            even += np.int64(line[2 * c])
+            odd += np.int64(line[2 * c + 1])
+        if columns % 2:
+            even += np.int64(line[columns - 1])
+        row_sums[r, 0], row_sums[r, 1] = even, odd
+
+
+@kernel
+def _add_pair(
+    frame: NDArray[np.uint16], previous: NDArray[np.uint16], d1: Ints, d2: Ints, d4: Floats
+) -> None:
+    rows, columns = frame.shape
+    for r in range(rows):
+        p = r % 2
+        a, b, s1, s2, s4 = frame[r], previous[r], d1[p], d2[p], d4[p]
+        for c in range(np.uintp(columns)):
+            d = np.int32(np.int32(a[c]) - np.int32(b[c]))
+            square = np.float64(d) * np.float64(d)
+            s1[c] += d
+            s2[c] += np.int64(d) * np.int64(d)
+            s4[c] += square * square
+
+
+@kernel
+def _square_total(total: NDArray[np.int32], squares: Ints) -> None:
+    rows, columns = total.shape
+    for r in range(rows):
+        source, out = total[r], squares[r % 2]
+        for c in range(np.uintp(columns)):
+            out[c] += np.int64(source[c]) * np.int64(source[c])
+
+
+def _channel(
+    exposure: Any, name: str, names: tuple[tuple[str, str], ...], sums: _Sums, pattern: Ints
+) -> LevelStatistics:
+    """Reduce the sums to one channel: the parities that bear its name, as one plane."""
+    places = [(i, j) for i, j in product((0, 1), (0, 1)) if names[i][j] == name]
+    mono = len(places) > 1
+    i, j = places[0]
+
+    def picked(sums_by_column: NDArray[Any]) -> Any:
+        """Return the sum over the channel's parities; the last two axes are (parity, column)."""
+        if mono:
+            return sums_by_column.sum((-2, -1))
+        return sums_by_column[..., i, j::2].sum(-1)
+
+    frames = len(sums.rows)
+    if mono:
+        row = np.stack([r.sum(1) for r in sums.rows])
+        column = np.stack([c.sum(0) for c in sums.columns])
+    else:
+        row = np.stack([r[i::2, j] for r in sums.rows])
+        column = np.stack([c[i, j::2] for c in sums.columns])
+    size = (row.shape[1], column.shape[1])
+    n = size[0] * size[1]
+    within = frames * int(picked(sums.squares)) - int(picked(pattern))
+    temporal = _temporal(within / frames, row / size[1], column / size[0])
+    pairs = [(int(picked(a)), int(picked(b)), float(picked(c))) for a, b, c in sums.pairs]
+    variance, variance_se, kurtosis = _variance(temporal, pairs, n, frames)
+    mean_total = int(row.sum())
+    noise = temporal.row + temporal.column - temporal.pixel if frames > 1 else np.nan
+    left = (temporal.pixel if frames > 1 else np.nan) / frames
+    spatial = (int(picked(pattern)) - mean_total**2 / n) / frames**2 / max(n - 1, 1)
+    light = exposure.light
+    low, high = picked(sums.clipped)
+    return LevelStatistics(
+        exposure=exposure.name,
+        kind=str(exposure.kind),
+        exposure_time_s=float(exposure.exposure_time_s),
+        light=None if light is None else float(light),
+        channel=name,
+        frames=frames,
+        rows=size[0],
+        columns=size[1],
+        level_dn=sums.reference + mean_total / (n * frames),
+        level_se_dn=float(np.sqrt(max(noise, 0.0) / (n * frames))),
+        variance_dn2=variance,
+        variance_se_dn2=variance_se,
+        pair_variance_dn2=_mean([d2 / (2 * n) for _, d2, _ in pairs]),
+        removed_dn2=_mean([(d1 / n) ** 2 / 2 for d1, _, _ in pairs]),
+        frame_sd_dn=float(np.sqrt(temporal.frame / n)),
+        wander=float(temporal.frame / noise) if noise > 0 else np.nan,
+        kurtosis=kurtosis,
+        clipped_low=float(low) / (n * frames),
+        clipped_high=float(high) / (n * frames),
+        fixed_dn2=spatial - left,
+        fixed_se_dn2=spatial * np.sqrt(2 / max(n - 1, 1)),
+    )
+
+
+@dataclass(frozen=True)
+class _Temporal:
+    """Mean squares of the temporal residual, and the sum of squares without the frames' change."""
+
+    frame: float
+    row: float
+    column: float
+    pixel: float
+    rest: float
+    size: tuple[int, int]
+
+
+def _temporal(within: float, row_means: Floats, column_means: Floats) -> _Temporal:
+    frames, rows = row_means.shape
+    columns = column_means.shape[1]
+    if frames < 2:
+        return _Temporal(np.nan, np.nan, np.nan, np.nan, np.nan, (rows, columns))
+    frame = row_means.mean(1)
+    row = row_means - row_means.mean(0) - (frame - frame.mean())[:, None]
+    column = column_means - column_means.mean(0) - (frame - frame.mean())[:, None]
+    ss_frame = rows * columns * float(((frame - frame.mean()) ** 2).sum())
+    ss_row, ss_column = columns * float((row**2).sum()), rows * float((column**2).sum())
+    rest = max(within - ss_frame, 0.0)
+
+    def mean_square(sum_of_squares: float, dof: int) -> float:
+        return sum_of_squares / ((frames - 1) * dof) if dof else 0.0
+
+    return _Temporal(
+        mean_square(ss_frame, 1),
+        mean_square(ss_row, rows - 1),
+        mean_square(ss_column, columns - 1),
+        mean_square(max(rest - ss_row - ss_column, 0.0), (rows - 1) * (columns - 1)),
+        rest,
+        (rows, columns),
+    )
+
+
+def _variance(
+    temporal: _Temporal, pairs: list[tuple[int, int, float]], n: int, frames: int
+) -> tuple[float, float, float]:
+    """Return temporal variance, its standard error (DN^2) and the excess kurtosis."""
+    if frames < 2 or n < 2:
+        return np.nan, np.nan, np.nan
+    variance = temporal.rest / ((frames - 1) * (n - 1))
+    kurtosis = _kurtosis(pairs, n)
+    rows, columns = temporal.size
+    spread = (
+        (rows - 1) * temporal.row**2
+        + (columns - 1) * temporal.column**2
+        + (rows - 1) * (columns - 1) * temporal.pixel**2
+    )
+    square = 2 * spread / ((frames - 1) * (n - 1) ** 2)
+    if np.isfinite(kurtosis):
+        # An excess kurtosis cannot be below -2: the variance keeps a positive error.
+        square += max(kurtosis, -1.9) * variance**2 / (frames * n)
+    return variance, float(np.sqrt(max(square, 0.0))), kurtosis
+
+
+def _kurtosis(pairs: list[tuple[int, int, float]], n: int) -> float:
+    """Return the excess kurtosis of the noise: twice that of differences of two frames."""
+    second = fourth = 0.0
+    for d1, d2, d4 in pairs:
+        shift, m2 = d1 / n, d2 / n
+        centred = m2 - shift**2
+        second += centred
+        # The third moment of a difference of equal frames is zero.
+        fourth += d4 / n - 6 * shift**2 * centred - shift**4
+    if not pairs or second <= 0:
+        return np.nan
+    m2, m4 = second / len(pairs), fourth / len(pairs)
+    return 2 * (m4 / m2**2 - 3)
+
+
+def _mean(values: list[float]) -> float:
+    return float(np.mean(values)) if values else np.nan

@@ -1,0 +1,87 @@
+"""Raw frames in files: headers and codes of every format, whatever library reads it."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsis.errors import InputError
+from dsis.imagefile import codes_info, read_codes
+from dsis.recording.cameraraw import RAW_SUFFIXES, raw_frame, raw_header
+
+_UNSIGNED = {"uint8": 8, "uint16": 16, "uint": 32, "uint32": 32, "uint64": 64}
+
+
+@dataclass(frozen=True)
+class FrameHeader:
+    """What can be said of a frame before its codes are read.
+
+    Attributes
+    ----------
+    rows, columns
+        Size in pixels.
+    pixel_type
+        Unsigned type that the codes are stored in.
+    bits
+        Bits of that type.
+    colours
+        Colour filters of rows 0, 1 and columns 0, 1 where the file states them: `RGGB` ...
+    """
+
+    rows: int
+    columns: int
+    pixel_type: str
+    bits: int
+    colours: str | None = None
+
+
+def read_header(path: Path) -> FrameHeader:
+    """Return the header of a frame; raise `InputError` where the file can hold no raw frame."""
+    suffix = path.suffix.lower()
+    if suffix == ".npy":
+        stored = _mapped(path)
+        return _header(path, stored.shape, stored.dtype.name)
+    if suffix in RAW_SUFFIXES:
+        raw = raw_header(path)
+        return FrameHeader(raw.rows, raw.columns, "uint16", 16, raw.colours)
+    held = codes_info(path)
+    if held.images > 1:
+        raise InputError.of(path, "", "holds more than one image, must hold one frame")
+    shape = (held.rows, held.columns, held.channels)[: 2 if held.channels == 1 else 3]
+    return _header(path, shape, held.pixel_type)
+
+
+def read_frame(path: Path) -> NDArray[np.unsignedinteger]:
+    """Return the codes of a frame as stored, (row, column); raise `InputError` where damaged."""
+    suffix = path.suffix.lower()
+    if suffix == ".npy":
+        stored = _mapped(path)
+        _header(path, stored.shape, stored.dtype.name)
+        return np.array(stored)
+    if suffix in RAW_SUFFIXES:
+        return raw_frame(path)
+    return read_codes(path)
+
+
+def _header(path: Path, shape: tuple[int, ...], pixel_type: str) -> FrameHeader:
+    if pixel_type not in _UNSIGNED:
+        allowed = "must hold unsigned whole codes (uint8 or uint16)"
+        raise InputError.of(path, "", f"holds {pixel_type} values, {allowed}")
+    if len(shape) != 2:
+        found = " x ".join(map(str, shape))
+        fact = f"holds an array of {found}, must hold one channel (rows x columns)"
+        raise InputError.of(path, "", fact)
+    if 0 in shape:
+        raise InputError.of(path, "", "holds no pixels")
+    return FrameHeader(shape[0], shape[1], pixel_type, _UNSIGNED[pixel_type])
+
+
+def _mapped(path: Path) -> NDArray[np.generic]:
+    """Return the array of an .npy file, mapped into memory: only what is touched is read."""
+    try:
+        stored: NDArray[np.generic] = np.load(path, mmap_mode="r", allow_pickle=False)
+    except (OSError, ValueError, EOFError) as error:
+        reason = str(error).splitlines()[0]
+        raise InputError.of(path, "", f"is damaged or no .npy file: {reason}") from None
+    return stored

@@ -1,0 +1,142 @@
+"""Is a recording fit to be analysed: copies of frames, clipping, missing light, odd codes.
+
+Nothing here refuses a recording; each remark states a limit of what it can show.
+"""
+
+import hashlib
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass
+from threading import Lock
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsis.compiled import kernel
+
+CLIPPED_SHARE = 1e-4
+"""Share of clipped pixels above which mean and variance of an exposure are biased noticeably."""
+
+
+class Planned(Protocol):
+    """What the remarks need to know of an exposure."""
+
+    @property
+    def name(self) -> str: ...  # noqa: D102 - `ExposurePlan` says it
+    @property
+    def kind(self) -> str: ...  # noqa: D102 - `ExposurePlan` says it
+
+
+@dataclass(frozen=True)
+class FrameSummary:
+    """One frame in a few numbers: code sum, least and largest code, clipped counts, common bits."""
+
+    total: int
+    least: int
+    largest: int
+    at_zero: int
+    at_white: int
+    bits: int
+    size: int
+    digest: bytes
+
+
+class Inspection:
+    """Gathers what passes by while frames are streamed; threads may share it."""
+
+    def __init__(self, white_level: float) -> None:
+        self.white_level = white_level
+        self._seen: dict[str, dict[int, FrameSummary]] = defaultdict(dict)
+        self._lock = Lock()
+
+    def look(self, exposure: str, index: int, codes: NDArray[np.uint16]) -> None:
+        """Take note of frame `index` of an exposure: uint16 (row, column)."""
+        numbers = _summarise(codes.reshape(-1), np.uint16(self.white_level))
+        digest = hashlib.blake2b(np.ascontiguousarray(codes).data, digest_size=16).digest()
+        with self._lock:
+            self._seen[exposure][index] = FrameSummary(*map(int, numbers), codes.size, digest)
+
+    def remarks(self, exposures: Sequence[Planned]) -> tuple[str, ...]:
+        """Return the remarks on the exposures that were looked at, in their order."""
+        seen = [(e, [self._seen[e.name][i] for i in sorted(self._seen[e.name])])
+                for e in exposures if e.name in self._seen]  # fmt: skip
+        found = [remark for e, frames in seen for remark in _on_exposure(e, frames)]
+        return (*found, *self._copies(), *self._on_codes(seen), *_on_light(seen))
+
+    def _copies(self) -> list[str]:
+        places: dict[bytes, list[str]] = defaultdict(list)
+        for name, frames in self._seen.items():
+            for index, frame in sorted(frames.items()):
+                if frame.least < frame.largest:  # constant frames have a remark of their own
+                    places[frame.digest].append(f"{name} frame {index}")
+        return [
+            f"byte-identical frames, noise cannot repeat itself: {', '.join(sorted(same))}"
+            for same in places.values()
+            if len(same) > 1
+        ]
+
+    def _on_codes(self, seen: list[tuple[Planned, list[FrameSummary]]]) -> list[str]:
+        bits = int(np.bitwise_or.reduce([f.bits for _, frames in seen for f in frames] or [0]))
+        factor = bits & -bits
+        if factor <= 1:
+            return []
+        says = f"all codes are multiples of {factor}: left-aligned, or converted?"
+        return [f"{says} Codes must be right-aligned"]
+
+
+def _on_exposure(exposure: Planned, frames: list[FrameSummary]) -> list[str]:
+    name, pixels = exposure.name, sum(f.size for f in frames)
+    at_white = sum(f.at_white for f in frames) / pixels
+    at_zero = sum(f.at_zero for f in frames) / pixels
+    found = []
+    if len(frames) == 1:
+        found.append(f"{name}: one frame only, temporal noise cannot be measured")
+    if at_white == 1:
+        found.append(f"{name}: saturated, every pixel is at the white level")
+    elif at_white > CLIPPED_SHARE:
+        found.append(f"{name}: {at_white:.2%} of the pixels are clipped at the white level")
+    if at_zero == 1:
+        found.append(f"{name}: empty, every pixel is 0")
+    elif at_zero > CLIPPED_SHARE:
+        found.append(f"{name}: {at_zero:.2%} of the pixels are at code 0, its mean is biased")
+    constant = sum(f.least == f.largest for f in frames)
+    if constant and at_white < 1 and at_zero < 1:
+        found.append(f"{name}: {constant} of {len(frames)} frames hold one code only")
+    return found
+
+
+def _on_light(seen: list[tuple[Planned, list[FrameSummary]]]) -> list[str]:
+    """Return remarks on whether the recording holds usable light at all."""
+    means = [(e, sum(f.total for f in frames) / sum(f.size for f in frames)) for e, frames in seen]
+    darks = [mean for e, mean in means if e.kind == "dark"]
+    lit = [(e, frames) for e, frames in seen if e.kind != "dark"]
+    if not lit:
+        return ["no exposure has light: neither gain nor response can be measured"]
+    found = []
+    if darks:
+        found = [
+            f"{e.name}: no brighter than the darks"
+            for e, mean in means
+            if e.kind != "dark" and mean <= max(darks)
+        ]
+    if all(f.at_white > CLIPPED_SHARE * f.size for _, frames in lit for f in frames):
+        found.append("every exposure with light is clipped: gain cannot be measured")
+    return found
+
+
+@kernel
+def _summarise(
+    codes: NDArray[np.uint16], white: np.uint16
+) -> tuple[np.uint64, np.uint16, np.uint16, np.uint64, np.uint64, np.uint16]:
+    total, at_zero, at_white = np.uint64(0), np.uint64(0), np.uint64(0)
+    least, largest, bits = np.uint16(65535), np.uint16(0), np.uint16(0)
+    for i in range(codes.size):
+        code = codes[i]
+        total += np.uint64(code)
+        at_zero += np.uint64(code == 0)
+        at_white += np.uint64(code >= white)
+        least = min(least, code)
+        largest = max(largest, code)
+        bits |= code
+    return total, least, largest, at_zero, at_white, bits

@@ -1,0 +1,110 @@
+"""Writes a recording: uint16 TIFF frames and `recording.toml`, whole or not at all."""
+
+import json
+import re
+import shutil
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+import dsis
+from dsis.errors import InputError
+from dsis.imagefile import write_codes
+from dsis.outdir import check_replaceable, finish, partial_of
+from dsis.recording.model import ExposurePlan, Recording, Sensor
+from dsis.recording.reader import read_recording
+from dsis.recording.tomlfile import RECORDING, write_listing
+
+PROVENANCE = "provenance.json"
+"""Marks a recording that dsis wrote: only such a one may be replaced by another."""
+
+Progress = Callable[[int, int, str], None]
+_PLAIN = re.compile(r"[A-Za-z0-9_][A-Za-z0-9._-]*")
+
+
+def write_recording(
+    out: Path,
+    sensor: Sensor,
+    exposures: Sequence[ExposurePlan],
+    frames: Iterable[NDArray[np.uint16]],
+    *,
+    origin: str = "",
+    progress: Progress | None = None,
+) -> Recording:
+    """Write a recording and return it as it reads back.
+
+    Parameters
+    ----------
+    out
+        Folder for the result. Work goes on in `OUT.partial`; an earlier recording that dsis wrote
+        is replaced, anything else is refused.
+    sensor
+        Its sensor.
+    exposures
+        Its exposures, with unique names.
+    frames
+        Codes, uint16 (row, column), right-aligned: all frames of the first exposure, then those of
+        the next. Consumed one by one.
+    origin
+        How the frames came about, for whoever finds the folder.
+    progress
+        Called with (frames done, frames in all, exposure).
+    """
+    out = out.absolute()
+    if not exposures or len({plan.name for plan in exposures}) < len(exposures):
+        message = "a recording needs exposures, each with a name of its own"
+        raise ValueError(message)
+    check_replaceable(out, PROVENANCE)
+    partial = partial_of(out)
+    if partial.exists():
+        shutil.rmtree(partial)
+    partial.mkdir(parents=True)
+    folders = {plan.name: _folder(number, plan.name) for number, plan in enumerate(exposures)}
+    total, done = sum(plan.frames for plan in exposures), 0
+    stream = iter(frames)
+    for plan in exposures:
+        for number, codes in enumerate(_exactly(plan, stream)):
+            # Leading zeros: any program lists the frames in their order.
+            write_codes(partial / folders[plan.name] / f"{number:04d}.tif", codes[:, :, np.newaxis])
+            done += 1
+            if progress is not None:
+                progress(done, total, plan.name)
+    if next(stream, None) is not None:
+        message = f"more frames than the {total} that the exposures announce"
+        raise ValueError(message)
+    listed = {plan.name: (plan, f"{folders[plan.name]}/*.tif") for plan in exposures}
+    mark = {"written_by": f"dsis {dsis.__version__}", "origin": origin}
+    (partial / PROVENANCE).write_text(json.dumps(mark, indent=2) + "\n", encoding="utf-8")
+    write_listing(partial / RECORDING, sensor, listed)
+    finish(partial, out)
+    return read_recording(out)
+
+
+def _exactly(
+    plan: ExposurePlan, stream: Iterator[NDArray[np.uint16]]
+) -> Iterator[NDArray[np.uint16]]:
+    """Yield as many frames as the exposure announces; raise `ValueError` where there are fewer."""
+    count = 0
+    for codes in islice(stream, plan.frames):
+        if codes.dtype != np.uint16 or codes.ndim != 2:
+            message = f"{plan.name}: frames must be uint16 (row, column), not {codes.dtype}"
+            raise ValueError(message)
+        count += 1
+        yield codes
+    if count < plan.frames or not count:
+        message = f"{plan.name}: {count} frames came, {plan.frames} (at least 1) were announced"
+        raise ValueError(message)
+
+
+def _folder(number: int, name: str) -> str:
+    """Return the folder of an exposure: its name where every file system takes it."""
+    return name if _PLAIN.fullmatch(name) else f"exposure-{number:03d}"
+
+
+def check_out(out: Path, recording: Recording) -> None:
+    """Refuse to write over the recording that is being imitated."""
+    if out.exists() and out.resolve() == recording.folder.resolve():
+        raise InputError.of(out, "", "is the recording itself: give another folder")

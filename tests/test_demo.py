@@ -2,6 +2,7 @@
 
 import csv
 import json
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -53,6 +54,56 @@ def test_simulated_votes_say_so_everywhere(demo: Path) -> None:
         assert "SIMULATED" in (demo / text).read_text(encoding="utf-8"), text
 
 
+def test_the_report_shows_what_was_shown(demo: Path) -> None:
+    manifest = json.loads((demo / "stimuli" / "manifest.json").read_text(encoding="utf-8"))
+    page = (demo / "report" / "report.html").read_text(encoding="utf-8")
+    table = page[page.index('<table id="stimuli">') :]
+    for clip in manifest["clips"]:
+        if clip["role"] == "test":
+            psnr = clip["quality"]["psnr_db"]
+            assert f">{sum(psnr) / len(psnr):.2f}<" in table, clip["stimulus"]
+            assert f">{clip['quality']['visible_noise']:.2f}<" in table
+    assert "added physics" not in table
+
+
+def test_the_report_says_what_added_physics_does(tmp_path: Path) -> None:
+    """A camera with row noise of 200 DN: every camera clip has its PSNR change in the report."""
+    text = (SHIPPED / "demo.toml").read_text(encoding="utf-8")
+    for old, new in (
+        ("width = 480", "width = 96"),
+        ("height = 270", "height = 64"),
+        ("seconds = 2", "seconds = 0.12"),
+        ("reference_s = 2.0", "reference_s = 0.1"),
+        ("test_s = 2.0", "test_s = 0.1"),
+        ("cameras/dual_gain_cinema.toml", "striped.toml"),
+        ("levels = [2]", "levels = [0]"),
+        ('scene = "landscape"', 'scene = "city"'),
+    ):
+        assert old in text
+        text = text.replace(old, new)
+    (tmp_path / "striped.toml").write_text(
+        (SHIPPED / "cameras" / "dual_gain_cinema.toml").read_text(encoding="utf-8")
+        + '[[effect]]\nkind = "row_noise"\nsigma_dn = 200\n',
+        encoding="utf-8",
+    )
+    (tmp_path / "test.toml").write_text(text, encoding="utf-8")
+    folder, votes = tmp_path / "stimuli", tmp_path / "votes"
+    assert main(["stimuli", str(tmp_path / "test.toml"), "--out", str(folder)]) == 0
+    assert main(["session", str(folder), "--robots", "6"]) == 0
+    assert main(["votes", str(folder), "-o", str(votes)]) == 0
+    assert main(["report", str(votes / "votes.csv"), "--out", str(tmp_path / "report")]) == 0
+    page = (tmp_path / "report" / "report.html").read_text(encoding="utf-8")
+    assert "added physics" in page
+    with (votes / "stimuli.csv").open(encoding="utf-8") as file:
+        rows = [row for row in csv.DictReader(file) if row["role"] == "test"]
+    for row in rows:
+        if row["noise"] == "sd":
+            assert float(row["effects_psnr_db"]) < -1
+            assert float(row["effects_visible_ratio"]) > 1.2
+        else:
+            assert row["effects_psnr_db"] == ""
+
+
 def test_training_clips_are_not_the_tests_and_not_scored(demo: Path) -> None:
     with (demo / "votes" / "votes.csv").open(encoding="utf-8") as file:
         votes = list(csv.DictReader(file))
@@ -71,7 +122,7 @@ def test_content_never_repeats_in_succession(demo: Path) -> None:
         shown = [v for v in votes if v["observer"] == observer and v["kind"] != "training"]
         shown.sort(key=lambda v: int(v["presentation"]))
         contents = [v["content"] for v in shown]
-        assert all(a != b for a, b in zip(contents, contents[1:], strict=False)), observer
+        assert all(a != b for a, b in pairwise(contents)), observer
 
 
 def test_it_can_be_run_again(demo: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,7 +1,7 @@
 """The MOS report: one self-contained page, the figure, and the tables as CSV."""
 
 from base64 import b64encode
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,7 @@ from analysis.figures import (
     simulated_mark,
 )
 from analysis.report.remarks import Counts, count_votes, observer_name, remarks
+from analysis.report.stimuli import shown_stimuli
 from analysis.scale import Description, describe_test
 from analysis.scores import MOS_COLUMNS, OBSERVER_COLUMNS, observer_table, score_table
 from analysis.screening import REMOVED_COLUMNS, remove_outliers, screen_bt500, screen_correlation
@@ -41,6 +42,7 @@ class Results:
     kurtosis: pd.DataFrame
     correlation: pd.DataFrame
     remarks: tuple[str, ...]
+    stimuli: tuple[dict[str, object], ...] = ()
 
 
 def write_report(votes_csv: Path, out: Path, scale: tuple[int, int] | None = None) -> None:
@@ -69,7 +71,7 @@ def write_report(votes_csv: Path, out: Path, scale: tuple[int, int] | None = Non
     votes = read_votes(votes_csv, scale)
     if count_votes(votes).scored == 0:
         raise InputError.of(votes_csv, "", "holds no valid vote on a test sequence")
-    results = analyse(votes, test)
+    results = replace(analyse(votes, test), stimuli=tuple(shown_stimuli(votes_csv)))
     partial = partial_of(out)
     partial.mkdir(parents=True, exist_ok=True)
     for left_over in partial.iterdir():
@@ -138,6 +140,7 @@ def render(results: Results, test: Description, votes_name: str, figure_svg: byt
         conditions=has_conditions(results.scores),
         levels=len(results.scores["level"].dropna().unique()) > 1,
         scores=_score_rows(results.scores),
+        stimuli=results.stimuli,
         observers=_observer_rows(results),
         threshold=float(results.correlation["threshold"].iloc[0]),
         removed=_removed_rows(results.removed)[:REMOVED_SHOWN],

@@ -1,5 +1,6 @@
 """Columns of the tables that a session exports: declared once, written and explained from here."""
 
+import math
 from dataclasses import dataclass
 from operator import attrgetter
 from typing import Any
@@ -59,6 +60,47 @@ class Shown:
         """Hash of the clip as the player shows it, where the manifest has it."""
         player = self.clip.files.get("player")
         return None if player is None else player.sha256
+
+
+@dataclass(frozen=True)
+class Stimulus:
+    """A clip and how it differs from its reference: a row of `STIMULI`."""
+
+    clip: Clip
+
+    @property
+    def psnr_db(self) -> float | None:
+        """Mean over the frames; None for references, infinite where a frame has no difference."""
+        return _mean_db(self.clip.quality.psnr_db)
+
+    @property
+    def psnr_demosaicked_db(self) -> float | None:
+        """The same against the demosaicked noise-free frame."""
+        return _mean_db(self.clip.quality.psnr_demosaicked_db)
+
+    @property
+    def effects_psnr_db(self) -> float | None:
+        """What effects beyond the base model add to the PSNR of the measured frames."""
+        q = self.clip.quality
+        base = _mean_db(q.base_psnr_db)
+        found = _mean_db(tuple(q.psnr_db[frame] for frame in q.visible_frames))
+        return None if base is None or found is None else found - base
+
+    @property
+    def effects_visible_ratio(self) -> float | None:
+        """Visible noise with effects beyond the base model over that without."""
+        q = self.clip.quality
+        if not q.base_visible_noise or q.visible_noise is None:
+            return None
+        return q.visible_noise / q.base_visible_noise
+
+
+def _mean_db(values: tuple[float | None, ...]) -> float | None:
+    if not values:
+        return None
+    return (
+        math.inf if None in values else math.fsum(v for v in values if v is not None) / len(values)
+    )
 
 
 _OBSERVER = Column("observer", "string", "", "pseudonym of the observer", "observer")
@@ -150,5 +192,52 @@ OBSERVERS = (
         "",
         "when the plan was drawn, ISO 8601 with offset; robots' clocks start in 1970",
         "created_at",
+    ),
+)
+STIMULI = (
+    _STIMULUS,
+    Column("role", "string", "", "test, training or reference", "clip.role"),
+    Column("content", "string", "", "what the clip shows", "clip.content"),
+    Column("noise", "string", "", "noise model: awgn, sd (signal-dependent)", "clip.noise"),
+    Column("demosaic", "string", "", "demosaicking; none: never mosaicked", "clip.demosaic"),
+    Column("level", "integer", "stop", "stops of under-exposure", "clip.level"),
+    Column(
+        "awgn_sigma", "number", "8-bit code", "standard deviation of white noise", "clip.awgn_sigma"
+    ),
+    Column("psnr_db", "number", "dB", "against the reference, mean over frames", "psnr_db"),
+    Column(
+        "psnr_demosaicked_db",
+        "number",
+        "dB",
+        "against the demosaicked noise-free frame",
+        "psnr_demosaicked_db",
+    ),
+    Column(
+        "visible_noise",
+        "number",
+        "Delta E^2",
+        "mean squared S-CIELAB difference from the reference",
+        "clip.quality.visible_noise",
+    ),
+    Column(
+        "visible_colour",
+        "number",
+        "Delta E^2",
+        "its part in a* and b*",
+        "clip.quality.visible_colour",
+    ),
+    Column(
+        "effects_psnr_db",
+        "number",
+        "dB",
+        "what the camera's effects beyond the base model add to the PSNR",
+        "effects_psnr_db",
+    ),
+    Column(
+        "effects_visible_ratio",
+        "number",
+        "",
+        "visible noise with those effects over that without",
+        "effects_visible_ratio",
     ),
 )

@@ -14,22 +14,24 @@ from dsis.outdir import check_replaceable, finish, partial_of
 from dsis.session.columns import (
     OBSERVERS,
     PRESENTATIONS,
+    STIMULI,
     STIMULUS_SHA256,
     VOTES,
     Column,
     Shown,
+    Stimulus,
 )
 from dsis.session.store import Store, read_store
 
 PACKAGE = "datapackage.json"
 SCHEMA = "dsis-votes/1"
-TABLES = ("votes", "presentations", "observers")
+TABLES = ("votes", "presentations", "observers", "stimuli")
 
 _Table = tuple[Sequence[Column], Sequence[object]]
 
 
 def export_votes(folder: Path, out: Path) -> None:
-    """Write `votes.csv`, `presentations.csv`, `observers.csv` and `datapackage.json` into `out`.
+    """Write `votes.csv` with `presentations`, `observers`, `stimuli` and `datapackage.json`.
 
     The same votes give the same bytes. A session may be running: its votes so far are written.
 
@@ -76,6 +78,7 @@ def _tables(store: Store, manifest: Manifest) -> dict[str, _Table]:
         (columns, voted),
         (PRESENTATIONS, shown),
         (OBSERVERS, store.observers()),
+        (STIMULI, [Stimulus(clip) for clip in manifest.clips]),
     ]
     return dict(zip(TABLES, tables, strict=True))
 

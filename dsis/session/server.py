@@ -1,6 +1,7 @@
 """The session in a browser: a server on the loopback address, for one observer."""
 
 import json
+import os
 import socket
 import webbrowser
 from collections.abc import Awaitable, Callable
@@ -73,9 +74,8 @@ def serve(
     """
     manifest = read_manifest(folder)
     check_playable(manifest, folder)
-    with open_store(folder, manifest) as store:
+    with _listening(port) as listening, open_store(folder, manifest) as store:
         enrol(store, manifest, observer, resume=resume, seed=seed, say=say)
-        listening = _listening(port)
         address = f"{ADDRESS}:{listening.getsockname()[1]}"
         observation = Observation(store, manifest, folder, observer, say=say)
         app = create_app(observation, address, when_done=lambda: _stop(server))
@@ -219,6 +219,10 @@ async def _body(request: Request) -> dict[str, Any]:
 
 def _listening(port: int) -> socket.socket:
     listening = socket.socket()
+    if (
+        os.name == "posix"
+    ):  # the port of a session that has just ended is free; elsewhere it means more
+        listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
         listening.bind((ADDRESS, port))
         listening.listen()  # from here on a browser waits, however long the server takes to start

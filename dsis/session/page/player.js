@@ -226,7 +226,8 @@ function ask(ended) {
     $("confirm").disabled = true;
     $("saving").textContent = "";
     show("vote");
-    form.querySelector("input").focus();
+    // Focus on a grade would look like a suggestion; a number to type needs it.
+    (longScale() ? $("number") : $("question")).focus();
     document.addEventListener("keydown", pressed);
     form.oninput = () => { $("confirm").disabled = chosen() === null; };
     form.onsubmit = (event) => {
@@ -312,9 +313,10 @@ function describe() {
   $("again").hidden = !test.begun;
   buildScale();
   const ten = best >= 10 && worst > 0 ? ", 0 for 10" : "";
+  const others = grades().every((grade) => grade >= 0 && grade <= (worst > 0 ? 10 : 9)) ? "" : ", or Tab and the arrows";
   const keys = longScale()
     ? "Type the number; Enter confirms."
-    : `Keys: the digits${ten}, or the arrows; or the mouse. Enter confirms.`;
+    : `Keys: the digits${ten}${others}; or the mouse. Enter confirms.`;
   $("keys").textContent = keys;
   $("keys-start").textContent = keys;
   canvas.width = test.width;

@@ -25,7 +25,7 @@ _LOW, _HALF = np.uint64(0xFFFFFFFF), np.uint64(32)
 _ONE, _TWO, _THREE, _THIRTY = np.uint64(1), np.uint64(2), np.uint64(3), np.uint64(30)
 _EIGHTH_TURN = np.uint64(1 << 29)
 _TURN_TO_RADIANS = np.float32(2 * np.pi / 2**32)
-_EIGHT, _UNIT_24 = np.uint64(8), np.float32(2.0**-24)
+_NINE, _UNIT_23 = np.uint64(9), np.float32(2.0**-23)
 _F, _I = np.float32, np.int32
 _SQRT_HALF_BITS = np.int32(0x3F3504F3)
 _LN_2 = np.float32(np.log(2.0))
@@ -98,13 +98,13 @@ def _normal_lanes(
 def _uniform_lanes(
     lanes: Any, groups: Any, c0: Any, c1: Any, frame: Any, channel: Any, k0: Any, k1: Any
 ) -> Any:
-    """Fill lanes (4, groups) with deviates uniform on (0, 1), multiples of 2^-25."""
+    """Fill lanes (4, groups) with deviates uniform on (0, 1): odd multiples of 2^-24."""
     for g in range(groups):
         a, b, c, d = philox(c0 + np.uint64(2 * g), c1, frame, channel, k0, k1)
-        lanes[0, g] = (_F(_I(a >> _EIGHT)) + _F(0.5)) * _UNIT_24
-        lanes[1, g] = (_F(_I(b >> _EIGHT)) + _F(0.5)) * _UNIT_24
-        lanes[2, g] = (_F(_I(c >> _EIGHT)) + _F(0.5)) * _UNIT_24
-        lanes[3, g] = (_F(_I(d >> _EIGHT)) + _F(0.5)) * _UNIT_24
+        lanes[0, g] = (_F(_I(a >> _NINE)) + _F(0.5)) * _UNIT_23
+        lanes[1, g] = (_F(_I(b >> _NINE)) + _F(0.5)) * _UNIT_23
+        lanes[2, g] = (_F(_I(c >> _NINE)) + _F(0.5)) * _UNIT_23
+        lanes[3, g] = (_F(_I(d >> _NINE)) + _F(0.5)) * _UNIT_23
 
 
 @kernel

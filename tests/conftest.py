@@ -4,6 +4,11 @@ import os
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
+
+# The first example of a test may compile a kernel; the same examples every time.
+settings.register_profile("dsis", deadline=None, derandomize=True)
+settings.load_profile("dsis")
 
 
 @pytest.fixture(scope="session")

@@ -85,8 +85,10 @@ def test_normal_distribution_and_tails(field: np.ndarray) -> None:
 
 def test_uniform_distribution() -> None:
     field = Draw(7).uniform("test", FIELD)
-    assert field.min() > 0
-    assert field.max() < 1
+    # In 8 million draws of 2^23 values the outermost ones occur; neither may round to 0 or 1.
+    wide = Draw(4).uniform("test", PixelGrid(2048, 4096, Cfa.MONO))
+    assert min(field.min(), wide.min()) > 0
+    assert max(field.max(), wide.max()) < 1
     assert stats.kstest(field.ravel().astype(np.float64), "uniform").pvalue > 1e-4
 
 

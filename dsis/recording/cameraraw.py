@@ -1,5 +1,7 @@
 """Camera raw and DNG files through LibRaw: the only file that touches rawpy, an optional extra."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -10,10 +12,11 @@ from numpy.typing import NDArray
 
 from dsis.errors import InputError
 
-RAW_SUFFIXES = frozenset(
-    ".3fr .ari .arw .cr2 .cr3 .crw .dng .erf .fff .iiq .kdc .mef .mos .mrw .nef .nrw .orf .pef "
-    ".raf .raw .rw2 .rwl .sr2 .srf .srw .x3f".split()
-)
+RAW_SUFFIXES = frozenset((
+    ".3fr", ".ari", ".arw", ".cr2", ".cr3", ".crw", ".dng", ".erf", ".fff", ".iiq", ".kdc",
+    ".mef", ".mos", ".mrw", ".nef", ".nrw", ".orf", ".pef", ".raf", ".rw2", ".rwl", ".sr2",
+    ".srf", ".srw", ".x3f",
+))  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -41,7 +44,7 @@ class RawHeader:
 
 
 def raw_header(path: Path) -> RawHeader:
-    """Return what the file says of itself; the pixels are left alone."""
+    """Return what the file says of itself. LibRaw decodes the file before it tells the filters."""
     with _opened(path) as raw:
         return RawHeader(
             raw.sizes.height,
@@ -56,21 +59,18 @@ def raw_header(path: Path) -> RawHeader:
 def raw_frame(path: Path) -> NDArray[np.uint16]:
     """Return the codes of the visible area: uint16 (row, column), neither scaled nor balanced."""
     with _opened(path) as raw:
-        try:
-            raw.unpack()
-            return np.array(raw.raw_image_visible, np.uint16)
-        except _library(path).LibRawError as error:
-            raise InputError.of(path, "", f"is damaged: {_reason(error)}") from None
+        return np.array(raw.raw_image_visible, np.uint16)
 
 
-def _opened(path: Path) -> Any:
+@contextmanager
+def _opened(path: Path) -> Iterator[Any]:
     library = _library(path)
-    raw = library.RawPy()
     try:
-        raw.open_file(str(path))
+        with library.RawPy() as raw:
+            raw.open_file(str(path))
+            yield raw
     except library.LibRawError as error:
         raise InputError.of(path, "", f"is no readable camera raw: {_reason(error)}") from None
-    return raw
 
 
 def _library(path: Path) -> Any:

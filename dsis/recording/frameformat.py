@@ -11,6 +11,7 @@ from dsis.imagefile import codes_info, read_codes
 from dsis.recording.cameraraw import RAW_SUFFIXES, raw_frame, raw_header
 
 _UNSIGNED = {"uint8": 8, "uint16": 16, "uint": 32, "uint32": 32, "uint64": 64}
+_ALLOWED = "must hold unsigned whole codes (uint8 or uint16)"
 
 
 @dataclass(frozen=True)
@@ -41,6 +42,10 @@ def read_header(path: Path) -> FrameHeader:
     suffix = path.suffix.lower()
     if suffix == ".npy":
         stored = _mapped(path)
+        if stored.dtype.kind == "f" and not np.isfinite(stored).all():
+            raise InputError.of(
+                path, "", f"holds {stored.dtype.name} values, some NaN or infinite; {_ALLOWED}"
+            )
         return _header(path, stored.shape, stored.dtype.name)
     if suffix in RAW_SUFFIXES:
         raw = raw_header(path)
@@ -66,8 +71,7 @@ def read_frame(path: Path) -> NDArray[np.unsignedinteger]:
 
 def _header(path: Path, shape: tuple[int, ...], pixel_type: str) -> FrameHeader:
     if pixel_type not in _UNSIGNED:
-        allowed = "must hold unsigned whole codes (uint8 or uint16)"
-        raise InputError.of(path, "", f"holds {pixel_type} values, {allowed}")
+        raise InputError.of(path, "", f"holds {pixel_type} values, {_ALLOWED}")
     if len(shape) != 2:
         found = " x ".join(map(str, shape))
         fact = f"holds an array of {found}, must hold one channel (rows x columns)"

@@ -52,10 +52,12 @@ class Inspection:
 
     def look(self, exposure: str, index: int, codes: NDArray[np.uint16]) -> None:
         """Take note of frame `index` of an exposure: uint16 (row, column)."""
-        numbers = _summarise(codes.reshape(-1), np.uint16(self.white_level))
+        numbers = _summarise(codes.reshape(-1), np.uint16(np.ceil(self.white_level)))
         digest = hashlib.blake2b(np.ascontiguousarray(codes).data, digest_size=16).digest()
+        total, least, largest, at_zero, at_white, bits = (int(n) for n in numbers)
+        summary = FrameSummary(total, least, largest, at_zero, at_white, bits, codes.size, digest)
         with self._lock:
-            self._seen[exposure][index] = FrameSummary(*map(int, numbers), codes.size, digest)
+            self._seen[exposure][index] = summary
 
     def remarks(self, exposures: Sequence[Planned]) -> tuple[str, ...]:
         """Return the remarks on the exposures that were looked at, in their order."""

@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Callable, Hashable, Mapping
 from pathlib import Path
+from typing import TypeVar
 
 from dsis.cfa import Cfa
 from dsis.errors import Fault, InputError
@@ -14,6 +15,7 @@ from dsis.recording.model import RecordedExposure, Recording, Sensor
 from dsis.recording.tomlfile import RECORDING, read_listing
 
 Headers = Mapping[Path, FrameHeader]
+V = TypeVar("V", bound=Hashable)
 
 
 def read_recording(path: Path) -> Recording:
@@ -153,19 +155,16 @@ def _check_colours(listing: Listing, headers: Headers, faults: list[Fault]) -> N
             faults.append(_fault(listing, listed, frame, fact))
 
 
-def _usual(
-    listing: Listing, headers: Headers, of: Callable[[FrameHeader], V]
-) -> tuple[V, str]:
+def _usual(listing: Listing, headers: Headers, of: Callable[[FrameHeader], V]) -> tuple[V, str]:
     """Return the most frequent property of the headers, and a file that has it."""
-    counts = Counter(of(header) for header in headers.values())
+    frames = _frames(listing, headers)
+    counts = Counter(of(header) for _, _, header in frames)
     value = counts.most_common(1)[0][0]
-    model = next(frame for frame, header in headers.items() if of(header) == value)
+    model = next(frame for _, frame, header in frames if of(header) == value)
     return value, _shown(listing, model)
 
 
-def _frames(
-    listing: Listing, headers: Headers
-) -> list[tuple[Listed, Path, FrameHeader]]:
+def _frames(listing: Listing, headers: Headers) -> list[tuple[Listed, Path, FrameHeader]]:
     return [
         (listed, frame, headers[frame])
         for listed in listing.exposures

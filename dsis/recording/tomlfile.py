@@ -15,11 +15,13 @@ from dsis.recording.listing import Listed, Listing, absolute
 from dsis.recording.model import ExposurePlan, Kind, RecordedExposure, Sensor
 
 RECORDING = "recording.toml"
-SCHEMA = "dsis-recording/1"
+SCHEMA: Literal["dsis-recording/1"] = "dsis-recording/1"
 
 
 def _listed(value: object) -> object:
-    return [value] if isinstance(value, str) else value
+    if isinstance(value, str):
+        return (value,)
+    return tuple(value) if isinstance(value, list) else value
 
 
 class Entry(Model):
@@ -62,8 +64,8 @@ def read_listing(path: Path) -> Listing:
         entries = list(_sound_entries(values))
     listed = []
     for number, entry in entries:
-        place = f"exposure[{number}]"
-        frames, missing = _frames(path, entry, f"{place}.frames")
+        place = f"exposure[{number}].frames"
+        frames, missing = _frames(path, entry, place)
         faults += missing
         exposure = RecordedExposure(
             entry.name, entry.kind, entry.exposure_time_s, entry.light, frames

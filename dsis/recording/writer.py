@@ -4,14 +4,13 @@ import json
 import re
 import shutil
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from importlib.metadata import version
 from itertools import islice
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-import dsis
-from dsis.errors import InputError
 from dsis.imagefile import write_codes
 from dsis.outdir import check_replaceable, finish, partial_of
 from dsis.recording.model import ExposurePlan, Recording, Sensor
@@ -62,11 +61,14 @@ def write_recording(
     if partial.exists():
         shutil.rmtree(partial)
     partial.mkdir(parents=True)
-    folders = {plan.name: _folder(number, plan.name) for number, plan in enumerate(exposures)}
+    folders = _folders([plan.name for plan in exposures])
     total, done = sum(plan.frames for plan in exposures), 0
     stream = iter(frames)
     for plan in exposures:
         for number, codes in enumerate(_exactly(plan, stream)):
+            if codes.max() > sensor.white_level:
+                message = f"{plan.name}: code {codes.max()} is above {sensor.white_level:g}"
+                raise ValueError(message)
             # Leading zeros: any program lists the frames in their order.
             write_codes(partial / folders[plan.name] / f"{number:04d}.tif", codes[:, :, np.newaxis])
             done += 1
@@ -76,9 +78,10 @@ def write_recording(
         message = f"more frames than the {total} that the exposures announce"
         raise ValueError(message)
     listed = {plan.name: (plan, f"{folders[plan.name]}/*.tif") for plan in exposures}
-    mark = {"written_by": f"dsis {dsis.__version__}", "origin": origin}
+    mark = {"written_by": f"dsis {version('dsis')}", "origin": origin}
     (partial / PROVENANCE).write_text(json.dumps(mark, indent=2) + "\n", encoding="utf-8")
     write_listing(partial / RECORDING, sensor, listed)
+    read_recording(partial)  # what cannot be read must not take the place of an earlier result
     finish(partial, out)
     return read_recording(out)
 
@@ -99,12 +102,9 @@ def _exactly(
         raise ValueError(message)
 
 
-def _folder(number: int, name: str) -> str:
-    """Return the folder of an exposure: its name where every file system takes it."""
-    return name if _PLAIN.fullmatch(name) else f"exposure-{number:03d}"
-
-
-def check_out(out: Path, recording: Recording) -> None:
-    """Refuse to write over the recording that is being imitated."""
-    if out.exists() and out.resolve() == recording.folder.resolve():
-        raise InputError.of(out, "", "is the recording itself: give another folder")
+def _folders(names: Sequence[str]) -> dict[str, str]:
+    """Return the folder of each exposure: its name where every file system takes all of them."""
+    plain = all(_PLAIN.fullmatch(name) for name in names)
+    if plain and len({name.lower() for name in names}) == len(names):
+        return {name: name for name in names}
+    return {name: f"exposure-{number:03d}" for number, name in enumerate(names)}

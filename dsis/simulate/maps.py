@@ -1,0 +1,124 @@
+"""`maps.npz` beside `camera.toml`: the fixed pattern of one sensor, pixel by pixel."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+from pydantic import ConfigDict
+
+from dsis.camera import Camera
+from dsis.effects import Effect, Exposure, Image, Stage
+from dsis.errors import Fault, InputError
+from dsis.grid import PixelGrid
+
+MAPS = "maps.npz"
+REPLACED = frozenset({"dsnu", "prnu", "row_fpn", "column_fpn", "shading", "tap_mismatch"})
+"""Effects that draw a pattern which the maps hold as it was measured."""
+
+_DTYPE = np.dtype(np.float32)
+
+
+@dataclass(frozen=True)
+class SensorMaps:
+    """Fixed patterns of a sensor, float32 (row, column).
+
+    Attributes
+    ----------
+    dsnu_dn
+        Offset of each pixel that depends neither on light nor on exposure time, DN: dark-signal
+        non-uniformity with its rows, columns and taps; mean 0 over each colour.
+    prnu_gain
+        Response of each pixel relative to the mean of its colour: photo-response non-uniformity
+        with shading and taps; mean 1 over each colour.
+    """
+
+    dsnu_dn: Image
+    prnu_gain: Image
+
+
+def read_maps(camera_file: Path) -> SensorMaps:
+    """Return the maps that lie beside a `camera.toml`; raise `InputError` where they do not."""
+    path = camera_file.parent / MAPS
+    if not path.is_file():
+        fact = "is missing: the same sensor needs the fixed patterns that a fit wrote beside "
+        raise InputError.of(path, "", f"{fact}{camera_file.name}; without them draw a new sensor")
+    try:
+        with np.load(path, allow_pickle=False) as stored:
+            arrays = {name: stored[name] for name in stored.files}
+    except (OSError, ValueError, EOFError) as error:
+        raise InputError.of(path, "", f"is damaged: {str(error).splitlines()[0]}") from None
+    faults = [
+        Fault(str(path), name, "is missing, must be an array (row, column)")
+        for name in ("dsnu_dn", "prnu_gain")
+        if name not in arrays
+    ]
+    faults += [
+        Fault(str(path), name, f"has shape {array.shape}, must be finite numbers (row, column)")
+        for name, array in arrays.items()
+        if array.ndim != 2 or array.dtype.kind not in "fiu" or not np.isfinite(array).all()
+    ]
+    if not faults and arrays["dsnu_dn"].shape != arrays["prnu_gain"].shape:
+        sizes = f"{arrays['prnu_gain'].shape}, must be {arrays['dsnu_dn'].shape} like dsnu_dn"
+        faults.append(Fault(str(path), "prnu_gain", f"has shape {sizes}"))
+    if not faults and arrays["prnu_gain"].min() <= 0:
+        faults.append(Fault(str(path), "prnu_gain", "holds a gain <= 0, must be greater than 0"))
+    if faults:
+        raise InputError(faults)
+    return SensorMaps(arrays["dsnu_dn"].astype(_DTYPE), arrays["prnu_gain"].astype(_DTYPE))
+
+
+def write_maps(maps: SensorMaps, camera_file: Path) -> None:
+    """Write the maps beside a `camera.toml`; `read_maps` returns equal ones."""
+    np.savez(
+        camera_file.parent / MAPS,
+        dsnu_dn=maps.dsnu_dn.astype(_DTYPE),
+        prnu_gain=maps.prnu_gain.astype(_DTYPE),
+    )
+
+
+class OffsetMap(Effect):
+    """The measured offset of every pixel: no effect of the vocabulary."""
+
+    model_config = ConfigDict(arbitrary_types_allowed=True)
+    kind: str = "offset_map"
+    offsets_dn: Any
+    stage: ClassVar[Stage] = Stage.READ_OUT
+    reference: ClassVar[str] = "EMVA Standard 1288, release 3.1, section 4"
+    measures: ClassVar[frozenset[str]] = frozenset({"level"})
+
+    def apply(self, image: Image, exposure: Exposure) -> Image:
+        """Add the offsets of the pixels."""
+        part: Image = image + _part(self.offsets_dn, exposure.grid)
+        return part
+
+
+class GainMap(Effect):
+    """The measured gain of every pixel: no effect of the vocabulary."""
+
+    model_config = ConfigDict(arbitrary_types_allowed=True)
+    kind: str = "gain_map"
+    gains: Any
+    stage: ClassVar[Stage] = Stage.LIGHT
+    reference: ClassVar[str] = "EMVA Standard 1288, release 3.1, section 4"
+    measures: ClassVar[frozenset[str]] = frozenset({"level"})
+
+    def apply(self, image: Image, exposure: Exposure) -> Image:
+        """Multiply by the gains of the pixels."""
+        part: Image = image * _part(self.gains, exposure.grid)
+        return part
+
+
+def with_maps(camera: Camera, maps: SensorMaps, grid: PixelGrid) -> Camera:
+    """Return the camera with measured patterns in the place of the drawn ones."""
+    if maps.dsnu_dn.shape != grid.shape:
+        found, wanted = (" x ".join(map(str, s)) for s in (maps.dsnu_dn.shape, grid.shape))
+        raise InputError.of(MAPS, "", f"is of {found} pixels, must be of {wanted} (rows x columns)")
+    kept = tuple(effect for effect in camera.effect if effect.kind not in REPLACED)
+    links = (GainMap(gains=maps.prnu_gain), OffsetMap(offsets_dn=maps.dsnu_dn))
+    return camera.model_copy(update={"effect": (*kept, *links)})
+
+
+def _part(whole: Image, grid: PixelGrid) -> Image:
+    row, column = grid.first_row, grid.first_column
+    return whole[row : row + grid.rows, column : column + grid.columns]

@@ -1,0 +1,147 @@
+"""A camera model's recording: frames by threads, written in order; the seed fixes every byte."""
+
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsis.camera import Camera
+from dsis.draw import Draw
+from dsis.effects import Image
+from dsis.errors import Fault, InputError
+from dsis.grid import PixelGrid
+from dsis.recording import Recording, Sensor, write_recording
+from dsis.recording.ahead import in_order
+from dsis.simulate.imitation import Imitation
+from dsis.simulate.maps import SensorMaps, with_maps
+from dsis.simulate.shot import Shot
+
+Progress = Callable[[int, int, str], None]
+
+
+def simulate_like(
+    camera: Camera,
+    recording: Recording,
+    out: Path,
+    *,
+    seed: int = 0,
+    maps: SensorMaps | None = None,
+    jobs: int = 1,
+    progress: Progress | None = None,
+) -> Recording:
+    """Write a recording of the same layout as another: what the camera model says it would be.
+
+    Exposures, frame counts, size, exposure times and light are those of `recording`. Flats have
+    the recorded mean of each colour filter site as their uniform signal, see `Imitation`; darks
+    have none. A scene's signal is its recorded mean frame above black: the error of that mean and
+    the recorded sensor's own pattern stay in it (with `maps` the pattern is taken off first).
+
+    Parameters
+    ----------
+    camera
+        The camera model.
+    recording
+        What to imitate.
+    out
+        Folder for the result, written whole or not at all.
+    seed
+        Fixes every byte, whatever the number of jobs. Another seed is another sensor as well.
+    maps
+        Fixed patterns of the sensor (`read_maps`): the same sensor. None: a new sensor of the same
+        statistics.
+    jobs
+        Threads.
+    progress
+        Called with (frames done, frames in all, exposure).
+
+    Raises
+    ------
+    InputError
+        Where camera and recording do not fit: another colour filter array, maps of another size,
+        codes of more than 16 bits; or where `out` may not be replaced.
+    """
+    faults = _faults(camera)
+    if camera.cfa != recording.sensor.cfa:
+        fact = f"is {camera.cfa}, must be {recording.sensor.cfa} as in the recording"
+        faults.append(Fault(f"camera {camera.name!r}", "cfa", fact))
+    if out.resolve() == recording.folder.resolve():
+        faults.append(Fault(str(out), "", "is the recording itself: give another folder"))
+    if faults:
+        raise InputError(faults)
+    used = camera if maps is None else with_maps(camera, maps, recording.grid)
+    shots = Imitation(used, recording, _sensor(seed), maps, jobs).shots()
+    return simulate(
+        used, shots, recording.rows, recording.columns, out, seed=seed, jobs=jobs, progress=progress
+    )
+
+
+def simulate(
+    camera: Camera,
+    shots: Sequence[Shot],
+    rows: int,
+    columns: int,
+    out: Path,
+    *,
+    seed: int = 0,
+    jobs: int = 1,
+    progress: Progress | None = None,
+) -> Recording:
+    """Write a recording of stated exposures (`flat`, `dark`, `Shot`); see `simulate_like`."""
+    faults = _faults(camera)
+    if faults:
+        raise InputError(faults)
+    sensor = Sensor(
+        name=camera.name,
+        cfa=camera.cfa,
+        black_level=camera.black_level,
+        white_level=camera.white_level,
+        bit_depth=camera.bit_depth,
+    )
+    grid = PixelGrid(rows, columns, camera.cfa)
+    frames = simulated_frames(camera, shots, grid, seed=seed, jobs=jobs)
+    origin = f"simulated from camera model {camera.name!r}, seed {seed}"
+    plans = [shot.plan for shot in shots]
+    return write_recording(out, sensor, plans, frames, origin=origin, progress=progress)
+
+
+def simulated_frames(
+    camera: Camera, shots: Sequence[Shot], grid: PixelGrid, *, seed: int = 0, jobs: int = 1
+) -> Iterator[NDArray[np.uint16]]:
+    """Yield the codes of every frame, exposure after exposure: uint16 (row, column).
+
+    One sensor serves the whole recording; each exposure has temporal noise of its own, by name.
+    """
+    sensor = _sensor(seed)
+    # Codes come less black and, where black is a fraction, are no whole numbers: round to nearest.
+    offset = np.float32(camera.black_level + 0.5)
+
+    def expose(work: tuple[Shot, Image, int]) -> NDArray[np.uint16]:
+        shot, clean, frame = work
+        temporal = Draw(seed).within("exposure", shot.plan.name)
+        image = camera.expose(
+            clean, temporal, sensor, frame, grid, exposure_time_s=shot.plan.exposure_time_s
+        )
+        return (image + offset).astype(np.uint16)
+
+    return in_order(expose, _work(shots, grid), 0 if jobs <= 1 else jobs)
+
+
+def _work(shots: Sequence[Shot], grid: PixelGrid) -> Iterator[tuple[Shot, Image, int]]:
+    for shot in shots:
+        clean = shot.clean(grid)
+        clean.flags.writeable = False  # threads share it
+        for frame in range(shot.plan.frames):
+            yield shot, clean, frame
+
+
+def _sensor(seed: int) -> Draw:
+    return Draw(seed).within("sensor")
+
+
+def _faults(camera: Camera) -> list[Fault]:
+    """Return why a camera's codes cannot be written."""
+    if camera.bit_depth <= 16:
+        return []
+    fact = f"is {camera.bit_depth}, must be at most 16: frames hold 16-bit codes"
+    return [Fault(f"camera {camera.name!r}", "bit_depth", fact)]

@@ -5,18 +5,23 @@ and the converter are links of it like every other, so physics beyond the base m
 between them.
 """
 
-from dataclasses import replace
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 import tomli_w
-from pydantic import ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from dsis.cfa import Cfa
 from dsis.color import white_balanced
 from dsis.draw import Draw
-from dsis.effects import Effect, Exposure, Image, Stage, any_effect
+from dsis.effects import Effect, Exposure, Image, ReadOut, Stage, any_effect
+from dsis.effects.poisson_shot_noise import PoissonShotNoise
+from dsis.errors import Fault, InputError
 from dsis.grid import PixelGrid
 from dsis.model import Model, read_toml, structure
 from dsis.noise import Segments, read_noise, shot_noise
@@ -37,9 +42,9 @@ class Segment(Model):
 
 
 class BaseNoise(Model):
-    """The base model's noise: read-out segments in ascending order."""
+    """The base model's noise: the law of its shot noise, read-out segments in ascending order."""
 
-    shot: Literal["gaussian"] = "gaussian"
+    shot: Literal["gaussian", "poisson"] = "gaussian"
     segment: Annotated[tuple[Segment, ...], Field(min_length=1)]
 
     @model_validator(mode="after")
@@ -85,6 +90,24 @@ class Camera(Model):
             raise ValueError(message)
         return self
 
+    @model_validator(mode="after")
+    def _effects_fit(self) -> Self:
+        unfit = [
+            f"effect[{i}] ({effect.kind}): {reason}"
+            for i, effect in enumerate(self.effect)
+            if (reason := effect.unfit_for(self.read_out))
+        ]
+        laws = Counter(law.kind for law in self._physics() if law.reshapes)
+        unfit += [f"{kind} is given {n} times, must be once" for kind, n in laws.items() if n > 1]
+        if unfit:
+            raise ValueError("; ".join(unfit))
+        return self
+
+    @property
+    def read_out(self) -> ReadOut:
+        """What effects may know of the camera."""
+        return ReadOut(self.cfa, self.segments, self.black_level, self.white_level)
+
     @property
     def segments(self) -> Segments:
         """The read-out segments as arrays."""
@@ -128,7 +151,8 @@ class Camera(Model):
         frame: int,
         grid: PixelGrid,
         *,
-        exposure_time_s: float = 0.0,
+        exposure_time_s: float | None = None,
+        earlier_clean: Callable[[int], Image] | None = None,
         threads: int = 1,
     ) -> Image:
         """Return one noisy frame of a clean signal: whole codes less black, float32.
@@ -144,27 +168,68 @@ class Camera(Model):
         grid
             The pixels of `clean`.
         exposure_time_s
-            Exposure time, s.
+            Exposure time, s; effects that grow with it raise `InputError` where it is None.
+        earlier_clean
+            The clean signal k frames earlier, for effects that remember; None: a static scene.
         threads
             Threads that kernels may use.
         """
-        exposure = Exposure(grid, frame, temporal, sensor, clean, exposure_time_s, threads)
-        image = clean
-        lit = False
-        for link in self.chain():
-            if link.stage > Stage.LIGHT and not lit:
-                exposure, lit = replace(exposure, expected_dn=image), True
-            image = link.apply(image, exposure)
-        return image
+        if exposure_time_s is None:
+            self._refuse_growth()
+        chain = list(_drawn(self.chain(), temporal, sensor))
+
+        def after(links: int, back: int) -> Image:
+            """Return what the first `links` links make of the frame `back` frames earlier."""
+            image = earlier_clean(back) if back and earlier_clean else clean
+            # Before the first frame the counter runs backwards: it has 32 bits.
+            number, lit, expected = (frame - back) % 2**32, False, image
+            for place, (link, own_temporal, own_sensor) in enumerate(chain[:links]):
+                if link.stage > Stage.LIGHT and not lit:
+                    lit, expected = True, image
+                exposure = Exposure(
+                    grid,
+                    number,
+                    own_temporal,
+                    own_sensor,
+                    expected,
+                    self.read_out,
+                    partial(before, place, back),
+                    exposure_time_s or 0.0,
+                    threads,
+                )
+                image = link.apply(image, exposure)
+            return image
+
+        def before(links: int, back: int, k: int) -> Image:
+            return after(links, back + k)
+
+        return after(len(chain), 0)
 
     def chain(self) -> tuple[Effect, ...]:
         """Return all links, base model included, in the order that light and charge meet them."""
+        physics = self._physics()
         base = (
-            ShotNoise(segments=self.segments),
-            ReadNoise(segments=self.segments),
-            Conversion(black_level=self.black_level, white_level=self.white_level),
+            ShotNoise(laws=tuple(law for law in physics if law.reshapes == "shot_noise")),
+            ReadNoise(laws=tuple(law for law in physics if law.reshapes == "read_noise")),
+            Conversion(),
         )
-        return tuple(sorted((*base, *self.effect), key=lambda e: (e.stage, e.rank, e.kind)))
+        return tuple(sorted((*base, *physics), key=_place))
+
+    def _physics(self) -> tuple[Effect, ...]:
+        """Return the effects, what `noise.shot` asks for among them."""
+        poisson = (PoissonShotNoise(),) if self.noise.shot == "poisson" else ()
+        return tuple(sorted((*poisson, *self.effect), key=_place))
+
+    def _refuse_growth(self) -> None:
+        """Raise where an effect needs the exposure time and nobody gave one."""
+        fact = "grows with the exposure time, which is not given"
+        faults = [
+            Fault(self.name, f"effect[{i}] ({effect.kind})", fact)
+            for i, effect in enumerate(self.effect)
+            if effect.grows_with_time
+        ]
+        if faults:
+            raise InputError(faults)
 
     def _scene_gain(self) -> float:
         if self.diffuse_white_dn is None:
@@ -173,20 +238,66 @@ class Camera(Model):
         return self.diffuse_white_dn
 
 
+def _place(link: Effect) -> tuple[int, int, str]:
+    """Return where a link stands in the chain."""
+    return link.stage, link.rank, link.kind
+
+
+def _drawn(
+    chain: tuple[Effect, ...], temporal: Draw, sensor: Draw
+) -> Iterator[tuple[Effect, Draw, Draw]]:
+    """Yield each link with its random fields: a second effect of one kind has fields of its own."""
+    seen: Counter[str] = Counter()
+    for link in chain:
+        seen[link.kind] += 1
+        nth = () if seen[link.kind] == 1 else (f"{link.kind} {seen[link.kind]}",)
+        yield link, temporal.within(*nth), sensor.within(*nth)
+
+
+@dataclass(frozen=True)
+class _Reshaped(Draw):
+    """Fields whose normal deviates go through laws before a base link scales them."""
+
+    laws: tuple[Effect, ...] = ()
+    exposure: Exposure | None = None
+
+    @classmethod
+    def of(cls, exposure: Exposure, laws: tuple[Effect, ...], expected: Image) -> Draw:
+        """Return the temporal fields of `exposure`, reshaped if there are laws."""
+        draw = exposure.temporal
+        if not laws:
+            return draw
+        return cls(draw.seed, draw.scope, laws, replace(exposure, expected_dn=expected))
+
+    def normal_rows(
+        self, purpose: str, grid: PixelGrid, frame: int, first: int, last: int
+    ) -> Image:
+        """Return rows first..last-1 of the deviates, after all laws."""
+        deviates = super().normal_rows(purpose, grid, frame, first, last)
+        whole = self.exposure
+        if whole is None:
+            return deviates
+        expected = whole.expected_dn[first:last]
+        block = replace(whole, grid=grid.block(first, last), expected_dn=expected)
+        for law in self.laws:
+            deviates = law.reshape(deviates, block)
+        return deviates
+
+
 class BaseLink(Effect):
     """A link of the base model: no effect of the vocabulary."""
 
-    model_config = ConfigDict(arbitrary_types_allowed=True)  # Segments holds arrays
+    laws: tuple[Effect, ...] = ()
     reference: ClassVar[str] = (
         "Seybold et al., CIC 22, 2014, section 'Camera noise characteristics'"
     )
+    confounders: ClassVar[str] = ""
 
 
 class ShotNoise(BaseLink):
     """Shot noise of variance m x: the first thing that happens to charge."""
 
     kind: str = "shot_noise"
-    segments: Segments
     stage: ClassVar[Stage] = Stage.CHARGE
     rank: ClassVar[int] = -100
     measures: ClassVar[frozenset[str]] = frozenset({"pixel_variance"})
@@ -194,14 +305,14 @@ class ShotNoise(BaseLink):
     def apply(self, image: Image, exposure: Exposure) -> Image:
         """Add the noise of the expected signal."""
         e = exposure
-        return shot_noise(image, self.segments, e.temporal, e.grid, e.frame, e.threads)
+        draw = _Reshaped.of(e, self.laws, image)
+        return shot_noise(image, e.read_out.segments, draw, e.grid, e.frame, e.threads)
 
 
 class ReadNoise(BaseLink):
     """Read noise of variance t: the first thing that the read-out adds."""
 
     kind: str = "read_noise"
-    segments: Segments
     stage: ClassVar[Stage] = Stage.READ_OUT
     rank: ClassVar[int] = -100
     measures: ClassVar[frozenset[str]] = frozenset({"pixel_variance"})
@@ -209,8 +320,9 @@ class ReadNoise(BaseLink):
     def apply(self, image: Image, exposure: Exposure) -> Image:
         """Add the noise of the read-out path that the expected signal selects."""
         e = exposure
+        draw = _Reshaped.of(e, self.laws, e.expected_dn)
         return read_noise(
-            image, e.expected_dn, self.segments, e.temporal, e.grid, e.frame, e.threads
+            image, e.expected_dn, e.read_out.segments, draw, e.grid, e.frame, e.threads
         )
 
 
@@ -218,17 +330,15 @@ class Conversion(BaseLink):
     """The converter: rounds to whole codes and clips at both ends; the last link."""
 
     kind: str = "conversion"
-    black_level: float
-    white_level: float
     stage: ClassVar[Stage] = Stage.CODE
     rank: ClassVar[int] = 100
     measures: ClassVar[frozenset[str]] = frozenset({"level", "pixel_variance"})
 
     def apply(self, image: Image, exposure: Exposure) -> Image:
         """Return whole codes less black; values below black stay negative."""
-        del exposure
-        black = np.float32(self.black_level)
-        codes: Image = np.clip(np.rint(image + black), np.float32(0), np.float32(self.white_level))
+        black = np.float32(exposure.read_out.black_level_dn)
+        white = np.float32(exposure.read_out.white_level_dn)
+        codes: Image = np.clip(np.rint(image + black), np.float32(0), white)
         return codes - black
 
 

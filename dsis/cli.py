@@ -7,6 +7,7 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TypeAlias
 
 from dsis import __version__
 from dsis.errors import DamagedError, DsisError, InputError
@@ -150,6 +151,40 @@ def report(options: argparse.Namespace) -> None:
     print(f"report in {out / 'report.html'}")
 
 
+def camera_fit(options: argparse.Namespace) -> None:
+    """Fit a camera model to a recording by photon transfer."""
+    from analysis.photon_transfer import fit_camera, summary, write_fit
+    from dsis.recording import read_recording
+
+    fit = fit_camera(read_recording(options.recording), options.segments)
+    write_fit(fit, options.out)
+    print(summary(fit))
+    print(f"camera model in {options.out}")
+
+
+def camera_simulate(options: argparse.Namespace) -> None:
+    """Write a recording of a camera model with the layout of another recording."""
+    from dsis.camera import read_camera
+    from dsis.recording import read_recording
+    from dsis.simulate import read_maps, simulate_like
+
+    camera = read_camera(options.camera)
+    maps = read_maps(options.camera) if options.same_sensor else None
+    recording = read_recording(options.like)
+    with _progress("simulate") as progress:
+        simulate_like(
+            camera,
+            recording,
+            options.out,
+            seed=options.seed or 0,
+            maps=maps,
+            jobs=options.jobs,
+            progress=progress,
+        )
+    frames = sum(len(exposure.frames) for exposure in recording.exposures)
+    print(f"{frames} frames in {len(recording.exposures)} exposures, simulated, in {options.out}")
+
+
 @contextmanager
 def _progress(what: str) -> Iterator[Callable[[int, int, str], None]]:
     """Show a bar on a terminal once the work has taken two seconds."""
@@ -179,6 +214,43 @@ def _whole(low: int) -> Callable[[str], int]:
     return whole
 
 
+Add = Callable[..., argparse.ArgumentParser]
+Commands: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"  # noqa: SLF001 - argparse has no public name for it
+
+
+def _adder(
+    commands: "argparse._SubParsersAction[argparse.ArgumentParser]", prefix: str = ""
+) -> Add:
+    """Return what adds a command with its help and an example to a group of commands."""
+
+    def add(
+        name: str, function: Callable[[argparse.Namespace], None], says: str, example: str
+    ) -> argparse.ArgumentParser:
+        sub = commands.add_parser(
+            name,
+            help=says,
+            description=says,
+            epilog=f"example:\n  dsis {prefix}{example}",
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
+        sub.set_defaults(command=function)
+        return sub
+
+    return add
+
+
+def _add_jobs(sub: argparse.ArgumentParser) -> None:
+    sub.add_argument(
+        "--jobs", type=_whole(1), default=_cores(), metavar="N", help="threads (default: all)"
+    )
+
+
+def _add_seed(sub: argparse.ArgumentParser, default: str) -> None:
+    sub.add_argument(
+        "--seed", type=_whole(0), metavar="N", help=f"fixes every random number ({default})"
+    )
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="dsis",
@@ -188,116 +260,125 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"dsis {__version__}")
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
+    add = _adder(commands)
+    _add_demo(add)
+    _add_stimuli(add)
+    _add_session(add)
+    _add_votes(add)
+    _add_report(add)
+    _add_camera(commands)
+    return parser
 
-    def command(
-        name: str, function: Callable[[argparse.Namespace], None], says: str, example: str
-    ) -> argparse.ArgumentParser:
-        sub = commands.add_parser(
-            name,
-            help=says,
-            description=says,
-            epilog=f"example:\n  {example}",
-            formatter_class=argparse.RawDescriptionHelpFormatter,
-        )
-        sub.set_defaults(command=function)
-        return sub
 
-    def working(sub: argparse.ArgumentParser) -> None:
-        sub.add_argument(
-            "--jobs", type=_whole(1), default=_cores(), metavar="N", help="threads (default: all)"
-        )
-
-    def seeded(sub: argparse.ArgumentParser, default: str) -> None:
-        sub.add_argument(
-            "--seed", type=_whole(0), metavar="N", help=f"fixes every random number ({default})"
-        )
-
-    sub = command(
+def _add_demo(add: Add) -> None:
+    sub = add(
         "demo",
         demo,
         "The whole chain in small: stimuli, a session of simulated observers, the MOS report.",
-        "dsis demo --out my-demo",
+        "demo --out my-demo",
     )
     sub.add_argument("--out", type=Path, default=Path("dsis-demo"), metavar="DIR")
     sub.add_argument("--observers", type=_whole(1), default=DEMO_OBSERVERS, metavar="N")
-    working(sub)
-    seeded(sub, "default: the spec's")
+    _add_jobs(sub)
+    _add_seed(sub, "default: the spec's")
 
-    sub = command(
+
+def _add_stimuli(add: Add) -> None:
+    sub = add(
         "stimuli",
         stimuli,
         "Build the sequences that a test spec names, with a manifest.",
-        "dsis stimuli stills.toml --source photos/ --out stimuli",
+        "stimuli stills.toml --source photos/ --out stimuli",
     )
-    sub.add_argument(
-        "spec",
-        nargs="?",
-        metavar="SPEC.toml",
-        help="a file, a shipped spec's name, or a manifest.json",
-    )
+    spec = "a file, the name of a spec that comes with dsis, or a manifest.json"
+    sub.add_argument("spec", nargs="?", metavar="SPEC.toml", help=spec)
     sub.add_argument("--out", type=Path, metavar="DIR", help="default: SPEC-stimuli")
-    sub.add_argument(
-        "--source",
-        nargs="+",
-        default=[],
-        metavar="FILES",
-        help="your frames instead of the spec's content",
-    )
-    sub.add_argument(
-        "--dry-run", action="store_true", help="say disk, memory and time, build nothing"
-    )
-    sub.add_argument(
-        "--check", type=Path, metavar="DIR", help="verify every frame against the manifest"
-    )
-    working(sub)
-    seeded(sub, "default: the spec's")
+    frames = "your frames instead of the spec's content"
+    sub.add_argument("--source", nargs="+", default=[], metavar="FILES", help=frames)
+    sub.add_argument("--dry-run", action="store_true", help="say disk, memory, time; build nothing")
+    check = "verify every frame against the manifest"
+    sub.add_argument("--check", type=Path, metavar="DIR", help=check)
+    _add_jobs(sub)
+    _add_seed(sub, "default: the spec's")
 
-    sub = command(
+
+def _add_session(add: Add) -> None:
+    sub = add(
         "session",
         session,
         "Run the test with people in the browser, or with simulated observers.",
-        "dsis session stimuli --observer anna",
+        "session stimuli --observer anna",
     )
     sub.add_argument("stimuli_dir", type=Path, metavar="STIMULI_DIR")
     sub.add_argument("--observer", metavar="ID", help="pseudonym of the person who votes")
     sub.add_argument("--robots", type=_whole(1), metavar="N", help="simulated observers instead")
-    sub.add_argument(
-        "--resume", action="store_true", help="go on with a session that was interrupted"
-    )
-    sub.add_argument(
-        "--status", action="store_true", help="how far the observers are; never scores"
-    )
-    sub.add_argument(
-        "--port", type=_whole(0), default=0, help="port on 127.0.0.1 (default: a free one)"
-    )
+    sub.add_argument("--resume", action="store_true", help="go on with an interrupted session")
+    sub.add_argument("--status", action="store_true", help="how far it is; never scores")
+    port = "port on 127.0.0.1 (default: a free one)"
+    sub.add_argument("--port", type=_whole(0), default=0, help=port)
     sub.add_argument("--no-browser", action="store_true", help="print the address only")
-    seeded(sub, "default: 1")
+    _add_seed(sub, "default: 1")
 
-    sub = command(
+
+def _add_votes(add: Add) -> None:
+    sub = add(
         "votes",
         votes,
         "Export the recorded votes: votes.csv and the tables beside it.",
-        "dsis votes stimuli -o votes",
+        "votes stimuli -o votes",
     )
     sub.add_argument("stimuli_dir", type=Path, metavar="STIMULI_DIR")
     sub.add_argument("-o", "--out", type=Path, required=True, metavar="DIR")
 
-    sub = command(
+
+def _add_report(add: Add) -> None:
+    sub = add(
         "report",
         report,
         "Write the MOS report of a table of votes.",
-        "dsis report votes/votes.csv --out report",
+        "report votes/votes.csv --out report",
     )
     sub.add_argument("votes", type=Path, metavar="VOTES.csv")
     sub.add_argument("--out", type=Path, metavar="DIR", help="default: VOTES-report")
-    sub.add_argument(
-        "--scale",
-        nargs=2,
-        type=int,
-        metavar=("LOW", "HIGH"),
-        help="ends of the scale, worst first; default: datapackage.json",
+    ends = "ends of the scale, worst first; default: datapackage.json"
+    sub.add_argument("--scale", nargs=2, type=int, metavar=("LOW", "HIGH"), help=ends)
+
+
+def _add_camera(commands: Commands) -> None:
+    says = "Camera models: fitted to recordings, and simulated."
+    group = commands.add_parser(
+        "camera",
+        help=says,
+        description=says,
+        epilog="example:\n  dsis camera fit RECORDING -o camera.toml",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    return parser
+    add = _adder(group.add_subparsers(required=True, metavar="COMMAND"), "camera ")
+    sub = add(
+        "fit",
+        camera_fit,
+        "Fit the paper's camera model to a recording by photon transfer.",
+        "fit recording -o camera.toml",
+    )
+    recording = "folder with recording.toml, or an EMVA 1288 descriptor file"
+    sub.add_argument("recording", type=Path, metavar="RECORDING", help=recording)
+    sub.add_argument("-o", "--out", type=Path, required=True, metavar="camera.toml")
+    segments = "read-out segments (default: as the data need)"
+    sub.add_argument("--segments", type=_whole(1), metavar="N", help=segments)
+    sub = add(
+        "simulate",
+        camera_simulate,
+        "Write a recording of a camera model, laid out like another recording.",
+        "simulate camera.toml --like recording -o simulated",
+    )
+    sub.add_argument("camera", type=Path, metavar="camera.toml")
+    like = "recording whose exposures, frame counts, size and signal levels are taken"
+    sub.add_argument("--like", type=Path, required=True, metavar="RECORDING", help=like)
+    sub.add_argument("-o", "--out", type=Path, required=True, metavar="DIR")
+    same = "fixed patterns from the maps.npz beside camera.toml instead of a new sensor's"
+    sub.add_argument("--same-sensor", action="store_true", help=same)
+    _add_jobs(sub)
+    _add_seed(sub, "default: 0")
 
 
 if __name__ == "__main__":

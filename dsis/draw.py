@@ -143,6 +143,20 @@ def _fill(
                         out[row, start + 8 * g, plane] = lanes[lane, g]
 
 
+@kernel
+def _scatter(
+    out: NDArray[np.float64], places: NDArray[np.int64], key: NDArray[np.uint64], frame: np.uint64
+) -> None:
+    """Fill `out` (2, pixel) with deviates uniform on (0, 1) of places (3, pixel)."""
+    for i in range(places.shape[1]):
+        row, column, channel = places[0, i], places[1, i], places[2, i]
+        a, b, _, _ = philox(
+            np.uint64(column), np.uint64(row), frame, np.uint64(channel), key[0], key[1]
+        )
+        out[0, i] = (np.float64(a) + 0.5) / 4294967296.0
+        out[1, i] = (np.float64(b) + 0.5) / 4294967296.0
+
+
 @dataclass(frozen=True)
 class Draw:
     """Random fields of one seed.
@@ -177,12 +191,26 @@ class Draw:
     def rows(self, purpose: str, grid: PixelGrid, frame: int = 0) -> NDArray[np.float32]:
         """Return one standard normal deviate per sensor row, common to all channels."""
         line = PixelGrid(grid.rows, 1, Cfa.MONO, grid.first_row, 0)
-        return self.normal(purpose, line, frame)[:, 0]
+        offsets: NDArray[np.float32] = self.normal(purpose, line, frame)[:, 0]
+        return offsets
 
     def columns(self, purpose: str, grid: PixelGrid, frame: int = 0) -> NDArray[np.float32]:
         """Return one standard normal deviate per sensor column, common to all channels."""
         line = PixelGrid(1, grid.columns, Cfa.MONO, 0, grid.first_column)
-        return self.normal(purpose, line, frame)[0]
+        offsets: NDArray[np.float32] = self.normal(purpose, line, frame)[0]
+        return offsets
+
+    def scattered(
+        self, purpose: str, places: NDArray[np.int64], frame: int = 0
+    ) -> NDArray[np.float64]:
+        """Return two deviates, uniform on (0, 1), for each of some pixels: float64 (2, pixel).
+
+        `places` (3, pixel) holds sensor row, sensor column and channel. For effects that few
+        pixels have.
+        """
+        out = np.empty((2, places.shape[1]), np.float64)
+        _scatter(out, np.ascontiguousarray(places), self._key(purpose), np.uint64(frame))
+        return out
 
     def normal_rows(
         self, purpose: str, grid: PixelGrid, frame: int, first: int, last: int

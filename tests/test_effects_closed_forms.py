@@ -102,7 +102,7 @@ CORRELATION_ERROR = 1.5 / SIDE  # 1 / sqrt(n), with room for Bartlett's factor
 @pytest.mark.parametrize("fraction", [0.01, 0.05, 0.15])
 @pytest.mark.parametrize("along", ["both", "rows", "columns"])
 def test_crosstalk_correlates_by_its_kernel(fraction: float, along: str) -> None:
-    made = apply(effect("crosstalk", fraction=fraction, along=along), white())
+    made = apply(effect("crosstalk", fraction=fraction, along=along), white(mean=500))
     neighbours = 4 if along == "both" else 2
     own = 1 - neighbours * fraction
     norm = own**2 + neighbours * fraction**2
@@ -111,7 +111,18 @@ def test_crosstalk_correlates_by_its_kernel(fraction: float, along: str) -> None
         rho = expected if along in ("both", axis) else 0.0
         assert abs(correlation(made, *lag) - rho) < Z_MAX * CORRELATION_ERROR
     assert abs(made.var() / white().var() - norm) < Z_MAX * np.sqrt(2) / SIDE
-    assert made.mean() == pytest.approx(white().mean(), abs=1e-4)  # charge is kept
+    assert made.mean() == pytest.approx(white(mean=500).mean(), abs=1e-4)  # charge is kept
+
+
+@pytest.mark.parametrize("kind", ["crosstalk", "spatial_filtering"])
+def test_a_single_charge_is_shared_with_its_neighbours(kind: str) -> None:
+    point = np.zeros((9, 9))
+    point[4, 4] = 1000.0
+    expected = np.zeros((9, 9))
+    expected[4, 4] = 880.0
+    expected[[3, 5, 4, 4], [4, 4, 3, 5]] = 30.0
+    made = apply(effect(kind, fraction=0.03), point)
+    np.testing.assert_allclose(made, expected, atol=1e-3)
 
 
 def test_brighter_fatter_grows_with_the_square_of_the_signal() -> None:
@@ -134,8 +145,11 @@ def test_brighter_fatter_grows_with_the_square_of_the_signal() -> None:
 def test_spatial_filtering_couples_sites_of_one_colour(cfa: Cfa) -> None:
     step = 1 if cfa is Cfa.MONO else 2
     made = apply(
-        effect("spatial_filtering", fraction=0.05), white(), grid=PixelGrid(SIDE, SIDE, cfa)
+        effect("spatial_filtering", fraction=0.05),
+        white(mean=500),
+        grid=PixelGrid(SIDE, SIDE, cfa),
     )
+    assert made.mean() == pytest.approx(white(mean=500).mean(), abs=1e-4)
     expected = 2 * 0.8 * 0.05 / (0.8**2 + 4 * 0.05**2)
     for dy, dx in ((0, step), (step, 0)):
         assert abs(correlation(made, dy, dx) - expected) < Z_MAX * CORRELATION_ERROR
@@ -340,6 +354,9 @@ def test_code_widths_have_the_rms_asked_for(rms: float) -> None:
     kurtosis = stats.kurtosis(widths, fisher=False)
     assert abs(widths.mean() - 1) < 0.02
     assert abs(widths.std() / rms - 1) < Z_MAX * np.sqrt((kurtosis - 1) / (4 * 4000)) + 0.01
+    # The mean of the integral non-linearity: a bridge over 64 codes, averaged over 64 of them.
+    off = (codes - BLACK_DN - ramp[0]).mean()
+    assert abs(off) < Z_MAX * rms * np.sqrt(64 / 12) / np.sqrt(64) + 1 / per_lsb
     edges = code_edges(Draw(4), int(WHITE_DN), rms)
     integral = edges - np.arange(edges.size) + 0.5
     assert np.abs(integral[::64]).max() < 1e-9

@@ -197,6 +197,18 @@ class TestLaws:
         assert made.dtype == np.float32
         assert made.shape == image.shape
 
+    def test_without_strength_nothing_happens(self, name: str) -> None:
+        example = example_of(KINDS[name])
+        strength = next((n for n, v in example if isinstance(v, float)), None)
+        if strength is None or name in {"heavy_tailed_read_noise", "crosstalk", "saturation"}:
+            return  # no parameter whose zero is "none"
+        if name == "quantisation":
+            return  # a step of 1 rounds
+        grid = PixelGrid(16, 16, Cfa.RGGB)
+        image = np.random.default_rng(0).uniform(0, 3000, grid.shape).astype(np.float32)
+        nothing = KINDS[name](**dict(example) | {strength: 0.0})
+        np.testing.assert_array_equal(nothing.apply(image, self.exposure(grid, 2, image)), image)
+
     def test_it_loads_from_toml_as_it_was_written(self, name: str, tmp_path: Path) -> None:
         camera = camera_with(example_of(KINDS[name]))
         write_camera(camera, tmp_path / "camera.toml")

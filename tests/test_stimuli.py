@@ -189,7 +189,7 @@ def rendering(camera: str, transform: type[DisplayTransform], seed: int = 1) -> 
     from dsis.camera import read_camera
 
     model: Camera = read_camera(SHIPPED / "cameras" / f"{camera}.toml")
-    return Rendering(model, transform(Color()), seed)
+    return Rendering(model, transform(Color()), seed, exposure_time_s=0.02)
 
 
 @pytest.mark.parametrize("camera", ["dual_gain_cinema", "single_gain"])

@@ -1,1 +1,26 @@
-"""Photon transfer."""
+"""Photon transfer: the paper's camera model fitted to a recording, and EMVA 1288's figures.
+
+Public: `fit_camera` gives a `Fit`; `write_fit` writes camera.toml, figures and numbers, `summary` a
+table to read.
+"""
+
+from analysis.photon_transfer.files import camera_text, fit_values, summary, write_fit
+from analysis.photon_transfer.fit import ChannelFit, Fit, FittedLevel, fit_camera
+from analysis.photon_transfer.quantity import Quantity
+from analysis.photon_transfer.segments import Line, SegmentFit, Switch, fit_segments
+
+__all__ = [
+    "ChannelFit",
+    "Fit",
+    "FittedLevel",
+    "Line",
+    "Quantity",
+    "SegmentFit",
+    "Switch",
+    "camera_text",
+    "fit_camera",
+    "fit_segments",
+    "fit_values",
+    "summary",
+    "write_fit",
+]

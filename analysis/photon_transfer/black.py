@@ -56,5 +56,6 @@ def dark_line(
     if dof > 0 and stats.chi2.sf(chi2, dof) < P_SCALED:
         covariance *= chi2 / dof
     value, sd = solution / scale, np.sqrt(np.diag(covariance)) / scale
-    current = (float(value[1]), float(sd[1])) if line else (None, None)
-    return DarkLine(float(value[0]), float(sd[0]), *current, chi2, dof)
+    current = float(value[1]) if line else None
+    current_se = float(sd[1]) if line else None
+    return DarkLine(float(value[0]), float(sd[0]), current, current_se, chi2, dof)

@@ -1,6 +1,6 @@
 """Undo rounding to whole codes: mean and variance of a Gaussian from those of its codes.
 
-The Fourier series of the rounding error gives, for N(mu, sigma) and w_k = (-1)^k exp(-2 (pi k s)^2),
+The Fourier series of the rounding error gives for N(mu, sigma) and w_k = (-1)^k exp(-2 (pi k s)^2):
 
     E round   = mu + sum w_k sin(2 pi k mu) / (pi k)
     Var round = sigma^2 + 1/12 + sum w_k cos(2 pi k mu) (4 sigma^2 + 1 / (pi k)^2) - (bias)^2
@@ -58,7 +58,7 @@ def unrounded(
         Variance of the pixels' fixed offsets.
     """
     plain = variance_dn2 - SHEPPARD_DN2
-    if variance_dn2 > _SMOOTH_DN2:
+    if not variance_dn2 <= _SMOOTH_DN2:  # one frame's nan too
         return Unrounded(level_dn, level_se_dn, plain, variance_se_dn2, recovered=True)
 
     def miss(at: np.ndarray) -> list[float]:

@@ -2,32 +2,35 @@
 
 The points are gamma distributed about slope * x + intercept with known relative errors, so they are
 fitted by iterated weighted least squares with the model's own variance and compared by deviance.
+Where the levels scatter more than their errors allow, a further relative error common to all levels
+(Mandel & Paule's) makes up for it, so that no single level of many frames rules the fit.
 A further segment must pass two tests: the deviance that the best of all gaps gains must be too
 large for chance, chance being allowed every gap (Bonferroni's bound on the scanned switch), and the
-step must explain the points better than a smooth bend (a parabola) does: a bent response is no
-read-out path. The switch is known as an interval between levels: all gaps whose deviance is within
-`GAP_DEVIANCE` of the best. Errors in x enter the weights with the slope; they are small:
+step must explain the points better than a smooth bend (a cubic, a kink) does, by Schwarz's
+penalty: a bent response is no read-out path. The switch is known as an interval between levels:
+all gaps whose deviance is within `GAP_DEVIANCE` of the best. Errors in x enter the weights with the
+slope; they are small:
 m^2 Var(mean) / Var(variance) = m^2 (T - 1) / (2 T v) for white noise.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
+from scipy import optimize, stats
 
 Floats = NDArray[np.float64]
 
 MAX_SEGMENTS = 4
-P_INVENTED = 0.003  # chance of one more segment where there is none
+P_INVENTED = 0.006  # chance of one more segment where there is none
 P_SCALED = 0.01  # scatter rarer than this is real: errors are scaled by it
 GAP_DEVIANCE = 7.4  # exp(-7.4 / 2) = 2.5 %: a gap so much worse is left out of the interval
-BEND_PENALTY = 2.0  # deviance that a step may lose to a bend per parameter it has more
 _GAP_ERRORS = 5.0  # levels closer than this many errors of the mean are one level
 _ITERATIONS = 12
+_CONVERGED = 1e-9
 
 
 @dataclass(frozen=True)
@@ -49,7 +52,11 @@ class Points:
     def of(cls, **columns: NDArray[np.generic]) -> "Points":
         """Return the points in ascending order of x."""
         order = np.argsort(columns["x_dn"], kind="stable")
-        return cls(**{name: np.asarray(values)[order] for name, values in columns.items()})  # type: ignore[arg-type] # one type per column
+        return cls(**{name: np.asarray(values)[order] for name, values in columns.items()})
+
+    def scattered(self, relative: float) -> "Points":
+        """Return the points with a further relative error of the variance."""
+        return replace(self, relative_se=np.hypot(self.relative_se, relative))
 
     def part(self, keep: NDArray[np.bool_] | slice) -> "Points":
         """Return some of the points."""
@@ -101,12 +108,14 @@ class SegmentFit:
     lines, switches
         Ascending; one switch fewer than lines.
     deviance, dof
-        Misfit and what chance gives; the errors carry `error_scale` = sqrt(deviance / dof) where
-        the misfit is too large for chance, else 1.
+        Misfit beside the points' own errors, and what chance gives.
+    scatter
+        Further relative error of the variance that explains a misfit too large for chance, else 0;
+        the lines' errors include it.
     p_segments
         For each number of segments tried beyond the first: how likely chance gains as much.
-    bend_deviance
-        Misfit of a parabola through all points; nan with fewer than four points.
+    bends
+        Whether one line does not do, but a smooth bend explains the points as well as a switch.
     forced
         Whether the user fixed the number of segments.
     """
@@ -115,9 +124,9 @@ class SegmentFit:
     switches: tuple[Switch, ...]
     deviance: float
     dof: int
-    error_scale: float
+    scatter: float
     p_segments: tuple[float, ...]
-    bend_deviance: float
+    bends: bool
     forced: bool
 
     def segment_of(self, x_dn: Floats) -> NDArray[np.intp]:
@@ -144,30 +153,73 @@ def fit_segments(points: Points, segments: int | None, black_se_dn: float = 0.0)
         raise ValueError(message + f"{segments or 1} segment(s) need two levels each")
     chances: list[float] = []
     cuts: tuple[int, ...] = ()
+    bends = False
     if segments is not None:
-        cuts = search.best(segments)[1]
+        search, cuts = _settled(points, segments)
     else:
+        search, _ = _settled(points, 1)
         for number in range(2, min(MAX_SEGMENTS, most) + 1):
-            chance, found = search.one_more(cuts, number)
-            chances.append(chance)
-            if chance > P_INVENTED:
+            larger, found = _settled(points, number)
+            chances.append(larger.chance(cuts, found))
+            bends = number == 2 and chances[-1] <= P_INVENTED and larger.bends(found)
+            if chances[-1] > P_INVENTED or bends:
                 break
-            cuts = found
-    return _result(search, cuts, tuple(chances), black_se_dn, forced=segments is not None)
+            search, cuts = larger, found
+    plain = _result(search, cuts, black_se_dn)
+    return replace(
+        plain,
+        deviance=_Search(points).total(cuts),
+        p_segments=tuple(chances),
+        bends=bends,
+        forced=segments is not None,
+    )
+
+
+def _settled(points: Points, number: int) -> tuple["_Search", tuple[int, ...]]:
+    """Return the best `number` pieces with the scatter that they leave unexplained."""
+    search = _Search(points)
+    _, cuts = search.best(number)
+    dof = points.x_dn.size - 2 * number
+    if dof < 1 or stats.chi2.sf(search.total(cuts), dof) > P_SCALED:
+        return search, cuts
+    for _ in range(2):  # the scatter moves the cuts a little, the cuts the scatter
+        search = _Search(points, _scatter(points, cuts, dof))
+        cuts = search.best(number)[1]
+    return search, cuts
+
+
+def _scatter(points: Points, cuts: tuple[int, ...], dof: int) -> float:
+    """Return the further relative error that brings the deviance of the pieces down to `dof`."""
+
+    def excess(relative: float) -> float:
+        return _Search(points, relative).total(cuts) - dof
+
+    high = 0.01
+    while excess(high) > 0 and high < 1e3:
+        high *= 3
+    return float(optimize.brentq(excess, 0.0, high, rtol=1e-3)) if excess(high) < 0 else high
 
 
 class _Search:
     """Pieces over runs of levels, each fitted once."""
 
-    def __init__(self, points: Points) -> None:
-        self.points = points
+    def __init__(self, points: Points, scatter: float = 0.0) -> None:
+        self.scatter = scatter
+        self.points = points.scattered(scatter) if scatter else points
         # The first point of each distinct level; no switch is sought inside a level.
         apart = np.diff(points.x_dn) > _GAP_ERRORS * np.hypot(
             points.x_se_dn[1:], points.x_se_dn[:-1]
         )
         self.starts = np.concatenate([[0], 1 + np.flatnonzero(apart)])
-        self.bend = _deviance(points, _bend) if points.x_dn.size > 3 else np.nan
         self.cost: Callable[[int, int], float] = cache(self._cost)
+
+    def bend(self) -> float:
+        """Return the least deviance of a smooth bend: a cubic, or a kink without a step."""
+        x = self.points.x_dn
+        if x.size < 5:
+            return np.nan
+        bends = [_cubic, *(_kink(float(x[start])) for start in self.starts[1:-1])]
+        return min(_deviance(self.points, bend) for bend in bends)
 
     def range(self, first: int, last: int) -> slice:
         """Return the points of levels first..last-1."""
@@ -196,30 +248,31 @@ class _Search:
 
         return up_to(len(self.starts), number)
 
-    def one_more(self, cuts: tuple[int, ...], number: int) -> tuple[float, tuple[int, ...]]:
-        """Return how likely chance gains what the best `number` pieces gain, and where they begin.
-
-        1 where a smooth bend explains the points as well.
-        """
-        deviance, found = self.best(number)
-        dof = self.points.x_dn.size - 2 * number
-        scale = _scale(deviance, dof) ** 2
-        gain = (self.total(cuts) - deviance) / scale
-        # The bend has one parameter more than a line; a step two and its place.
-        if number == 2 and self.bend - deviance < BEND_PENALTY * 2 * scale:
-            return 1.0, found
+    def chance(self, cuts: tuple[int, ...], more: tuple[int, ...]) -> float:
+        """Return how likely chance gains what `more` gains on `cuts`, one piece fewer."""
+        number = len(more) + 1
+        deviance = self.total(more)
+        gain = self.total(cuts) - deviance
         gaps = max(len(self.starts) - 2 * number + 1, 1)
-        single = stats.chi2.sf(gain, 2) if scale == 1 else stats.f.sf(gain / 2, 2, dof)
-        return min(1.0, float(gaps * single)), found
+        dof = self.points.x_dn.size - 2 * number
+        single = stats.f.sf(gain / 2, 2, dof) if self.scatter else stats.chi2.sf(gain, 2)
+        return min(1.0, float(gaps * single))
 
-    def interval(self, cuts: tuple[int, ...], which: int, scale: float) -> tuple[Switch, Floats]:
+    def bends(self, cuts: tuple[int, ...]) -> bool:
+        """Return whether a smooth bend explains the points as well as pieces that begin at `cuts`.
+
+        A step has one parameter more than a bend: Schwarz's penalty for it.
+        """
+        return self.bend() - self.total(cuts) < float(np.log(self.points.x_dn.size))
+
+    def interval(self, cuts: tuple[int, ...], which: int) -> tuple[Switch, Floats]:
         """Return the gaps that may hold a switch, and the weight of each level as its place."""
         bounds = (0, *cuts, len(self.starts))
         options = range(bounds[which] + 2, bounds[which + 2] - 1)
         misfits = np.array(
             [self.total((*cuts[:which], cut, *cuts[which + 1 :])) for cut in options]
         )
-        above = (misfits - misfits.min()) / scale**2
+        above = misfits - misfits.min()
         kept = [cut for cut, more in zip(options, above, strict=True) if more < GAP_DEVIANCE]
         x = self.points.x_dn
         low, high = int(self.starts[min(kept)]) - 1, int(self.starts[max(kept)])
@@ -228,33 +281,49 @@ class _Search:
         return Switch(float(x[low]), float(x[high])), weights
 
 
-def _result(
-    search: _Search,
-    cuts: tuple[int, ...],
-    chances: tuple[float, ...],
-    black_se_dn: float,
-    *,
-    forced: bool,
-) -> SegmentFit:
+def _result(search: _Search, cuts: tuple[int, ...], black_se_dn: float) -> SegmentFit:
+    """Return the pieces with their errors; what the choice was made by is added by the caller."""
     points, bounds = search.points, (0, *cuts, len(search.starts))
-    deviance = search.total(cuts)
     dof = points.x_dn.size - 2 * (len(cuts) + 1)
-    scale = _scale(deviance, dof)
-    switches, weights = [], []
-    for which in range(len(cuts)):
-        switch, weight = search.interval(cuts, which, scale)
-        switches.append(switch)
-        weights.append(weight)
+    found = [search.interval(cuts, which) for which in range(len(cuts))]
     lines = []
     for piece, (first, last) in enumerate(pairwise(bounds)):
-        line = _line(points.part(search.range(first, last)), scale, black_se_dn)
-        for at, other in ((piece - 1, 0), (piece, 1)):
+        line = _line(points.part(search.range(first, last)), black_se_dn)
+        for at, end in ((piece - 1, 0), (piece, 1)):
             if 0 <= at < len(cuts):
-                line = _averaged(search, line, (first, last), weights[at], other, scale)
+                line = _averaged(search, line, (first, last), found[at][1], end)
         lines.append(line)
     return SegmentFit(
-        tuple(lines), tuple(switches), deviance, dof, scale, chances, search.bend, forced
+        lines=tuple(lines),
+        switches=tuple(switch for switch, _ in found),
+        deviance=search.total(cuts),
+        dof=dof,
+        scatter=search.scatter,
+        p_segments=(),
+        bends=False,
+        forced=False,
     )
+
+
+def lines_between(
+    points: Points, switches: tuple[Switch, ...]
+) -> tuple[tuple[Line | None, ...], float, int]:
+    """Return the pieces between given switches, their deviance and number of parameters.
+
+    A piece with fewer than two distinct levels is None and adds no deviance.
+    """
+    ends = [-np.inf, *(switch.middle_dn for switch in switches), np.inf]
+    lines: list[Line | None] = []
+    deviance, parameters = 0.0, 0
+    for low, high in pairwise(ends):
+        part = points.part((points.x_dn >= low) & (points.x_dn < high))
+        if part.x_dn.size < 2 or len(_Search(part).starts) < 2:
+            lines.append(None)
+            continue
+        lines.append(_line(part, 0.0))
+        deviance += _deviance(part, _affine)
+        parameters += 2
+    return tuple(lines), deviance, parameters
 
 
 def _averaged(
@@ -263,7 +332,6 @@ def _averaged(
     bounds: tuple[int, int],
     weights: Floats,
     end: int,
-    scale: float,
 ) -> Line:
     """Widen a line's errors by what other plausible places of its end would make of it."""
     spread = np.zeros((2, 2))
@@ -271,10 +339,8 @@ def _averaged(
         first, last = (int(cut), bounds[1]) if end == 0 else (bounds[0], int(cut))
         if last - first < 2 or (first, last) == bounds:
             continue
-        other = _line(search.points.part(search.range(first, last)), scale, 0.0)
-        step = np.array(
-            [other.slope_dn - line.slope_dn, other.intercept_dn2 - line.intercept_dn2]
-        )
+        other = _line(search.points.part(search.range(first, last)), 0.0)
+        step = np.array([other.slope_dn - line.slope_dn, other.intercept_dn2 - line.intercept_dn2])
         spread += weights[cut] * (
             np.outer(step, step) + np.array(other.covariance) - np.array(line.covariance)
         )
@@ -284,36 +350,41 @@ def _averaged(
     return Line(line.slope_dn, line.intercept_dn2, _pair(covariance))
 
 
-def _scale(deviance: float, dof: int) -> float:
-    """Return sqrt(deviance / dof) where it is too large for chance, else 1."""
-    if dof < 1 or stats.chi2.sf(deviance, dof) > P_SCALED:
-        return 1.0
-    return float(np.sqrt(deviance / dof))
-
-
 def _affine(x: Floats) -> Floats:
     return np.stack([x, np.ones_like(x)], 1)
 
 
-def _bend(x: Floats) -> Floats:
-    return np.stack([x, np.ones_like(x), (x / max(float(np.abs(x).max()), 1e-30)) ** 2], 1)
+def _cubic(x: Floats) -> Floats:
+    part = x / max(float(np.abs(x).max()), 1e-30)
+    return np.stack([x, np.ones_like(x), part**2, part**3], 1)
+
+
+def _kink(at_dn: float) -> Callable[[Floats], Floats]:
+    def basis(x: Floats) -> Floats:
+        return np.stack([x, np.ones_like(x), np.maximum(x - at_dn, 0.0)], 1)
+
+    return basis
 
 
 def _solve(points: Points, design: Floats) -> tuple[Floats, Floats, Floats]:
     """Return parameters, fitted variance and relative errors (x's included) by reweighting."""
     v = points.variance_dn2
-    floor = 1e-3 * float(np.abs(v).max()) + 1e-12
-    fitted = np.maximum(v, floor)
-    relative = points.relative_se
-    parameters = np.zeros(design.shape[1])
+    # A line that runs through zero would weigh its point without bound.
+    floor = np.maximum(0.05 * v, 1e-12)
+    fitted, relative = np.maximum(v, floor), points.relative_se
+    size = np.maximum(np.abs(design).max(0), 1e-30)
+    unit = design / size
     for _ in range(_ITERATIONS):
         weight = 1 / (fitted * relative)
-        scale = np.linalg.norm(design * weight[:, None], axis=0)
-        solution, *_ = np.linalg.lstsq(design * weight[:, None] / scale, v * weight, rcond=None)
-        before, parameters = parameters, solution / scale
-        fitted = np.maximum(design @ parameters, np.minimum(np.maximum(v, floor), floor))
+        whitened = unit * weight[:, None]
+        norm = np.sqrt((whitened**2).sum(0))
+        whitened /= norm
+        gram = whitened.T @ whitened
+        gram[np.diag_indices_from(gram)] += 1e-13  # nearly collinear bends stay solvable
+        parameters = np.linalg.solve(gram, whitened.T @ (v * weight)) / norm / size
+        before, fitted = fitted, np.maximum(design @ parameters, floor)
         relative = np.hypot(points.relative_se, parameters[0] * points.x_se_dn / fitted)
-        if np.allclose(before, parameters, rtol=1e-10, atol=0):
+        if np.abs(fitted - before).max() <= _CONVERGED * fitted.max():
             break
     return parameters, fitted, relative
 
@@ -325,8 +396,8 @@ def _deviance(points: Points, basis: Callable[[Floats], Floats]) -> float:
     return float((2 * (ratio - 1 - np.log(ratio)) / relative**2).sum())
 
 
-def _line(points: Points, scale: float, black_se_dn: float) -> Line:
-    """Return the line through points, its errors scaled, the black level's error included."""
+def _line(points: Points, black_se_dn: float) -> Line:
+    """Return the line through points, the black level's error included."""
     design = _affine(points.x_dn)
     parameters, fitted, relative = _solve(points, design)
     weight = 1 / (fitted * relative) ** 2
@@ -335,7 +406,7 @@ def _line(points: Points, scale: float, black_se_dn: float) -> Line:
     inverse = np.linalg.inv(normal / np.outer(size, size)) / np.outer(size, size)
     # x moves with the black level, the fit with x.
     moved = -inverse @ (design.T @ (weight * parameters[0] * points.black_share))
-    covariance = inverse * scale**2 + np.outer(moved, moved) * black_se_dn**2
+    covariance = inverse + np.outer(moved, moved) * black_se_dn**2
     return Line(float(parameters[0]), float(parameters[1]), _pair(covariance))
 
 

@@ -49,6 +49,8 @@ class LevelStatistics:
         Share of samples at code 0 and at the white level or above.
     fixed_dn2, fixed_se_dn2
         Spatial variance of the mean frame less what temporal noise leaves in it.
+    repeated_frames
+        Number of frames that equal the one before bit for bit.
     """
 
     exposure: str
@@ -72,6 +74,7 @@ class LevelStatistics:
     clipped_high: float
     fixed_dn2: float
     fixed_se_dn2: float
+    repeated_frames: int
 
     @property
     def pixels(self) -> int:
@@ -90,6 +93,7 @@ class _Sums:
     squares: Ints  # (2, C)
     clipped: Ints  # (2, 2, C): low, high
     pairs: list[tuple[Ints, Ints, Floats]]  # per pair (2, C): d, d^2, d^4
+    repeats: int = 0
 
 
 def expose_statistics(recording: Recorded, exposure: Any) -> list[LevelStatistics]:
@@ -97,12 +101,16 @@ def expose_statistics(recording: Recorded, exposure: Any) -> list[LevelStatistic
     white = int(recording.sensor.white_level)
     sums: _Sums | None = None
     previous: NDArray[np.uint16] | None = None
-    count = 0
-    for frame in recording.frames(exposure):
+    for count, frame in enumerate(recording.frames(exposure)):
         if sums is None:
             sums = _begin(frame)
-        row, column = np.empty((frame.shape[0], 2), np.int64), np.zeros((2, frame.shape[1]), np.int64)
-        _add_frame(frame, sums.reference, white, sums.total, row, column, sums.squares, sums.clipped)
+        row, column = (
+            np.empty((frame.shape[0], 2), np.int64),
+            np.zeros((2, frame.shape[1]), np.int64),
+        )
+        _add_frame(
+            frame, sums.reference, white, sums.total, row, column, sums.squares, sums.clipped
+        )
         sums.rows.append(row)
         sums.columns.append(column)
         if previous is not None and count % 2:
@@ -110,8 +118,9 @@ def expose_statistics(recording: Recorded, exposure: Any) -> list[LevelStatistic
             d1, d2, d4 = np.zeros(shape, np.int64), np.zeros(shape, np.int64), np.zeros(shape)
             _add_pair(frame, previous, d1, d2, d4)
             sums.pairs.append((d1, d2, d4))
+        if previous is not None and np.array_equal(frame, previous):
+            sums.repeats += 1
         previous = frame
-        count += 1
     if sums is None:
         return []
     pattern = np.zeros((2, sums.total.shape[1]), np.int64)
@@ -232,7 +241,6 @@ def _channel(
     variance, variance_se, kurtosis = _variance(temporal, pairs, n, frames)
     mean_total = int(row.sum())
     noise = temporal.row + temporal.column - temporal.pixel if frames > 1 else np.nan
-    left = (temporal.pixel if frames > 1 else np.nan) / frames
     spatial = (int(picked(pattern)) - mean_total**2 / n) / frames**2 / max(n - 1, 1)
     light = exposure.light
     low, high = picked(sums.clipped)
@@ -256,8 +264,9 @@ def _channel(
         kurtosis=kurtosis,
         clipped_low=float(low) / (n * frames),
         clipped_high=float(high) / (n * frames),
-        fixed_dn2=spatial - left,
-        fixed_se_dn2=spatial * np.sqrt(2 / max(n - 1, 1)),
+        fixed_dn2=spatial - variance / frames,
+        fixed_se_dn2=float(spatial * np.sqrt(2 / max(n - 1, 1))),
+        repeated_frames=sums.repeats,
     )
 
 

@@ -13,13 +13,14 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, Stage
+from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, ReadOut, Stage
 
 __all__ = [
     "Effect",
     "Exposure",
     "Image",
     "OperatingPoint",
+    "ReadOut",
     "Stage",
     "any_effect",
     "registry",

@@ -21,7 +21,8 @@ class Prnu(Effect):
 
     stage: ClassVar[Stage] = Stage.LIGHT
     reference: ClassVar[str] = "EMVA Standard 1288, release 3.1, section 4"
-    measures: ClassVar[frozenset[str]] = frozenset({"fixed_pattern_variance"})
+    measures: ClassVar[frozenset[str]] = frozenset({"fixed_pixel_variance", "variance_spread"})
+    confounders: ClassVar[str] = "dsnu stays as the signal grows; shading is smooth."
 
     def apply(self, image: Image, exposure: Exposure) -> Image:
         """Multiply each pixel by its gain."""
@@ -29,5 +30,9 @@ class Prnu(Effect):
         return image * (np.float32(1) + np.float32(self.sigma_percent / 100) * gains)
 
     def contributions(self, point: OperatingPoint) -> Mapping[str, float]:
-        """Return (sigma S)^2 for the variance of the fixed pattern."""
-        return {"fixed_pattern_variance": (self.sigma_percent / 100 * point.signal_dn) ** 2}
+        """Return (sigma S)^2 for the fixed pixel variance, its share for the shot variance."""
+        spread = self.sigma_percent / 100
+        return {
+            "fixed_pixel_variance": (spread * point.signal_dn) ** 2,
+            "variance_spread": (spread * point.shot_variance_dn2 / point.variance_dn2) ** 2,
+        }

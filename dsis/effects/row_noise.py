@@ -22,6 +22,10 @@ class RowNoise(Effect):
     stage: ClassVar[Stage] = Stage.READ_OUT
     reference: ClassVar[str] = "Wei et al., A physics-based noise formation model (ELD), CVPR 2020"
     measures: ClassVar[frozenset[str]] = frozenset({"row_variance"})
+    confounders: ClassVar[str] = (
+        "line_flicker grows with the signal and has one frequency; pink_noise correlates "
+        "neighbouring rows."
+    )
 
     def apply(self, image: Image, exposure: Exposure) -> Image:
         """Add the offset of each row."""
@@ -48,6 +52,7 @@ class ColumnNoise(Effect):
     stage: ClassVar[Stage] = Stage.READ_OUT
     reference: ClassVar[str] = "Wei et al., A physics-based noise formation model (ELD), CVPR 2020"
     measures: ClassVar[frozenset[str]] = frozenset({"column_variance"})
+    confounders: ClassVar[str] = "column_fpn is the same in all frames: a mean frame shows it."
 
     def apply(self, image: Image, exposure: Exposure) -> Image:
         """Add the offset of each column."""

@@ -11,13 +11,12 @@ from dsis.compiled import ROWS_PER_BLOCK, kernel, over_rows
 
 Frame = NDArray[np.float32]
 Sums = NDArray[np.float64]
+FiveSums = tuple[Sums, Sums, Sums, Sums, Sums]
 
 _BLOCK = ROWS_PER_BLOCK
 
 
-def count_codes(
-    frame: Frame, histogram: NDArray[np.int64], lowest: int
-) -> bool:
+def count_codes(frame: Frame, histogram: NDArray[np.int64], lowest: int) -> bool:
     """Add the frame's codes to `histogram` (row parity, column parity, code - lowest).
 
     Returns False, with the histogram in an undefined state, where a value is no whole code or lies
@@ -56,7 +55,7 @@ def add_moments(
     column_offset: Sums,
     previous: Frame,
     centred: Frame,
-    power_sums: tuple[Sums, Sums, Sums, Sums, Sums],
+    power_sums: FiveSums,
     threads: int,
 ) -> None:
     """Write u = difference - offsets to `centred`; add u, u^2, u^3, u^4, u previous to the sums.
@@ -84,7 +83,8 @@ def lag_products(image: Frame, lags: NDArray[np.int64], threads: int) -> Sums:
         _lag_products(image, lags, first, last, sums)
 
     over_rows(block, rows, threads)
-    return sums.sum(0)
+    total: Sums = sums.sum(0)
+    return total
 
 
 @kernel
@@ -103,9 +103,7 @@ def _count_codes(frame: Frame, histogram: NDArray[np.int64], lowest: int) -> boo
 
 
 @kernel
-def _line_sums(
-    difference: Frame, first: int, last: int, by_row: Sums, by_column: Sums
-) -> None:
+def _line_sums(difference: Frame, first: int, last: int, by_row: Sums, by_column: Sums) -> None:
     columns = difference.shape[1]
     for y in range(first, last):
         line, into = difference[y], by_column[y // _BLOCK, y & 1]
@@ -121,9 +119,7 @@ def _line_sums(
 
 
 @kernel
-def _pair_squares(
-    difference: Frame, previous: Frame, first: int, last: int, by_row: Sums
-) -> None:
+def _pair_squares(difference: Frame, previous: Frame, first: int, last: int, by_row: Sums) -> None:
     columns = difference.shape[1]
     for y in range(first, last):
         sums = np.zeros(2)
@@ -167,9 +163,7 @@ def _add_moments(
 
 
 @kernel
-def _lag_products(
-    image: Frame, lags: NDArray[np.int64], first: int, last: int, sums: Sums
-) -> None:
+def _lag_products(image: Frame, lags: NDArray[np.int64], first: int, last: int, sums: Sums) -> None:
     rows, columns = image.shape
     # Sums by column vectorise; float32 holds 32 products of one sign to 1e-6.
     by_column = np.empty((2, columns), np.float32)
@@ -198,3 +192,17 @@ def add_power(transform: NDArray[np.complex64], power: Sums) -> None:
         for x in range(columns):
             re, im = np.float64(line[x].real), np.float64(line[x].imag)
             into[x] += re * re + im * im
+
+
+@kernel
+def project(image: NDArray[np.floating], basis: Sums) -> Sums:
+    """Return sums over rows of basis(row, degree) image(row, column): (degree, column)."""
+    rows, columns = image.shape
+    out = np.zeros((basis.shape[1], columns))
+    for y in range(rows):
+        line = image[y]
+        for degree in range(basis.shape[1]):
+            weight, into = basis[y, degree], out[degree]
+            for x in range(columns):
+                into[x] += weight * line[x]
+    return out

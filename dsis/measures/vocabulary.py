@@ -1,4 +1,17 @@
-"""The scalar measures: names and units, shared by effects, tests and diagnosis."""
+"""The scalar measures: names and units, shared by effects, tests and diagnosis.
+
+What one measure can say depends on others:
+
+* Below about 0.5 DN of pixel noise rounding makes variances depend on where the mean lies between
+  two codes: the nulls of variance_spread, skewness, kurtosis, frame_correlation and of the fixed
+  variances do not hold there. code_imbalance is unknown below 2 code steps of noise.
+* Correlated neighbours make row and column means scatter more: row_variance gains the sum of the
+  correlations along the row over its length (times the pixel variance), column_variance likewise,
+  and spectral_peak rises with the low end of the spectrum.
+* On a mosaic each channel is measured in its own plane: what alternates from pixel to pixel of the
+  mosaic is common to a channel's pixels, and shows in its frame or line means.
+* With two frames skewness and frame_correlation are unknown.
+"""
 
 CORRELATION_LAGS = {
     "correlation_0_1": (0, 1),

@@ -11,6 +11,7 @@ There is one reference: noise-free and never mosaicked. Level n is n stops of un
 signal is divided by 2^n before the noise and multiplied back after.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -64,6 +65,8 @@ class Rendering:
         From scene light to display.
     seed
         Seed of all noise of the test.
+    exposure_time_s
+        Exposure time of a frame, s.
     threads
         Threads inside one frame.
     """
@@ -71,6 +74,7 @@ class Rendering:
     camera: Camera
     transform: DisplayTransform
     seed: int
+    exposure_time_s: float
     threads: int = 1
 
     def display(self, raw: Frame) -> Frame:
@@ -99,13 +103,34 @@ class Rendering:
         """Return the reference of a clean raw frame: clipped to what the display can show."""
         return np.clip(self.display(clean), np.float32(0), np.float32(1))
 
-    def noisy_raw(self, clean: Frame, content: str, level: int, frame: int) -> Frame:
-        """Return whole codes less black at `level`, multiplied back: the raw data of `sd_rgb`."""
+    def noisy_raw(
+        self,
+        clean: Frame,
+        content: str,
+        level: int,
+        frame: int,
+        earlier: Callable[[int], Frame] | None = None,
+    ) -> Frame:
+        """Return whole codes less black at `level`, multiplied back: the raw data of `sd_rgb`.
+
+        `earlier(k)` gives the clean signal k frames before, for effects that remember; without it
+        the scene stands still.
+        """
         stops = np.float32(2.0**level)
         grid = PixelGrid(clean.shape[0], clean.shape[1])
         temporal = Draw(self.seed, ("content", content, f"level {level}"))
         sensor = Draw(self.seed, ("sensor",))
-        raw = self.camera.expose(clean / stops, temporal, sensor, frame, grid, threads=self.threads)
+        before = None if earlier is None else lambda back: earlier(back) / stops
+        raw = self.camera.expose(
+            clean / stops,
+            temporal,
+            sensor,
+            frame,
+            grid,
+            exposure_time_s=self.exposure_time_s,
+            earlier_clean=before,
+            threads=self.threads,
+        )
         return raw * stops
 
     def noisy_display(

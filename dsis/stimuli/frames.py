@@ -1,6 +1,7 @@
 """One frame of a content in all its conditions."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,7 +35,9 @@ class FrameMaker:
     def of(cls, test: Test, job: Job) -> "FrameMaker":
         """Return the maker of a content of a test; renders or reads its source, solves sigma."""
         transform = DisplayTransform(test.spec.color)
-        rendering = Rendering(test.camera, transform, test.spec.seed)
+        # Half of the frame time, the shutter of 180 degrees that is cinema's rule.
+        exposure_time_s = 0.5 / test.spec.sequence.fps
+        rendering = Rendering(test.camera, transform, test.spec.seed, exposure_time_s)
         source = source_of(job.content, test, transform)
         levels = sorted({c.level for c in job.conditions if c.noise == "awgn"})
         solved = {
@@ -48,7 +51,7 @@ class FrameMaker:
     def with_camera(self, camera: Camera) -> "FrameMaker":
         """Return the maker of the same content and noise fields, seen by another camera."""
         make = self.rendering
-        rendering = Rendering(camera, make.transform, make.seed, make.threads)
+        rendering = replace(make, camera=camera)
         return FrameMaker(self.job, rendering, self.source, self.sigma)
 
     def frame(self, frame: int) -> Iterator[tuple[str, Frame, Frame]]:
@@ -70,7 +73,7 @@ class FrameMaker:
         for c in job.conditions:
             if (c.noise, c.level) not in noisy:
                 noisy[c.noise, c.level] = (
-                    make.noisy_raw(clean, job.name, c.level, frame)
+                    make.noisy_raw(clean, job.name, c.level, frame, self._clean_before(frame))
                     if c.noise == "sd"
                     else make.noisy_display(
                         reference, self.sigma[c.level], job.name, c.level, frame
@@ -78,6 +81,11 @@ class FrameMaker:
                 )
             display = make.shown(c.noise, noisy[c.noise, c.level], c.demosaic)
             yield c.stimulus(job.name), display, clean_dem.get((c.noise, c.demosaic), reference)
+
+    def _clean_before(self, frame: int) -> Callable[[int], Frame]:
+        """Return what gives the clean raw signal k frames before; before the first all is still."""
+        camera = self.rendering.camera
+        return lambda back: camera.clean_raw(self.source.light(max(0, frame - back)))
 
     def figure_frames(self, number: int) -> dict[tuple[str, int], dict[str, Frame]]:
         """Return one frame of all clips, {(noise, level): {"reference" or demosaic: frame}}."""

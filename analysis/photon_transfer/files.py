@@ -1,0 +1,129 @@
+"""What a fit leaves on disk: camera.toml, its figures, all numbers as JSON, a table to read."""
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, is_dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tomli_w
+
+from analysis.figures_camera import draw_distribution, draw_photon_transfer
+from analysis.photon_transfer.fit import Fit
+from analysis.photon_transfer.quantity import Quantity
+from dsis.camera import camera_values
+from dsis.errors import InputError
+
+SCHEMA = "dsis-camera-fit/1"
+
+
+def write_fit(fit: Fit, out_toml: Path, origin: str = "") -> tuple[Path, ...]:
+    """Write camera.toml and, beside it, -ptc.svg/.png, -distribution.png and -fit.json.
+
+    Parameters
+    ----------
+    fit
+        The fit; raises `InputError` where it is no possible camera.
+    out_toml
+        Where the camera model goes; the other names start with its stem.
+    origin
+        A comment that says what was recorded: source, copyright, licence.
+
+    Returns
+    -------
+    The files written.
+    """
+    if out_toml.suffix != ".toml":
+        raise InputError.of(out_toml, "", "must end in .toml: the camera model is written to it")
+    text = camera_text(fit, origin)  # first: where it fails, nothing is written
+    out_toml.parent.mkdir(parents=True, exist_ok=True)
+
+    def beside(ending: str) -> Path:
+        return out_toml.with_name(out_toml.stem + ending)
+
+    numbers = beside("-fit.json")
+    numbers.write_text(json.dumps(fit_values(fit), indent=1) + "\n", encoding="utf-8")
+    written = [numbers, *draw_photon_transfer(fit, beside("-ptc"))]
+    if fit.distribution is not None:
+        written.append(draw_distribution(fit, fit.distribution, beside("-distribution.png")))
+    unfinished = beside(".toml.partial")
+    unfinished.write_text(text, encoding="utf-8")
+    unfinished.replace(out_toml)
+    return (out_toml, *written)
+
+
+def camera_text(fit: Fit, origin: str = "") -> str:
+    """Return camera.toml: comments on what limits the numbers, then the model."""
+    comments = [line for line in origin.splitlines() if line]
+    comments.append(
+        "Fitted by photon transfer; slopes in DN, intercepts in DN^2, rounding taken off."
+    )
+    if fit.black_se_dn is not None:
+        comments.append(f"black_level = {fit.black_dn:.6g} +- {fit.black_se_dn:.2g} DN")
+    for number, switch in enumerate(fit.segments.switches):
+        comments.append(
+            f"segment {number} ends between {switch.low_dn:.6g} and {switch.high_dn:.6g} DN "
+            "(95 %); upper_dn is the middle"
+        )
+    comments += fit.remarks
+    head = "".join(f"# {line}\n" for line in comments)
+    return head + tomli_w.dumps(camera_values(fit.camera))
+
+
+def fit_values(fit: Fit) -> dict[str, Any]:
+    """Return every number of a fit as plain values, as JSON holds them; nan becomes null."""
+    values = asdict(fit)
+    values["segments"]["error_of_intervals"] = "standard errors; switches: 95 % intervals"
+    plain: dict[str, Any] = {"schema": SCHEMA, **_plain(values)}
+    return plain
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, np.ndarray):
+        return _plain(value.tolist())
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    if isinstance(value, np.generic):
+        return _plain(value.item())
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return asdict(value) if is_dataclass(value) and not isinstance(value, type) else value
+
+
+def summary(fit: Fit) -> str:
+    """Return the fit as Markdown: model, quantities, channels, remarks."""
+    black = "nominal" if fit.black_se_dn is None else f"{fit.black_se_dn:.2g}"
+    lines = [f"# {fit.name}", "", "| segment | from DN | slope DN | intercept DN^2 |"]
+    lines.append("|---|---|---|---|")
+    starts = ["0"] + [f"{s.low_dn:.5g} .. {s.high_dn:.5g}" for s in fit.segments.switches]
+    for number, (start, line) in enumerate(zip(starts, fit.segments.lines, strict=True)):
+        slope = f"{line.slope_dn:.5g} +- {line.slope_se_dn:.2g}"
+        lines.append(
+            f"| {number} | {start} | {slope} | "
+            f"{line.intercept_dn2:.5g} +- {line.intercept_se_dn2:.2g} |"
+        )
+    lines += ["", f"Black level {fit.black_dn:.6g} DN (standard error {black}). "]
+    misfit = f"{fit.segments.deviance:.4g} / {fit.segments.dof}"
+    lines[-1] += f"Misfit: deviance / dof = {misfit}."
+    if math.isfinite(fit.homogeneity_p):
+        lines[-1] += f" Channels alike: p = {fit.homogeneity_p:.2g}."
+    lines += ["", "## The model", "", *_table(fit.quantities)]
+    for name, channel in fit.channels.items():
+        if channel.figures:
+            lines += ["", f"## EMVA 1288, {name}", "", *_table(channel.figures)]
+    if fit.remarks:
+        lines += ["", "## Remarks", "", *(f"- {remark}" for remark in fit.remarks)]
+    return "\n".join(lines) + "\n"
+
+
+def _table(quantities: Sequence[Quantity]) -> list[str]:
+    rows = ["| quantity | value | standard error | unit | definition |", "|---|---|---|---|---|"]
+    for q in quantities:
+        value = "-" if q.value is None else f"{q.value:.5g}"
+        error = "-" if q.standard_error is None else f"{q.standard_error:.2g}"
+        rows.append(f"| {q.name} | {value} | {error} | {q.unit} | {q.means} |")
+    return rows

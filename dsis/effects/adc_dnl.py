@@ -1,0 +1,91 @@
+"""Differential non-linearity of the converter: unequal code widths."""
+
+from collections.abc import Mapping
+from functools import lru_cache
+from typing import Annotated, ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+from scipy.special import gammaincinv
+
+from dsis.cfa import Cfa
+from dsis.compiled import kernel
+from dsis.draw import Draw
+from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, Stage
+from dsis.grid import PixelGrid
+
+BLOCK_CODES = 64
+
+
+class AdcDnl(Effect):
+    """The width of each code is its own, fixed, 1 LSB on average; the code follows the edges.
+
+    c = k where edge(k) <= v + black < edge(k + 1). Widths are random with the given standard
+    deviation; each block of 64 adds up to 64 LSB, so that the integral non-linearity stays within a
+    few LSB, and codes keep their order.
+    """
+
+    kind: Literal["adc_dnl"] = "adc_dnl"
+    rms_lsb: Annotated[float, Field(ge=0, le=2, examples=[0.3])]
+
+    stage: ClassVar[Stage] = Stage.CODE
+    rank: ClassVar[int] = 50
+    reference: ClassVar[str] = "IEEE Std 1241-2010, Terminology and test methods for ADCs"
+    measures: ClassVar[frozenset[str]] = frozenset(
+        {"level", "pixel_variance", "skewness", "kurtosis", "code_spacing", "code_imbalance"}
+    )
+    confounders: ClassVar[str] = (
+        "Light texture moves every level differently; quantisation leaves codes out altogether."
+    )
+
+    def apply(self, image: Image, exposure: Exposure) -> Image:
+        """Return whole codes less black, by the converter's edges."""
+        if not self.rms_lsb:
+            return image
+        black = np.float32(exposure.read_out.black_level_dn)
+        edges = code_edges(exposure.sensor, int(exposure.read_out.white_level_dn), self.rms_lsb)
+        out = np.empty_like(image, order="C")
+        _convert(np.ascontiguousarray(image).reshape(-1), black, edges, out.reshape(-1))
+        return out
+
+    def contributions(self, point: OperatingPoint) -> Mapping[str, float]:
+        """State nothing: everything depends on which codes the noise covers."""
+        del point
+        return {}
+
+
+@lru_cache(maxsize=8)
+def code_edges(sensor: Draw, white_code: int, rms_lsb: float) -> NDArray[np.float64]:
+    """Return the lower edge of each code 0..white_code, and last the upper one: LSB, ascending.
+
+    Widths are 64 times a symmetric Dirichlet vector whose components have the standard deviation
+    asked for: normalised gamma variates.
+    """
+    blocks = white_code // BLOCK_CODES + 1
+    line = PixelGrid(1, blocks * BLOCK_CODES, Cfa.MONO)
+    shape = ((BLOCK_CODES - 1) / rms_lsb**2 - 1) / BLOCK_CODES
+    gammas = gammaincinv(shape, sensor.uniform("adc_dnl", line)[0].astype(np.float64))
+    parts = gammas.reshape(blocks, BLOCK_CODES)
+    widths = (BLOCK_CODES * parts / parts.sum(1, keepdims=True)).reshape(-1)
+    edges = np.concatenate(([0.0], np.cumsum(widths))) - 0.5
+    edges.flags.writeable = False
+    return edges
+
+
+@kernel
+def _convert(
+    signal: NDArray[np.float32],
+    black: np.float32,
+    edges: NDArray[np.float64],
+    out: NDArray[np.float32],
+) -> None:
+    last = edges.size - 2
+    for i in range(signal.size):
+        v = signal[i] + black
+        code = min(max(int(np.rint(v)), 0), last)
+        while code > 0 and v < edges[code]:
+            code -= 1
+        while code < last and v >= edges[code + 1]:
+            code += 1
+        out[i] = np.float32(code) - black

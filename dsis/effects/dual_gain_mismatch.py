@@ -1,0 +1,48 @@
+"""Dual-gain mismatch: the gains of two read-out paths disagree."""
+
+from collections.abc import Mapping
+from typing import Annotated, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field
+
+from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, ReadOut, Stage
+
+
+class DualGainMismatch(Effect):
+    """Above the switch between read-out segments the gain is off: the mean steps there.
+
+    v' = v (1 + e) where the expected signal selects any segment but the first, which sets the
+    scale; the noise of that path is scaled with it.
+    """
+
+    kind: Literal["dual_gain_mismatch"] = "dual_gain_mismatch"
+    gain_error_percent: Annotated[float, Field(gt=-50, lt=50, examples=[1.0])]
+
+    stage: ClassVar[Stage] = Stage.READ_OUT
+    rank: ClassVar[int] = -50  # the path's amplifier scales its read noise; lines come later
+    reference: ClassVar[str] = (
+        "Seybold et al., CIC 22, 2014, section 'Camera noise characteristics' (dual-gain read-out)"
+    )
+    measures: ClassVar[frozenset[str]] = frozenset({"level", "pixel_variance"})
+    confounders: ClassVar[str] = (
+        "nonlinearity is smooth; a wrong switch level moves the step of the variance and leaves "
+        "the mean straight."
+    )
+
+    def apply(self, image: Image, exposure: Exposure) -> Image:
+        """Scale what the upper paths read."""
+        switch = exposure.read_out.segments.lower_dn[1]
+        gain = np.float32(1 + self.gain_error_percent / 100)
+        return np.where(exposure.expected_dn >= switch, image * gain, image)
+
+    def unfit_for(self, read_out: ReadOut) -> str:
+        """Refuse a camera with one read-out path."""
+        single = read_out.segments.lower_dn.size < 2
+        return "needs a second [[noise.segment]]" if single else ""
+
+    def contributions(self, point: OperatingPoint) -> Mapping[str, float]:
+        """Return e S and ((1 + e)^2 - 1) V above the switch, nothing below."""
+        e = self.gain_error_percent / 100 if point.segment else 0.0
+        noise = point.shot_variance_dn2 + point.read_variance_dn2
+        return {"level": e * point.signal_dn, "pixel_variance": ((1 + e) ** 2 - 1) * noise}

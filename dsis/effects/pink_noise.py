@@ -1,0 +1,94 @@
+"""Pink noise: 1/f noise of the amplifier along the order of read-out."""
+
+from collections.abc import Mapping
+from typing import Annotated, ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+from scipy import fft
+
+from dsis.cfa import Cfa
+from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, Stage
+from dsis.grid import PixelGrid
+
+
+class PinkNoise(Effect):
+    """Noise whose power falls as 1/f along the read-out, row after row, sample after sample.
+
+    v(t, i) = S(i) + b(t, i), i = y W + x: a Gaussian series of standard deviation sigma and power
+    proportional to 1/f from two frames' length down to two samples, new in each frame. All sites
+    of a mosaic are one series; the three planes share it.
+    """
+
+    kind: Literal["pink_noise"] = "pink_noise"
+    sigma_dn: Annotated[float, Field(ge=0, examples=[1.5])]
+
+    stage: ClassVar[Stage] = Stage.READ_OUT
+    reference: ClassVar[str] = (
+        "Rauscher, Teledyne H1RG, H2RG, and H4RG noise generator, PASP 127, 2015"
+    )
+    measures: ClassVar[frozenset[str]] = frozenset(
+        {
+            "pixel_variance",
+            "row_variance",
+            "column_variance",
+            "frame_variance",
+            "correlation_0_1",
+            "correlation_1_0",
+            "correlation_1_1",
+            "correlation_0_2",
+            "correlation_2_0",
+            "spectral_peak",
+            "row_spectrum_peak",
+        }
+    )
+    confounders: ClassVar[str] = (
+        "row_noise is white from row to row and constant along it; crosstalk falls off after one "
+        "pixel, pink noise as the logarithm of the lag."
+    )
+
+    def apply(self, image: Image, exposure: Exposure) -> Image:
+        """Add the series in the order of read-out."""
+        grid = exposure.grid
+        rows, columns = grid.sensor_shape
+        length = _length(rows, columns)
+        # Bin k of the spectrum is drawn at row k // columns: real part left, imaginary part right.
+        lines = PixelGrid(-(-(length // 2 + 1) // columns), 2 * columns, Cfa.MONO)
+        white = exposure.temporal.normal("pink_noise", lines, exposure.frame, exposure.threads)
+        bins = white.reshape(-1).view(np.complex64)[: length // 2 + 1]
+        # Two standard normal parts of amplitude a add 4 a^2 / length^2 to the variance.
+        spectrum = bins * (np.sqrt(_power(length)) * length / 2).astype(np.float32)
+        series = np.float32(self.sigma_dn) * fft.irfft(spectrum, length)[: rows * columns]
+        first, left = grid.first_row, grid.first_column
+        part = series.reshape(rows, columns)[first : first + grid.rows, left : left + grid.columns]
+        made: Image = image + part.reshape(*part.shape, *(1,) * (image.ndim - 2))
+        return made
+
+    def contributions(self, point: OperatingPoint) -> Mapping[str, float]:
+        """Return what the series' covariance makes of pixels, lines and frames."""
+        h, w = point.rows, point.columns
+        length = _length(h, w)
+        covariance = fft.irfft(_power(length), length) * length / 2 * self.sigma_dn**2
+        x, y = np.arange(1 - w, w), np.arange(1 - h, h)
+        in_rows, in_columns = (w - np.abs(x)) / w**2, (h - np.abs(y)) / h**2
+        row = float((in_rows * covariance[x]).sum())
+        column = float((in_columns * covariance[y * w]).sum())
+        frame = sum(
+            float(v * (in_rows * covariance[k * w + x]).sum())
+            for k, v in zip(y, in_columns, strict=True)
+        )
+        return point.components(float(covariance[0]), row, column, frame)
+
+
+def _length(rows: int, columns: int) -> int:
+    """Return the samples of the series: two frames, so that its ends do not meet."""
+    return 2 * int(fft.next_fast_len(rows * columns, real=True))
+
+
+def _power(length: int) -> NDArray[np.float64]:
+    """Return the variance in each bin of a series of variance 1: 1/f, none in the constant."""
+    power = np.zeros(length // 2 + 1)
+    power[1:-1] = 1 / np.arange(1, length // 2)
+    share: NDArray[np.float64] = power / power.sum()
+    return share

@@ -1,0 +1,72 @@
+"""Read-out memory: a sample remembers what was read a few samples earlier."""
+
+from collections.abc import Mapping
+from typing import Annotated, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field
+
+from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, Stage
+
+
+class ReadoutMemory(Effect):
+    """The noise of the sample read `lag_pixels` earlier along a line is seen once more.
+
+    v'(i) = v(i) + f n(i - lag), n = v - S the deviation from the expected signal, which the clamp,
+    the correlated double sampling or the converter bank has in common. A negative fraction takes
+    noise away. Correlation f / (1 + f^2) at that lag and at no other; the first samples of a line
+    have nothing to remember.
+    """
+
+    kind: Literal["readout_memory"] = "readout_memory"
+    fraction: Annotated[float, Field(gt=-1, lt=1, examples=[0.1])]
+    lag_pixels: Annotated[int, Field(ge=1, examples=[2])]
+    along: Literal["rows", "columns"] = "rows"
+
+    stage: ClassVar[Stage] = Stage.READ_OUT
+    rank: ClassVar[int] = 50
+    reference: ClassVar[str] = (
+        "White, Lampe, Blaha & Mack, Characterization of surface channel CCD image arrays at low "
+        "light levels, IEEE J. Solid-State Circuits 9, 1974"
+    )
+    measures: ClassVar[frozenset[str]] = frozenset(
+        {
+            "pixel_variance",
+            "row_variance",
+            "column_variance",
+            "frame_variance",
+            "correlation_0_1",
+            "correlation_1_0",
+            "correlation_1_1",
+            "correlation_0_2",
+            "correlation_2_0",
+            "spectral_peak",
+            "row_spectrum_peak",
+        }
+    )
+    confounders: ClassVar[str] = (
+        "crosstalk acts on both sides, at lag 1 and on shot noise alone; row_noise is common to a "
+        "whole row."
+    )
+
+    def apply(self, image: Image, exposure: Exposure) -> Image:
+        """Add the remembered noise."""
+        made, noise = image.copy(), np.float32(self.fraction) * (image - exposure.expected_dn)
+        k = self.lag_pixels
+        if self.along == "rows":
+            made[:, k:] += noise[:, :-k]
+        else:
+            made[k:] += noise[:-k]
+        return made
+
+    def reach_pixels(self) -> int:
+        """Return how far away a pixel may matter."""
+        return self.lag_pixels
+
+    def contributions(self, point: OperatingPoint) -> Mapping[str, float]:
+        """Return f^2 V for the variance and f V for the covariance at the lag."""
+        v = point.shot_variance_dn2 + point.read_variance_dn2
+        f, k = self.fraction, self.lag_pixels
+        across = point.columns if self.along == "rows" else point.rows
+        lag = (0, k) if self.along == "rows" else (k, 0)
+        return point.coupled({(0, 0): v * f**2 * max(across - k, 0) / across, lag: v * f})

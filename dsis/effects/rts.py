@@ -1,0 +1,89 @@
+"""Random telegraph signal: some pixels jump between two levels."""
+
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+from scipy.special import ndtr, ndtri
+
+from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, Stage
+
+
+class Rts(Effect):
+    """A share of the pixels carries a trap that is empty or filled: two levels, equally long.
+
+    v(t, p) = S(p) + a(p) (b(t, p) - 1/2), a ~ Exp(amplitude) with probability q, else 0; b a Markov
+    chain of 0 and 1 that switches with probability w per frame: variance a^2 / 4, correlation
+    (1 - 2 w)^k over k frames.
+    """
+
+    kind: Literal["rts"] = "rts"
+    pixel_fraction: Annotated[float, Field(ge=0, le=0.5, examples=[0.05])]
+    amplitude_dn: Annotated[float, Field(ge=0, examples=[8.0])]
+    switch_probability: Annotated[float, Field(gt=0, le=0.5)] = 0.2
+
+    stage: ClassVar[Stage] = Stage.READ_OUT
+    reference: ClassVar[str] = (
+        "Wang, Rao, Mierop & Theuwissen, Random telegraph signal in CMOS image sensor pixels, IEDM "
+        "2006"
+    )
+    measures: ClassVar[frozenset[str]] = frozenset(
+        {
+            "pixel_variance",
+            "kurtosis",
+            "skewness",
+            "variance_spread",
+            "frame_correlation",
+            "fixed_pixel_variance",
+        }
+    )
+    confounders: ClassVar[str] = (
+        "read_noise_spread is Gaussian in each pixel and white in time; impulse does not return; "
+        "hot_pixels grow with time and do not jump."
+    )
+
+    def apply(self, image: Image, exposure: Exposure) -> Image:
+        """Add the state of each trap."""
+        if not self.pixel_fraction:
+            return image
+        deviates = exposure.sensor.normal("rts", exposure.grid, threads=exposure.threads)
+        places = np.nonzero(deviates < ndtri(self.pixel_fraction))
+        # Below the threshold the normal law's tail is uniform: it gives the height as well.
+        tail = ndtr(deviates[places].astype(np.float64)) / self.pixel_fraction
+        filled = self._filled(places, exposure)
+        made = image.copy()
+        made[places] -= self.amplitude_dn * np.log(tail) * (filled - 0.5)
+        return made
+
+    def _filled(self, places: tuple[NDArray[np.intp], ...], exposure: Exposure) -> Any:
+        """Return which traps are filled in the frame.
+
+        At each frame a trap forgets with probability 2 w and is drawn anew: so its state is that
+        of the last frame, counted back, at which it forgot. Frame 0 is drawn for all.
+        """
+        grid = exposure.grid
+        rows, columns = places[0] + grid.first_row, places[1] + grid.first_column
+        channels = places[2] if grid.cfa is None else grid.channels()[rows % 2, columns % 2, 0]
+        sites = np.stack([rows, columns, channels]).astype(np.int64)
+        filled, waiting = np.zeros(rows.size, bool), np.arange(rows.size)
+        for frame in range(exposure.frame, -1, -1):
+            forgets, state = exposure.temporal.scattered("rts states", sites[:, waiting], frame)
+            done = (forgets < 2 * self.switch_probability) | (frame == 0)
+            filled[waiting[done]] = state[done] < 0.5
+            waiting = waiting[~done]
+            if not waiting.size:
+                break
+        return filled
+
+    def contributions(self, point: OperatingPoint) -> Mapping[str, float]:
+        """Return q a^2 / 2; what correlated frames have in common goes to the fixed pattern."""
+        variance = self.pixel_fraction * self.amplitude_dn**2 / 2
+        rho, frames = 1 - 2 * self.switch_probability, point.frames
+        k = np.arange(1, frames)
+        pairs = 2 * float(((frames - k) * rho**k).sum()) / (frames * (frames - 1))
+        return {
+            "pixel_variance": variance * (1 - pairs),
+            "fixed_pixel_variance": variance * pairs,
+        }

@@ -1,0 +1,66 @@
+"""Tap mismatch: regions of the sensor are read by different amplifiers."""
+
+from collections.abc import Mapping
+from typing import Annotated, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field
+
+from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, Stage
+
+
+class TapMismatch(Effect):
+    """Two amplifiers of unequal gain read two regions of the sensor.
+
+    v = Q (1 - g / 2) in the first region and Q (1 + g / 2) in the second: the left and right or
+    upper and lower halves, or the even and odd columns or rows. Charge and its noise are scaled.
+    """
+
+    kind: Literal["tap_mismatch"] = "tap_mismatch"
+    gain_percent: Annotated[float, Field(gt=-100, lt=100, examples=[1.0])]
+    regions: Literal["left_right", "top_bottom", "even_odd_columns", "even_odd_rows"] = "left_right"
+
+    stage: ClassVar[Stage] = Stage.READ_OUT
+    rank: ClassVar[int] = -200  # before the read noise of the amplifier
+    reference: ClassVar[str] = "Janesick, Scientific Charge-Coupled Devices, SPIE Press, 2001"
+    measures: ClassVar[frozenset[str]] = frozenset(
+        {
+            "level",  # of a colour that one amplifier reads alone
+            "pixel_variance",
+            "variance_spread",
+            "kurtosis",
+            "fixed_pixel_variance",
+            "fixed_row_variance",
+            "fixed_column_variance",
+            "fixed_smooth_variance",
+            "fixed_correlation_0_1",
+            "fixed_correlation_1_0",
+        }
+    )
+    confounders: ClassVar[str] = (
+        "column_fpn and row_fpn do not grow with the signal; shading has no step at the seam."
+    )
+
+    def apply(self, image: Image, exposure: Exposure) -> Image:
+        """Scale each region by its amplifier's gain."""
+        grid = exposure.grid
+        (rows, columns), y, x = grid.sensor_shape, grid.row_numbers(), grid.column_numbers()
+        match self.regions:
+            case "left_right":
+                second = 2 * x >= columns
+            case "top_bottom":
+                second = 2 * y >= rows
+            case "even_odd_columns":
+                second = x % 2 == 1
+            case "even_odd_rows":
+                second = y % 2 == 1
+        half = self.gain_percent / 200
+        gain = np.where(second, np.float32(1 + half), np.float32(1 - half))
+        return image * gain
+
+    def contributions(self, point: OperatingPoint) -> Mapping[str, float]:
+        """Return what two gains make of shot noise, on average, where both read all colours."""
+        return {
+            "level": 0.0,
+            "pixel_variance": (self.gain_percent / 200) ** 2 * point.shot_variance_dn2,
+        }

@@ -14,7 +14,8 @@ from analysis.figures import ALARM, GREY, INK, STYLE
 
 if TYPE_CHECKING:  # the fit imports nothing that draws
     from analysis.photon_transfer.distribution import Distribution
-    from analysis.photon_transfer.fit import Fit, FittedLevel
+    from analysis.photon_transfer.fit import Fit
+    from analysis.photon_transfer.levels import FittedLevel
 
 CHANNEL_COLOURS = {
     "R": "#D55E00",

@@ -14,9 +14,10 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from analysis.photon_transfer import Fit, Line, fit_camera, fit_values, summary, write_fit
+from analysis.photon_transfer.lines import Points
 from analysis.photon_transfer.recorded import channel_names
 from analysis.photon_transfer.rounding import rounded_moments, unrounded
-from analysis.photon_transfer.segments import Points, fit_segments
+from analysis.photon_transfer.segments import fit_segments
 from analysis.photon_transfer.statistics import expose_statistics
 from dsis.camera import BaseNoise, Camera, Segment, read_camera
 from dsis.cfa import Cfa

@@ -5,9 +5,11 @@ table to read.
 """
 
 from analysis.photon_transfer.files import camera_text, fit_values, summary, write_fit
-from analysis.photon_transfer.fit import ChannelFit, Fit, FittedLevel, fit_camera
+from analysis.photon_transfer.fit import ChannelFit, Fit, fit_camera
+from analysis.photon_transfer.levels import FittedLevel
+from analysis.photon_transfer.lines import Line
 from analysis.photon_transfer.quantity import Quantity
-from analysis.photon_transfer.segments import Line, SegmentFit, Switch, fit_segments
+from analysis.photon_transfer.segments import SegmentFit, Switch, fit_segments
 
 __all__ = [
     "ChannelFit",

@@ -1,16 +1,12 @@
-"""Variance of raw noise against signal: straight pieces, how many, and where they meet.
+"""Variance of raw noise against signal: how many straight pieces, and where they meet.
 
-The points are gamma distributed about slope * x + intercept with known relative errors, so they are
-fitted by iterated weighted least squares with the model's own variance and compared by deviance.
 Where the levels scatter more than their errors allow, a further relative error common to all levels
 (Mandel & Paule's) makes up for it, so that no single level of many frames rules the fit.
 A further segment must pass two tests: the deviance that the best of all gaps gains must be too
 large for chance, chance being allowed every gap (Bonferroni's bound on the scanned switch), and the
 step must explain the points better than a smooth bend (a cubic, a kink) does, by Schwarz's
 penalty: a bent response is no read-out path. The switch is known as an interval between levels:
-all gaps whose deviance is within `GAP_DEVIANCE` of the best. Errors in x enter the weights with the
-slope; they are small:
-m^2 Var(mean) / Var(variance) = m^2 (T - 1) / (2 T v) for white noise.
+all gaps whose deviance is within `GAP_DEVIANCE` of the best.
 """
 
 from collections.abc import Callable
@@ -22,68 +18,23 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import optimize, stats
 
-Floats = NDArray[np.float64]
+from analysis.photon_transfer.lines import (
+    Floats,
+    Line,
+    Points,
+    affine,
+    cubic,
+    deviance_of,
+    kink,
+    line_through,
+    pair,
+)
 
 MAX_SEGMENTS = 4
 P_INVENTED = 0.006  # chance of one more segment where there is none
-P_SCALED = 0.01  # scatter rarer than this is real: errors are scaled by it
+P_SCALED = 0.01  # scatter rarer than this is real and widens the errors
 GAP_DEVIANCE = 7.4  # exp(-7.4 / 2) = 2.5 %: a gap so much worse is left out of the interval
 _GAP_ERRORS = 5.0  # levels closer than this many errors of the mean are one level
-_ITERATIONS = 12
-_CONVERGED = 1e-9
-
-
-@dataclass(frozen=True)
-class Points:
-    """Noise against signal, ascending in x; DN above black, DN^2, relative error of the variance.
-
-    `black_share` is the derivative of x with respect to the black level: -1 where x is a mean code
-    less black, 0 where x is known without it (darks).
-    """
-
-    x_dn: Floats
-    variance_dn2: Floats
-    relative_se: Floats
-    x_se_dn: Floats
-    channel: NDArray[np.str_]
-    black_share: Floats
-
-    @classmethod
-    def of(cls, **columns: NDArray[np.generic]) -> "Points":
-        """Return the points in ascending order of x."""
-        order = np.argsort(columns["x_dn"], kind="stable")
-        return cls(**{name: np.asarray(values)[order] for name, values in columns.items()})
-
-    def scattered(self, relative: float) -> "Points":
-        """Return the points with a further relative error of the variance."""
-        return replace(self, relative_se=np.hypot(self.relative_se, relative))
-
-    def part(self, keep: NDArray[np.bool_] | slice) -> "Points":
-        """Return some of the points."""
-        return Points(*(getattr(self, name)[keep] for name in self.__dataclass_fields__))
-
-
-@dataclass(frozen=True)
-class Line:
-    """variance = slope * x + intercept, with covariance of (slope, intercept)."""
-
-    slope_dn: float
-    intercept_dn2: float
-    covariance: tuple[tuple[float, float], tuple[float, float]]
-
-    @property
-    def slope_se_dn(self) -> float:
-        """Standard error of the slope, DN."""
-        return float(np.sqrt(self.covariance[0][0]))
-
-    @property
-    def intercept_se_dn2(self) -> float:
-        """Standard error of the intercept, DN^2."""
-        return float(np.sqrt(self.covariance[1][1]))
-
-    def variance_dn2(self, x_dn: Floats) -> Floats:
-        """Return the line at x."""
-        return self.slope_dn * x_dn + self.intercept_dn2
 
 
 @dataclass(frozen=True)
@@ -218,8 +169,8 @@ class _Search:
         x = self.points.x_dn
         if x.size < 5:
             return np.nan
-        bends = [_cubic, *(_kink(float(x[start])) for start in self.starts[1:-1])]
-        return min(_deviance(self.points, bend) for bend in bends)
+        bends = [cubic, *(kink(float(x[start])) for start in self.starts[1:-1])]
+        return min(deviance_of(self.points, bend) for bend in bends)
 
     def range(self, first: int, last: int) -> slice:
         """Return the points of levels first..last-1."""
@@ -227,7 +178,7 @@ class _Search:
         return slice(int(ends[first]), int(ends[last]))
 
     def _cost(self, first: int, last: int) -> float:
-        return _deviance(self.points.part(self.range(first, last)), _affine)
+        return deviance_of(self.points.part(self.range(first, last)), affine)
 
     def total(self, cuts: tuple[int, ...]) -> float:
         """Return the deviance of pieces that begin at the levels `cuts`."""
@@ -288,7 +239,7 @@ def _result(search: _Search, cuts: tuple[int, ...], black_se_dn: float) -> Segme
     found = [search.interval(cuts, which) for which in range(len(cuts))]
     lines = []
     for piece, (first, last) in enumerate(pairwise(bounds)):
-        line = _line(points.part(search.range(first, last)), black_se_dn)
+        line = line_through(points.part(search.range(first, last)), black_se_dn)
         for at, end in ((piece - 1, 0), (piece, 1)):
             if 0 <= at < len(cuts):
                 line = _averaged(search, line, (first, last), found[at][1], end)
@@ -320,8 +271,8 @@ def lines_between(
         if part.x_dn.size < 2 or len(_Search(part).starts) < 2:
             lines.append(None)
             continue
-        lines.append(_line(part, 0.0))
-        deviance += _deviance(part, _affine)
+        lines.append(line_through(part, 0.0))
+        deviance += deviance_of(part, affine)
         parameters += 2
     return tuple(lines), deviance, parameters
 
@@ -339,7 +290,7 @@ def _averaged(
         first, last = (int(cut), bounds[1]) if end == 0 else (bounds[0], int(cut))
         if last - first < 2 or (first, last) == bounds:
             continue
-        other = _line(search.points.part(search.range(first, last)), 0.0)
+        other = line_through(search.points.part(search.range(first, last)), 0.0)
         step = np.array([other.slope_dn - line.slope_dn, other.intercept_dn2 - line.intercept_dn2])
         spread += weights[cut] * (
             np.outer(step, step) + np.array(other.covariance) - np.array(line.covariance)
@@ -347,69 +298,4 @@ def _averaged(
     covariance = np.array(line.covariance) + spread
     for i in (0, 1):  # an error never shrinks for want of knowing the end
         covariance[i, i] = max(covariance[i, i], line.covariance[i][i])
-    return Line(line.slope_dn, line.intercept_dn2, _pair(covariance))
-
-
-def _affine(x: Floats) -> Floats:
-    return np.stack([x, np.ones_like(x)], 1)
-
-
-def _cubic(x: Floats) -> Floats:
-    part = x / max(float(np.abs(x).max()), 1e-30)
-    return np.stack([x, np.ones_like(x), part**2, part**3], 1)
-
-
-def _kink(at_dn: float) -> Callable[[Floats], Floats]:
-    def basis(x: Floats) -> Floats:
-        return np.stack([x, np.ones_like(x), np.maximum(x - at_dn, 0.0)], 1)
-
-    return basis
-
-
-def _solve(points: Points, design: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return parameters, fitted variance and relative errors (x's included) by reweighting."""
-    v = points.variance_dn2
-    # A line that runs through zero would weigh its point without bound.
-    floor = np.maximum(0.05 * v, 1e-12)
-    fitted, relative = np.maximum(v, floor), points.relative_se
-    size = np.maximum(np.abs(design).max(0), 1e-30)
-    unit = design / size
-    for _ in range(_ITERATIONS):
-        weight = 1 / (fitted * relative)
-        whitened = unit * weight[:, None]
-        norm = np.sqrt((whitened**2).sum(0))
-        whitened /= norm
-        gram = whitened.T @ whitened
-        gram[np.diag_indices_from(gram)] += 1e-13  # nearly collinear bends stay solvable
-        parameters = np.linalg.solve(gram, whitened.T @ (v * weight)) / norm / size
-        before, fitted = fitted, np.maximum(design @ parameters, floor)
-        relative = np.hypot(points.relative_se, parameters[0] * points.x_se_dn / fitted)
-        if np.abs(fitted - before).max() <= _CONVERGED * fitted.max():
-            break
-    return parameters, fitted, relative
-
-
-def _deviance(points: Points, basis: Callable[[Floats], Floats]) -> float:
-    """Return the gamma deviance of the best fit: 2 (v/mu - 1 - ln(v/mu)) / relative error^2."""
-    _, fitted, relative = _solve(points, basis(points.x_dn))
-    ratio = np.maximum(points.variance_dn2, 1e-12) / fitted
-    return float((2 * (ratio - 1 - np.log(ratio)) / relative**2).sum())
-
-
-def _line(points: Points, black_se_dn: float) -> Line:
-    """Return the line through points, the black level's error included."""
-    design = _affine(points.x_dn)
-    parameters, fitted, relative = _solve(points, design)
-    weight = 1 / (fitted * relative) ** 2
-    normal = (design * weight[:, None]).T @ design
-    size = np.sqrt(np.diag(normal))
-    inverse = np.linalg.inv(normal / np.outer(size, size)) / np.outer(size, size)
-    # x moves with the black level, the fit with x.
-    moved = -inverse @ (design.T @ (weight * parameters[0] * points.black_share))
-    covariance = inverse + np.outer(moved, moved) * black_se_dn**2
-    return Line(float(parameters[0]), float(parameters[1]), _pair(covariance))
-
-
-def _pair(matrix: Floats) -> tuple[tuple[float, float], tuple[float, float]]:
-    (a, b), (c, d) = matrix.tolist()
-    return ((a, b), (c, d))
+    return Line(line.slope_dn, line.intercept_dn2, pair(covariance))

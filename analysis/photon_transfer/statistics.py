@@ -13,12 +13,20 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import stats
 
 from analysis.photon_transfer.recorded import Recorded, channel_names
-from dsis.compiled import kernel
+from analysis.photon_transfer.sums import (
+    Floats,
+    Ints,
+    Sums,
+    add_frame,
+    add_pair,
+    begin,
+    square_total,
+)
 
-Ints = NDArray[np.int64]
-Floats = NDArray[np.float64]
+LINES_P = 1e-3  # rows or columns that vary more than chance does so often have their own noise
 
 
 @dataclass(frozen=True)
@@ -82,41 +90,25 @@ class LevelStatistics:
         return self.rows * self.columns
 
 
-@dataclass
-class _Sums:
-    """Running sums of one exposure; columns keep their place, rows their parity."""
-
-    reference: int
-    total: NDArray[np.int32]  # (R, C): sum over frames of code - reference
-    rows: list[Ints]  # per frame (R, 2): row sums by column parity
-    columns: list[Ints]  # per frame (2, C): column sums by row parity
-    squares: Ints  # (2, C)
-    clipped: Ints  # (2, 2, C): low, high
-    pairs: list[tuple[Ints, Ints, Floats]]  # per pair (2, C): d, d^2, d^4
-    repeats: int = 0
-
-
 def expose_statistics(recording: Recorded, exposure: Any) -> list[LevelStatistics]:
     """Return the statistics of each CFA channel of one exposure; empty where it has no frames."""
     white = int(recording.sensor.white_level)
-    sums: _Sums | None = None
+    sums: Sums | None = None
     previous: NDArray[np.uint16] | None = None
     for count, frame in enumerate(recording.frames(exposure)):
         if sums is None:
-            sums = _begin(frame)
+            sums = begin(frame)
         row, column = (
             np.empty((frame.shape[0], 2), np.int64),
             np.zeros((2, frame.shape[1]), np.int64),
         )
-        _add_frame(
-            frame, sums.reference, white, sums.total, row, column, sums.squares, sums.clipped
-        )
+        add_frame(frame, sums.reference, white, sums.total, row, column, sums.squares, sums.clipped)
         sums.rows.append(row)
         sums.columns.append(column)
         if previous is not None and count % 2:
             shape = (2, frame.shape[1])
             d1, d2, d4 = np.zeros(shape, np.int64), np.zeros(shape, np.int64), np.zeros(shape)
-            _add_pair(frame, previous, d1, d2, d4)
+            add_pair(frame, previous, d1, d2, d4)
             sums.pairs.append((d1, d2, d4))
         if previous is not None and np.array_equal(frame, previous):
             sums.repeats += 1
@@ -124,96 +116,14 @@ def expose_statistics(recording: Recorded, exposure: Any) -> list[LevelStatistic
     if sums is None:
         return []
     pattern = np.zeros((2, sums.total.shape[1]), np.int64)
-    _square_total(sums.total, pattern)
+    square_total(sums.total, pattern)
     names = channel_names(recording.sensor.cfa)
     found = dict.fromkeys(names[i][j] for i, j in product((0, 1), (0, 1)))
     return [_channel(exposure, name, names, sums, pattern) for name in found]
 
 
-def _begin(frame: NDArray[np.uint16]) -> _Sums:
-    rows, columns = frame.shape
-    return _Sums(
-        # Near the data, so that the integers stay small.
-        round(float(frame.mean())),
-        np.zeros((rows, columns), np.int32),
-        [],
-        [],
-        np.zeros((2, columns), np.int64),
-        np.zeros((2, 2, columns), np.int64),
-        [],
-    )
-
-
-@kernel
-def _add_frame(
-    frame: NDArray[np.uint16],
-    reference: int,
-    white: int,
-    total: NDArray[np.int32],
-    row_sums: Ints,
-    column_sums: Ints,
-    squares: Ints,
-    clipped: Ints,
-) -> None:
-    rows, columns = frame.shape
-    line = np.empty(columns, np.int32)
-    ref, top = np.int32(reference), np.int32(white)
-    for r in range(rows):
-        p = r % 2
-        source, kept = frame[r], total[r]
-        sums, square, low, high = column_sums[p], squares[p], clipped[0, p], clipped[1, p]
-        for c in range(np.uintp(columns)):
-            code = np.int32(source[c])
-            x = np.int32(code - ref)
-            line[c] = x
-            kept[c] += x
-            sums[c] += x
-            square[c] += np.int64(x) * np.int64(x)
-        extremes = np.int32(0)
-        for c in range(np.uintp(columns)):
-            code = np.int32(source[c])
-            extremes += np.int32(code == 0) + np.int32(code >= top)
-        if extremes > 0:
-            for c in range(columns):
-                low[c] += source[c] == 0
-                high[c] += source[c] >= top
-        even = np.int64(0)
-        odd = np.int64(0)
-        for c in range(columns // 2):
-            even += np.int64(line[2 * c])
-            odd += np.int64(line[2 * c + 1])
-        if columns % 2:
-            even += np.int64(line[columns - 1])
-        row_sums[r, 0], row_sums[r, 1] = even, odd
-
-
-@kernel
-def _add_pair(
-    frame: NDArray[np.uint16], previous: NDArray[np.uint16], d1: Ints, d2: Ints, d4: Floats
-) -> None:
-    rows, columns = frame.shape
-    for r in range(rows):
-        p = r % 2
-        a, b, s1, s2, s4 = frame[r], previous[r], d1[p], d2[p], d4[p]
-        for c in range(np.uintp(columns)):
-            d = np.int32(np.int32(a[c]) - np.int32(b[c]))
-            square = np.float64(d) * np.float64(d)
-            s1[c] += d
-            s2[c] += np.int64(d) * np.int64(d)
-            s4[c] += square * square
-
-
-@kernel
-def _square_total(total: NDArray[np.int32], squares: Ints) -> None:
-    rows, columns = total.shape
-    for r in range(rows):
-        source, out = total[r], squares[r % 2]
-        for c in range(np.uintp(columns)):
-            out[c] += np.int64(source[c]) * np.int64(source[c])
-
-
 def _channel(
-    exposure: Any, name: str, names: tuple[tuple[str, str], ...], sums: _Sums, pattern: Ints
+    exposure: Any, name: str, names: tuple[tuple[str, str], ...], sums: Sums, pattern: Ints
 ) -> LevelStatistics:
     """Reduce the sums to one channel: the parities that bear its name, as one plane."""
     places = [(i, j) for i, j in product((0, 1), (0, 1)) if names[i][j] == name]
@@ -240,7 +150,7 @@ def _channel(
     pairs = [(int(picked(a)), int(picked(b)), float(picked(c))) for a, b, c in sums.pairs]
     variance, variance_se, kurtosis = _variance(temporal, pairs, n, frames)
     mean_total = int(row.sum())
-    noise = temporal.row + temporal.column - temporal.pixel if frames > 1 else np.nan
+    noise = temporal.white + temporal.lines if frames > 1 else np.nan
     spatial = (int(picked(pattern)) - mean_total**2 / n) / frames**2 / max(n - 1, 1)
     light = exposure.light
     low, high = picked(sums.clipped)
@@ -272,39 +182,44 @@ def _channel(
 
 @dataclass(frozen=True)
 class _Temporal:
-    """Mean squares of the temporal residual, and the sum of squares without the frames' change."""
+    """Mean squares of the temporal residual, and the sum of squares without the frames' change.
+
+    `lines` is what row and column noise add to the mean square of a frame mean, `white` the rest.
+    Both are estimates from few degrees of freedom; where chance explains the rows' and columns'
+    excess, they count as white: errors that err at random would spoil the weights.
+    """
 
     frame: float
-    row: float
-    column: float
-    pixel: float
+    white: float
+    lines: float
+    line_spread: float
     rest: float
-    size: tuple[int, int]
 
 
 def _temporal(within: float, row_means: Floats, column_means: Floats) -> _Temporal:
     frames, rows = row_means.shape
     columns = column_means.shape[1]
     if frames < 2:
-        return _Temporal(np.nan, np.nan, np.nan, np.nan, np.nan, (rows, columns))
+        return _Temporal(*[np.nan] * 5)
     frame = row_means.mean(1)
-    row = row_means - row_means.mean(0) - (frame - frame.mean())[:, None]
-    column = column_means - column_means.mean(0) - (frame - frame.mean())[:, None]
-    ss_frame = rows * columns * float(((frame - frame.mean()) ** 2).sum())
+    change = frame - frame.mean()
+    row = row_means - row_means.mean(0) - change[:, None]
+    column = column_means - column_means.mean(0) - change[:, None]
+    n = rows * columns
     ss_row, ss_column = columns * float((row**2).sum()), rows * float((column**2).sum())
+    ss_frame = n * float((change**2).sum())
     rest = max(within - ss_frame, 0.0)
-
-    def mean_square(sum_of_squares: float, dof: int) -> float:
-        return sum_of_squares / ((frames - 1) * dof) if dof else 0.0
-
-    return _Temporal(
-        mean_square(ss_frame, 1),
-        mean_square(ss_row, rows - 1),
-        mean_square(ss_column, columns - 1),
-        mean_square(max(rest - ss_row - ss_column, 0.0), (rows - 1) * (columns - 1)),
-        rest,
-        (rows, columns),
-    )
+    dof = (frames - 1) * (rows - 1) * (columns - 1)
+    pixel = max(rest - ss_row - ss_column, 0.0) / dof if dof else 0.0
+    white = rest / ((frames - 1) * max(n - 1, 1))
+    lines = spread = 0.0
+    for sum_of_squares, count in ((ss_row, rows - 1), (ss_column, columns - 1)):
+        square = sum_of_squares / ((frames - 1) * max(count, 1))
+        if count and stats.f.sf(square / max(pixel, 1e-12), (frames - 1) * count, dof) < LINES_P:
+            lines += square - pixel
+            spread += count * (square**2 - pixel**2)
+            white = pixel
+    return _Temporal(ss_frame / (frames - 1), white, lines, spread, rest)
 
 
 def _variance(
@@ -315,16 +230,13 @@ def _variance(
         return np.nan, np.nan, np.nan
     variance = temporal.rest / ((frames - 1) * (n - 1))
     kurtosis = _kurtosis(pairs, n)
-    rows, columns = temporal.size
-    spread = (
-        (rows - 1) * temporal.row**2
-        + (columns - 1) * temporal.column**2
-        + (rows - 1) * (columns - 1) * temporal.pixel**2
-    )
+    spread = (n - 1) * temporal.white**2 + temporal.line_spread
     square = 2 * spread / ((frames - 1) * (n - 1) ** 2)
     if np.isfinite(kurtosis):
-        # An excess kurtosis cannot be below -2: the variance keeps a positive error.
-        square += max(kurtosis, -1.9) * variance**2 / (frames * n)
+        # Counted as far as it exceeds its own error; -2 is the least there is.
+        error2 = 4 * 24 / (n * len(pairs))
+        known = kurtosis * max(0.0, 1 - error2 / max(kurtosis**2, 1e-30))
+        square += max(known, -1.9) * variance**2 / (frames * n)
     return variance, float(np.sqrt(max(square, 0.0))), kurtosis
 
 

@@ -1,6 +1,7 @@
 """The command line: parse, call one function, print. The one file that knows both packages."""
 
 import argparse
+import errno
 import os
 import shutil
 import sys
@@ -10,7 +11,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 from dsis import __version__
-from dsis.errors import DamagedError, DsisError, InputError
+from dsis.errors import DsisError, InputError
 
 DEMO_SPEC = "demo.toml"
 DEMO_OBSERVERS = 18
@@ -21,22 +22,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     try:
         options.command(options)
-    except InputError as error:
-        _complain(str(error))
-        return 2
-    except DamagedError as error:
-        _complain(str(error))
-        return 1
     except DsisError as error:
         _complain(str(error))
-        return 1
+        return 2 if isinstance(error, InputError) else 1
     except KeyboardInterrupt:
-        _complain("interrupted; the same command goes on where this one stopped")
+        _complain("interrupted")
         return 130
     except BrokenPipeError:
         # Whoever read the output has gone (`| head`); nothing is left to say.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
+    except OSError as error:
+        place = f"{error.filename}: " if error.filename else ""
+        _complain(f"{place}{error.strerror or error}")
+        return 1 if error.errno in (errno.ENOSPC, errno.EIO) else 2
     return 0
 
 
@@ -47,29 +45,34 @@ def _complain(message: str) -> None:
 def demo(options: argparse.Namespace) -> None:
     """Run the whole chain in small."""
     from analysis.report import write_report
-    from dsis.outdir import check_replaceable, finish, partial_of
+    from dsis.outdir import result_folder
     from dsis.session import export_votes, run_robots
-    from dsis.spec import read_spec
-    from dsis.stimuli import build_stimuli, summary
+    from dsis.session.store import voted_people
+    from dsis.spec import SHIPPED, read_spec
+    from dsis.stimuli import build_digest, build_stimuli, summary
 
     out: Path = options.out
-    check_replaceable(out, "report/report.html")
-    partial = partial_of(out)
-    partial.mkdir(parents=True, exist_ok=True)
-    stimuli = partial / "stimuli"
-    for stale in (stimuli / "session", partial / "votes", partial / "report"):
-        shutil.rmtree(stale, ignore_errors=True)
-    test = read_spec(DEMO_SPEC, seed=options.seed)
-    print(f"1/3 stimuli: {test.spec.title}, four noise conditions")
-    with _progress("stimuli") as progress:
-        manifest = build_stimuli(test, stimuli, jobs=options.jobs, progress=progress)
-    print(summary(manifest))
-    print(f"2/3 session: {options.observers} SIMULATED observers (robots) vote")
-    run_robots(stimuli, options.observers, seed=test.spec.seed)
-    export_votes(stimuli, partial / "votes")
-    print("3/3 report")
-    write_report(partial / "votes" / "votes.csv", partial / "report")
-    finish(partial, out)
+    test = read_spec(SHIPPED / DEMO_SPEC, seed=options.seed)
+
+    def people(folder: Path) -> str | None:
+        found = voted_people(folder / "stimuli")
+        return f"votes of {', '.join(found)}" if found else None
+
+    with result_folder(
+        out, "report/report.html", keep=people, resume=f"demo {build_digest(test)}"
+    ) as folder:
+        stimuli_dir = folder / "stimuli"
+        for made_again in (stimuli_dir / "session", folder / "votes", folder / "report"):
+            shutil.rmtree(made_again, ignore_errors=True)
+        print(f"1/3 stimuli: {test.spec.title}, four noise conditions")
+        with _progress("stimuli") as progress:
+            manifest = build_stimuli(test, stimuli_dir, jobs=options.jobs, progress=progress)
+        print(summary(manifest))
+        print(f"2/3 session: {options.observers} SIMULATED observers (robots) vote")
+        run_robots(stimuli_dir, options.observers, seed=test.spec.seed)
+        export_votes(stimuli_dir, folder / "votes")
+        print("3/3 report")
+        write_report(folder / "votes" / "votes.csv", folder / "report")
     print(_mos_table(out / "report" / "mos.csv"))
     print("All votes are SIMULATED: they show the tool at work, not what people see.")
     print(f"report   {out / 'report' / 'report.html'}")
@@ -114,10 +117,13 @@ def session(options: argparse.Namespace) -> None:
     from dsis import session as sessions
 
     folder: Path = options.stimuli_dir
+    seed = 1 if options.seed is None else options.seed
     if options.status:
         print(sessions.status(folder))
     elif options.robots is not None:
-        sessions.run_robots(folder, options.robots, seed=options.seed or 1)
+        sessions.run_robots(
+            folder, options.robots, seed=1 if options.seed is None else options.seed
+        )
         print(f"{options.robots} SIMULATED observers voted; export: dsis votes {folder} -o DIR")
     elif options.observer is None:
         fact = "give --observer ID, --robots N or --status"
@@ -129,7 +135,7 @@ def session(options: argparse.Namespace) -> None:
             port=options.port,
             open_browser=not options.no_browser,
             resume=options.resume,
-            seed=options.seed or 1,
+            seed=seed,
         )
 
 
@@ -204,10 +210,10 @@ def _cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def _whole(low: int) -> Callable[[str], int]:
+def _whole(low: int, high: int = 2**63 - 1) -> Callable[[str], int]:
     def whole(text: str) -> int:
-        if not text.isdigit() or int(text) < low:
-            message = f"is {text!r}, must be a whole number >= {low}"
+        if not text.isdecimal() or not low <= int(text) <= high:
+            message = f"is {text!r}, must be a whole number from {low} to {high}"
             raise argparse.ArgumentTypeError(message)
         return int(text)
 

@@ -1,5 +1,6 @@
 """Image files: the only place that touches OpenImageIO."""
 
+import errno
 import glob
 import re
 from collections.abc import Iterable
@@ -205,11 +206,26 @@ def write_codes(path: Path, pixels: NDArray[np.generic]) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     unfinished = path.with_name(f".{path.stem}.unfinished{path.suffix}")
     out = oiio.ImageOutput.create(str(unfinished))
-    if out is None or not out.open(str(unfinished), spec) or not out.write_image(pixels):
-        reason = (out.geterror() if out else oiio.geterror()).strip()
-        raise InputError.of(path, "", f"cannot be written: {reason}")
-    out.close()
+    whole = out is not None and out.open(str(unfinished), spec) and out.write_image(pixels)
+    whole = (out is not None and out.close()) and whole
+    # Some writers say nothing when the disk is full: a frame counts once it has been read back.
+    if not whole or not _holds(unfinished, pixels):
+        reason = (out.geterror() if out else oiio.geterror()).strip() or "the disk may be full"
+        unfinished.unlink(missing_ok=True)
+        raise OSError(errno.EIO, f"cannot be written: {reason}", str(path))
     unfinished.replace(path)
+
+
+def _holds(path: Path, pixels: NDArray[np.generic]) -> bool:
+    """Tell whether a file holds these pixels, bit for bit."""
+    opened = oiio.ImageInput.open(str(path))
+    if opened is None:
+        oiio.geterror()  # an error that nobody asks for is printed at the end of the program
+        return False
+    found = opened.read_image(format=opened.spec().format)
+    error = opened.geterror()
+    opened.close()
+    return not error and found is not None and np.array_equal(found, pixels)
 
 
 def codes(display: NDArray[np.float32], top: int) -> NDArray[np.float32]:

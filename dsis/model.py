@@ -1,9 +1,10 @@
 """Frozen, strict models of what users write in TOML; every fault with its path in the file."""
 
+import datetime
 import difflib
 import json
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, TypeVar, get_args, get_origin
 
@@ -30,7 +31,7 @@ def read_toml(path: Path) -> dict[str, Any]:
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "is not UTF-8 text"
         raise InputError.of(path, "", f"cannot be read: {reason}") from None
-    except tomllib.TOMLDecodeError as error:
+    except (ValueError, RecursionError) as error:  # numbers of 5000 digits, 1000 brackets
         raise InputError.of(path, "", f"is not TOML: {error}") from None
 
 
@@ -64,8 +65,10 @@ def attempt(
     """Return (value of type `kind` or None, faults): for callers that gather more faults."""
     # JSON's rules accept an array for a tuple and a whole number for a float, and nothing else.
     text = json.dumps(values, default=str)
+    dates = list(_dates(values, file, prefix))  # as text they would pass for titles and names
     try:
-        return TypeAdapter(kind).validate_json(text, context=context), []
+        value = TypeAdapter(kind).validate_json(text, context=context)
+        return (None, dates) if dates else (value, [])
     except ValidationError as error:
         items = error.errors()
         places = [item["loc"] for item in items]
@@ -73,12 +76,26 @@ def attempt(
         def alone(place: Sequence[object]) -> bool:
             return sum(p[: len(place)] == place for p in places) == 1
 
-        return None, [
+        faults = [
             _fault(kind, item, file, prefix)
             for item in items
             # An array whose items are all at fault is not empty besides.
             if item["type"] != "too_short" or alone(item["loc"])
         ]
+        dated = {fault.key for fault in dates}
+        return None, [*dates, *(fault for fault in faults if fault.key not in dated)]
+
+
+def _dates(values: Any, file: str, key: str) -> Iterator[Fault]:
+    """Yield a fault for every TOML date or time: no key of ours takes one."""
+    if isinstance(values, datetime.date | datetime.time):
+        yield Fault(file, key, f"is the date or time {values}, must be a number, or text in quotes")
+    elif isinstance(values, Mapping):
+        for name, value in values.items():
+            yield from _dates(value, file, f"{key}.{name}" if key else str(name))
+    elif isinstance(values, list | tuple):
+        for i, value in enumerate(values):
+            yield from _dates(value, file, f"{key}[{i}]")
 
 
 def _fault(kind: Any, item: Any, file: str, prefix: str) -> Fault:

@@ -2,12 +2,16 @@
 
 import csv
 import json
+import shutil
 from itertools import pairwise
 from pathlib import Path
 
 import pytest
 
 from dsis.cli import main
+from dsis.manifest import read_manifest
+from dsis.session import draw_plan
+from dsis.session.store import open_store
 from dsis.spec import SHIPPED
 
 
@@ -25,9 +29,12 @@ def demo(tmp_path_factory: pytest.TempPathFactory) -> Path:
     ):
         assert old in text
         text = text.replace(old, new)
-    (folder / "demo.toml").write_text(text, encoding="utf-8")
+    (folder / "small.toml").write_text(text, encoding="utf-8")
+    # A file of that name in the current folder is not the demo's.
+    (folder / "demo.toml").write_text("no spec at all", encoding="utf-8")
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
+        patch.setattr("dsis.cli.DEMO_SPEC", str(folder / "small.toml"))
         assert main(["demo"]) == 0
     return folder / "dsis-demo"
 
@@ -125,8 +132,27 @@ def test_content_never_repeats_in_succession(demo: Path) -> None:
         assert all(a != b for a, b in pairwise(contents)), observer
 
 
+def test_it_never_deletes_the_votes_of_people(
+    demo: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("dsis.cli.DEMO_SPEC", str(demo.parent / "small.toml"))
+    mine = tmp_path / "dsis-demo"
+    shutil.copytree(demo, mine)
+    manifest = read_manifest(mine / "stimuli")
+    with open_store(mine / "stimuli", manifest) as store:
+        store.add_observer("anna", draw_plan(manifest, "anna", 1), simulated=False)
+    votes = (mine / "stimuli" / "session" / "votes.sqlite").read_bytes()
+    assert main(["demo", "--out", str(mine)]) == 2
+    assert "holds votes of anna, which would be lost" in capsys.readouterr().err
+    assert (mine / "stimuli" / "session" / "votes.sqlite").read_bytes() == votes
+
+
 def test_it_can_be_run_again(demo: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     before = (demo / "report" / "report.html").read_bytes()
     monkeypatch.chdir(demo.parent)
+    monkeypatch.setattr("dsis.cli.DEMO_SPEC", str(demo.parent / "small.toml"))
     assert main(["demo"]) == 0
     assert (demo / "report" / "report.html").read_bytes() == before

@@ -17,6 +17,7 @@ import analysis
 from analysis.report import analyse
 from analysis.scale import Description, Scale
 from dsis.errors import InputError
+from dsis.outdir import UNFINISHED
 
 PAPER = (1, 10)
 FILES = {"report.html", "mos.svg", "mos.png", "mos.csv", "observers.csv", "removed_votes.csv"}
@@ -311,6 +312,7 @@ def test_an_earlier_report_is_replaced_and_anything_else_refused(tmp_path):
     before = (out / "mos.csv").read_text()
     (tmp_path / "report.partial").mkdir()  # of a killed run
     (tmp_path / "report.partial" / "mos.csv").write_text("half")
+    (tmp_path / "report.partial" / UNFINISHED).write_text('{"build": null}\n')
     report(tmp_path, votes.assign(vote=5))
     assert (out / "mos.csv").read_text() != before
     assert sorted(p.name for p in tmp_path.iterdir()) == ["report", "votes.csv"]

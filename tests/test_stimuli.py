@@ -393,7 +393,7 @@ def test_foreign_folders_and_recorded_votes_are_not_replaced(built: Path, tmp_pa
         build_stimuli(test, tmp_path / "mine")
     shutil.copytree(built, tmp_path / "voted")
     (tmp_path / "voted" / "session").mkdir()
-    with pytest.raises(InputError, match="session, which would be lost"):
+    with pytest.raises(InputError, match="recorded votes \\(session\\), which would be lost"):
         build_stimuli(test, tmp_path / "voted")
     assert (tmp_path / "mine" / "thesis.txt").exists()
 
@@ -447,7 +447,7 @@ def test_unfinished_work_of_another_spec_is_not_mixed_in(tmp_path: Path) -> None
     partial = tmp_path / "out.partial"
     partial.mkdir()
     (partial / "journal.jsonl").write_text('{"build": "of another spec"}\n', encoding="utf-8")
-    with pytest.raises(InputError, match="unfinished stimuli of another spec"):
+    with pytest.raises(InputError, match="unfinished work of another spec"):
         build_stimuli(read_spec(spec), tmp_path / "out")
     assert (partial / "journal.jsonl").exists()
 

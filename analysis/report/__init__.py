@@ -24,8 +24,8 @@ from analysis.screening import REMOVED_COLUMNS, remove_outliers, screen_bt500, s
 from analysis.table import codebook, to_csv
 from analysis.votesfile import read_votes
 from dsis import __version__
-from dsis.errors import Fault, InputError
-from dsis.outdir import check_replaceable, finish, partial_of
+from dsis.errors import InputError
+from dsis.outdir import UNFINISHED, result_folder
 
 FILES = ("report.html", "mos.svg", "mos.png", "mos.csv", "observers.csv", "removed_votes.csv")
 REMOVED_SHOWN = 200
@@ -66,40 +66,27 @@ def write_report(votes_csv: Path, out: Path, scale: tuple[int, int] | None = Non
         The votes cannot be used (every row that is wrong is named), the scale is not known, or
         `out` holds something else.
     """
-    _check_folder(out)
     test = describe_test(votes_csv, scale)
     votes = read_votes(votes_csv, scale)
     if count_votes(votes).scored == 0:
         raise InputError.of(votes_csv, "", "holds no valid vote on a test sequence")
     results = replace(analyse(votes, test), stimuli=tuple(shown_stimuli(votes_csv)))
-    partial = partial_of(out)
-    partial.mkdir(parents=True, exist_ok=True)
-    for left_over in partial.iterdir():
-        left_over.unlink()
-    draw_mos(results.scores, test.scale, results.counts.simulated_share, partial / "mos")
-    page = render(results, test, votes_csv.name, (partial / "mos.svg").read_bytes())
-    for name, text in (
-        ("mos.csv", to_csv(results.scores, MOS_COLUMNS)),
-        ("observers.csv", to_csv(results.observers, OBSERVER_COLUMNS)),
-        ("removed_votes.csv", to_csv(results.removed, REMOVED_COLUMNS)),
-        ("report.html", page),
-    ):
-        (partial / name).write_text(text, encoding="utf-8", newline="")
-    finish(partial, out)
+    with result_folder(out, "mos.csv", keep=_not_ours) as partial:
+        draw_mos(results.scores, test.scale, results.counts.simulated_share, partial / "mos")
+        page = render(results, test, votes_csv.name, (partial / "mos.svg").read_bytes())
+        for name, text in (
+            ("mos.csv", to_csv(results.scores, MOS_COLUMNS)),
+            ("observers.csv", to_csv(results.observers, OBSERVER_COLUMNS)),
+            ("removed_votes.csv", to_csv(results.removed, REMOVED_COLUMNS)),
+            ("report.html", page),
+        ):
+            (partial / name).write_text(text, encoding="utf-8", newline="")
 
 
-def _check_folder(out: Path) -> None:
-    """Refuse a folder in which something besides an earlier report would be lost."""
-    check_replaceable(out, "mos.csv")
-    for folder in (out, partial_of(out)):
-        found = sorted(path.name for path in folder.iterdir()) if folder.is_dir() else []
-        faults = [
-            Fault(str(folder), name, "is no part of a report and would be lost")
-            for name in found
-            if name not in FILES
-        ]
-        if faults:
-            raise InputError(faults)
+def _not_ours(out: Path) -> str | None:
+    """Return what in an earlier report is no part of one."""
+    other = sorted(p.name for p in out.iterdir() if p.name not in (*FILES, UNFINISHED))
+    return ", ".join(other) or None
 
 
 def analyse(votes: pd.DataFrame, test: Description) -> Results:

@@ -2,8 +2,7 @@
 
 import json
 import re
-import shutil
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from importlib.metadata import version
 from itertools import islice
 from pathlib import Path
@@ -12,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsis.imagefile import write_codes
-from dsis.outdir import check_replaceable, finish, partial_of
+from dsis.outdir import result_folder
 from dsis.recording.model import ExposurePlan, Recording, Sensor
 from dsis.recording.reader import read_recording
 from dsis.recording.tomlfile import RECORDING, write_listing
@@ -56,12 +55,25 @@ def write_recording(
     if not exposures or len({plan.name for plan in exposures}) < len(exposures):
         message = "a recording needs exposures, each with a name of its own"
         raise ValueError(message)
-    check_replaceable(out, PROVENANCE)
-    partial = partial_of(out)
-    if partial.exists():
-        shutil.rmtree(partial)
-    partial.mkdir(parents=True)
-    folders = _folders([plan.name for plan in exposures])
+    with result_folder(out, PROVENANCE) as partial:
+        folders = _folders([plan.name for plan in exposures])
+        _write_frames(partial, sensor, exposures, frames, folders, progress)
+        listed = {plan.name: (plan, f"{folders[plan.name]}/*.tif") for plan in exposures}
+        mark = {"written_by": f"dsis {version('dsis')}", "origin": origin}
+        (partial / PROVENANCE).write_text(json.dumps(mark, indent=2) + "\n", encoding="utf-8")
+        write_listing(partial / RECORDING, sensor, listed)
+        read_recording(partial)  # what cannot be read must not take the place of an earlier one
+    return read_recording(out)
+
+
+def _write_frames(
+    folder: Path,
+    sensor: Sensor,
+    exposures: Sequence[ExposurePlan],
+    frames: Iterable[NDArray[np.uint16]],
+    folders: Mapping[str, str],
+    progress: Callable[[int, int, str], None] | None,
+) -> None:
     total, done = sum(plan.frames for plan in exposures), 0
     stream = iter(frames)
     for plan in exposures:
@@ -70,20 +82,13 @@ def write_recording(
                 message = f"{plan.name}: code {codes.max()} is above {sensor.white_level:g}"
                 raise ValueError(message)
             # Leading zeros: any program lists the frames in their order.
-            write_codes(partial / folders[plan.name] / f"{number:04d}.tif", codes[:, :, np.newaxis])
+            write_codes(folder / folders[plan.name] / f"{number:04d}.tif", codes[:, :, np.newaxis])
             done += 1
             if progress is not None:
                 progress(done, total, plan.name)
     if next(stream, None) is not None:
         message = f"more frames than the {total} that the exposures announce"
         raise ValueError(message)
-    listed = {plan.name: (plan, f"{folders[plan.name]}/*.tif") for plan in exposures}
-    mark = {"written_by": f"dsis {version('dsis')}", "origin": origin}
-    (partial / PROVENANCE).write_text(json.dumps(mark, indent=2) + "\n", encoding="utf-8")
-    write_listing(partial / RECORDING, sensor, listed)
-    read_recording(partial)  # what cannot be read must not take the place of an earlier result
-    finish(partial, out)
-    return read_recording(out)
 
 
 def _exactly(

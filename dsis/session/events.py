@@ -21,7 +21,10 @@ def append(db: sqlite3.Connection, origin: str, event: str, **facts: Any) -> Non
     last = db.execute("SELECT hash FROM events ORDER BY id DESC LIMIT 1").fetchone()
     previous = last[0] if last else origin
     values = {"event": event, "at": now(), **facts}
-    payload = json.dumps(values, sort_keys=True, ensure_ascii=False, separators=(",", ":"))
+    # NaN and Infinity are no JSON: SQLite could never read the log again.
+    payload = json.dumps(
+        values, sort_keys=True, ensure_ascii=False, separators=(",", ":"), allow_nan=False
+    )
     db.execute(
         "INSERT INTO events (previous, payload, hash) VALUES (?, ?, ?)",
         (previous, payload, _link(previous, payload)),

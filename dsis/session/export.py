@@ -3,14 +3,13 @@
 import csv
 import io
 import json
-import shutil
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from dsis.errors import InputError
 from dsis.manifest import Manifest, read_manifest
-from dsis.outdir import check_replaceable, finish, partial_of
+from dsis.outdir import UNFINISHED, result_folder
 from dsis.session.columns import (
     OBSERVERS,
     PRESENTATIONS,
@@ -47,19 +46,16 @@ def export_votes(folder: Path, out: Path) -> None:
     InputError
         There is no vote, or `out` holds something else.
     """
-    _check_out(out)
     manifest = read_manifest(folder)
     with read_store(folder) as store:
         tables = _tables(store, manifest)
         package = _package(store, manifest, tables)
-    partial = partial_of(out)
-    shutil.rmtree(partial, ignore_errors=True)
-    partial.mkdir(parents=True)
-    for name, (columns, entries) in tables.items():
-        (partial / f"{name}.csv").write_text(_csv(columns, entries), encoding="utf-8", newline="")
-    text = json.dumps(package, indent=1, ensure_ascii=False) + "\n"
-    (partial / PACKAGE).write_text(text, encoding="utf-8", newline="")
-    finish(partial, out)
+    with result_folder(out, PACKAGE, keep=_not_ours) as partial:
+        for name, (columns, entries) in tables.items():
+            text = _csv(columns, entries)
+            (partial / f"{name}.csv").write_text(text, encoding="utf-8", newline="")
+        text = json.dumps(package, indent=1, ensure_ascii=False) + "\n"
+        (partial / PACKAGE).write_text(text, encoding="utf-8", newline="")
 
 
 def _tables(store: Store, manifest: Manifest) -> dict[str, _Table]:
@@ -113,19 +109,15 @@ def _csv(columns: Sequence[Column], entries: Sequence[object]) -> str:
     return text.getvalue()
 
 
-def _check_out(out: Path) -> None:
-    """Refuse to replace what is not an export, or has something else in it."""
-    check_replaceable(out, PACKAGE)
-    if not (out / PACKAGE).is_file():
-        return
-    try:
-        ours = json.loads((out / PACKAGE).read_text(encoding="utf-8"))["schema"] == SCHEMA
-    except (ValueError, KeyError, TypeError):
-        ours = False
-    if not ours:
-        raise InputError.of(out, "", f"holds a {PACKAGE} that is no export of votes")
-    known = {PACKAGE, *(f"{name}.csv" for name in TABLES)}
+def _not_ours(out: Path) -> str | None:
+    """Return what in an earlier export is not of ours."""
+    if (out / PACKAGE).is_file():
+        try:
+            ours = json.loads((out / PACKAGE).read_text(encoding="utf-8"))["schema"] == SCHEMA
+        except (ValueError, KeyError, TypeError):
+            ours = False
+        if not ours:
+            return f"a {PACKAGE} that is no export of votes"
+    known = {PACKAGE, UNFINISHED, *(f"{name}.csv" for name in TABLES)}
     other = sorted(path.name for path in out.iterdir() if path.name not in known)
-    if other:
-        fact = f"holds {', '.join(other)}, which would be lost: give another folder"
-        raise InputError.of(out, "", fact)
+    return ", ".join(other) or None

@@ -210,8 +210,10 @@ def _refusal(status: int) -> Callable[[Request, Exception], Awaitable[Response]]
 async def _body(request: Request) -> dict[str, Any]:
     try:
         body = json.loads(await request.body())
+        # 1e999 reads as infinity, which the log could hold but nobody could read again.
+        json.dumps(body, allow_nan=False)
     except ValueError:
-        raise InputError.of("request", "", "is not JSON") from None
+        raise InputError.of("request", "", "is not JSON of finite numbers") from None
     if not isinstance(body, dict):
         raise InputError.of("request", "", "must be a JSON object")
     return body

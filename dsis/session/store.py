@@ -334,6 +334,14 @@ def read_store(folder: Path) -> Store:
     return store
 
 
+def voted_people(folder: Path) -> tuple[str, ...]:
+    """Return the observers of a stimuli folder who are people; none where there is no store."""
+    if not (folder / STORE).is_file():
+        return ()
+    with read_store(folder) as store:
+        return tuple(entry.observer for entry in store.observers() if not entry.simulated)
+
+
 def manifest_sha256(folder: Path) -> str:
     """Return the SHA-256 of the manifest file in `folder`."""
     return hashlib.sha256((folder / MANIFEST).read_bytes()).hexdigest()

@@ -4,28 +4,36 @@ import json
 import re
 from collections.abc import Mapping
 from collections.abc import Sequence as Many
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
+
+from pydantic import Field
 
 from dsis.camera import Camera
 from dsis.errors import Fault, InputError
 from dsis.imagefile import find_files
 from dsis.model import attempt, read_toml
+from dsis.spec.checked import Test
 from dsis.spec.fits import misfits, too_long
-from dsis.spec.schema import CameraChoice, Content, Spec, Test, still_name
+from dsis.spec.footage import footage_of, still_name
+from dsis.spec.schema import LEVEL_MAX, SEED_MAX, CameraChoice, Spec
 
 # Beside the packages, in a checkout as in an installation.
 SHIPPED = Path(__file__).resolve().parents[2] / "stimuli_specs"
+
+# No wider than what `dsis.stimuli.match` may solve, or a manifest could not be read again.
+SOLVED_SIGMA_MAX = 255.0 * 2**LEVEL_MAX
+Sigmas = dict[str, dict[str, Annotated[float, Field(ge=0, le=SOLVED_SIGMA_MAX)]]]
 
 
 def spec_path(name: str | Path) -> Path:
     """Return the file of a spec or camera: as given, or of that name among those shipped."""
     path = Path(name)
-    if path.exists() or path.is_absolute():
-        return path
     shipped = SHIPPED / name
-    return shipped if shipped.is_file() else path
+    try:
+        return path if path.exists() or not shipped.is_file() else shipped
+    except OSError:  # a name longer than file systems take: reading it says so
+        return path
 
 
 def read_spec(name: str | Path, source: Many[str | Path] = (), seed: int | None = None) -> Test:
@@ -35,7 +43,7 @@ def read_spec(name: str | Path, source: Many[str | Path] = (), seed: int | None 
     ----------
     name
         A TOML file, one of those shipped with dsis (`seybold.toml`), or a `manifest.json`: the same
-        stimuli again.
+        stimuli again, with the white noise that it has solved unless `source` or `seed` is given.
     source
         Image files, globs or folders that take the place of the spec's contents, from the current
         folder.
@@ -45,7 +53,11 @@ def read_spec(name: str | Path, source: Many[str | Path] = (), seed: int | None 
     path = spec_path(name)
     values, sigma = _values(path)
     if seed is not None:
+        if not 0 <= seed <= SEED_MAX:
+            raise InputError.of("--seed", "", f"is {seed}, must be from 0 to {SEED_MAX}")
         values["seed"] = seed
+    if source or seed is not None:
+        sigma = {}  # solved for other noise, or on other footage
     if source:
         _check_source(source)
         values["content"] = _replaced(values.get("content"), source)
@@ -80,9 +92,9 @@ def read_spec(name: str | Path, source: Many[str | Path] = (), seed: int | None 
         faults += too_long(sections["session"], sections["sequence"], str(path))
     if faults or camera is None:
         raise InputError(faults)
-    test = Test(Spec.model_construct(**sections), camera, folder, {}, sigma)
-    footage = {c.name or "": _footage(c, folder) for c in test.contents()}
-    return replace(test, footage={name: paths for name, paths in footage.items() if paths})
+    spec = Spec.model_construct(**sections)
+    footage = [found for content in spec.content for found in footage_of(content, folder)]
+    return Test(spec, camera, folder, {found.name: found for found in footage}, sigma)
 
 
 def _names() -> list[str]:
@@ -96,11 +108,13 @@ def _values(path: Path) -> tuple[dict[str, Any], dict[tuple[str, int], float]]:
     try:
         manifest = json.loads(path.read_text(encoding="utf-8"))
         values = dict(manifest["spec"])
-        solved = manifest["awgn_sigma"]
-        sigma = {(name, int(n)): float(s) for name, per in solved.items() for n, s in per.items()}
+        solved, faults = attempt(Sigmas, manifest["awgn_sigma"], str(path), "awgn_sigma")
+        if faults:
+            raise InputError(faults)
+        sigma = {(name, int(n)): s for name, per in solved.items() for n, s in per.items()}
     except OSError as error:
         raise InputError.of(path, "", f"cannot be read: {error.strerror}") from None
-    except (ValueError, KeyError, TypeError, AttributeError):
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
         fact = "holds no spec to build from: only manifests that `dsis stimuli` wrote do"
         raise InputError.of(path, "spec", fact) from None
     return values, sigma
@@ -116,8 +130,12 @@ def _camera(section: object, path: Path, faults: list[Fault]) -> Camera | None:
     if not isinstance(model, str):
         return None  # the section's own fault
     beside = path.parent / model
-    file = beside if beside.exists() else spec_path(model)
-    if not file.is_file():
+    try:
+        file = beside if beside.exists() else spec_path(model)
+        found = file.is_file()
+    except OSError:  # longer than file systems take
+        found = False
+    if not found:
         shipped = sorted(p.name for p in SHIPPED.glob("cameras/*.toml"))
         fact = f"is {model!r}: no such file, neither from {path.parent.resolve()} nor shipped"
         faults.append(Fault(str(path), "camera.model", f"{fact} (cameras/: {', '.join(shipped)})"))
@@ -168,8 +186,3 @@ def _replaced(contents: object, source: Many[str | Path]) -> list[dict[str, Any]
     stem = re.sub(r"[\d*?\[\]]+$", "", Path(paths[0]).stem)
     return [{**kept, "name": still_name(Path(stem or "footage")), "files": paths}]
 
-
-def _footage(content: Content, folder: Path) -> tuple[Path, ...]:
-    if content.stills is not None:
-        return tuple(p for p in find_files(folder, content.stills) if still_name(p) == content.name)
-    return find_files(folder, content.files or ())

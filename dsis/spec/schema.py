@@ -2,14 +2,18 @@
 
 import re
 from collections import Counter
-from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    Field,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
 
-from dsis.camera import Camera
 from dsis.color import Color
 from dsis.demosaic import METHODS
 from dsis.imagefile import find_files
@@ -19,28 +23,58 @@ from dsis.scenes import SCENES
 from dsis.visibility import Viewing
 
 Positive = Annotated[float, Field(gt=0)]
-NotNegative = Annotated[float, Field(ge=0)]
-Seed = Annotated[int, Field(ge=0)]
+SEED_MAX = 2**63 - 1  # what SQLite and JSON readers hold
+Seed = Annotated[int, Field(ge=0, le=SEED_MAX)]
+Size = Annotated[int, Field(ge=8, le=32768)]
 Format = Literal["player", "png8", "tiff16", "dpx16", "exr"]
 Noise = Literal["awgn", "sd"]
 
+FRAMES_MAX = 10**6
+LEVEL_MAX = 16
+SCENE_OVERSAMPLING = 2
 TRAINING = "training"  # the content of the training presentations; no content of a test has it
 
 NAME = re.compile(r"[A-Za-z0-9]+(?:[-_.]?[A-Za-z0-9]+)*")
-Globs = Annotated[
-    tuple[str, ...],
-    BeforeValidator(lambda globs: (globs,) if isinstance(globs, str) else tuple(globs)),
-]
+NAME_MAX = 64  # a stimulus' name adds its condition, and file systems end at 255
 FILE_NAME_RULE = "letters, digits and single '-', '_' or '.' between them"
+
+
+def _listed(globs: object) -> object:
+    """Return one glob as a list of one; refuse what names no files at all."""
+    listed = [globs] if isinstance(globs, str) else globs
+    if not isinstance(listed, list) or not all(isinstance(g, str) and g for g in listed):
+        message = f"is {globs!r}, must be a file, folder or glob in quotes, or a list of them"
+        raise ValueError(message)
+    return listed
+
+
+def _once(values: tuple[Any, ...]) -> tuple[Any, ...]:
+    twice = [str(value) for value, count in Counter(values).items() if count > 1]
+    if twice:
+        message = f"named twice: {', '.join(twice)}"
+        raise ValueError(message)
+    return values
+
+
+Globs = Annotated[tuple[str, ...], Field(min_length=1), BeforeValidator(_listed)]
+Once = AfterValidator(_once)
 
 
 class Sequence(Model):
     """Size and duration of every clip."""
 
-    width: Annotated[int, Field(ge=8)]
-    height: Annotated[int, Field(ge=8)]
-    fps: Positive
+    width: Size
+    height: Size
+    fps: Annotated[float, Field(ge=0.01, le=1000)]
     seconds: Positive
+
+    @model_validator(mode="after")
+    def _countable(self) -> Self:
+        if self.fps * self.seconds > FRAMES_MAX:
+            frames = f"{self.fps:g} x {self.seconds:g} = {self.fps * self.seconds:g}"
+            message = f"fps x seconds is {frames} frames, must be at most {FRAMES_MAX}"
+            raise ValueError(message)
+        return self
 
     @property
     def frames(self) -> int:
@@ -54,17 +88,19 @@ class Content(Model):
     Attributes
     ----------
     name
-        Name of the content; with `stills` each file's name takes its place.
+        Name of the content, at most 64 characters; with `stills` each file's takes its place.
     scene, scene_seed
         A scene that dsis renders, and its seed.
     files
-        Globs of a numbered sequence in natural order, or one still; from the spec's folder.
+        Globs of a numbered sequence in natural order, or one still; from the spec's folder. Many
+        files are a sequence, a single one is a still.
     stills
         Globs of stills: every file is a content of its own.
     encoding
         `linear` or `display`; without it floating-point files are linear, integer ones display.
     pan_px_per_frame
-        Speed at which the window moves to the right, in sensor pixels; any fraction.
+        Speed at which the window over a scene or still moves to the right (negative: to the left),
+        in sensor pixels; any fraction. Sequences are not panned.
     oversampling
         Source pixels per sensor pixel along each axis; scenes are rendered at 2.
     """
@@ -75,7 +111,7 @@ class Content(Model):
     files: Globs | None = None
     stills: Globs | None = None
     encoding: Literal["linear", "display"] | None = None
-    pan_px_per_frame: float = 0.0
+    pan_px_per_frame: Annotated[float, Field(ge=-1000, le=1000)] = 0.0
     oversampling: Annotated[int, Field(ge=1, le=8)] | None = None
 
     @field_validator("name")
@@ -83,6 +119,9 @@ class Content(Model):
     def _is_name(cls, name: str | None) -> str | None:
         if name is not None and not NAME.fullmatch(name):
             message = f"is {name!r}, must be {FILE_NAME_RULE}"
+            raise ValueError(message)
+        if name is not None and len(name) > NAME_MAX:
+            message = f"is {name[:20]!r}... of {len(name)} characters, must have at most {NAME_MAX}"
             raise ValueError(message)
         return name
 
@@ -105,6 +144,11 @@ class Content(Model):
                 raise ValueError(message)
         return globs
 
+    @property
+    def scale(self) -> int:
+        """Source pixels per sensor pixel along each axis."""
+        return self.oversampling or (SCENE_OVERSAMPLING if self.scene is not None else 1)
+
     @model_validator(mode="after")
     def _one_source(self) -> Self:
         given = [key for key in ("scene", "files", "stills") if getattr(self, key) is not None]
@@ -125,10 +169,19 @@ class CameraChoice(Model):
 
 
 class Awgn(Model):
-    """Level of the white noise: given, or matched once per content and level to `sd_rgb`."""
+    """Level of the white noise: given, or matched once per content and level to `sd_rgb`.
+
+    Attributes
+    ----------
+    match
+        `psnr` or `visibility`: sigma is solved per content and level.
+    sigma
+        Standard deviation at level 0, 8-bit codes. Level n has sigma x 2^n: the signal is divided
+        by 2^n before the noise and multiplied back after.
+    """
 
     match: Literal["psnr", "visibility"] | None = None
-    sigma: NotNegative | None = None
+    sigma: Annotated[float, Field(ge=0, le=255)] | None = None
 
     @model_validator(mode="after")
     def _one_rule(self) -> Self:
@@ -141,9 +194,11 @@ class Awgn(Model):
 class Conditions(Model):
     """Which noise, demosaicking and levels are crossed."""
 
-    noise: Annotated[tuple[Noise, ...], Field(min_length=1)] = ("awgn", "sd")
-    demosaic: Annotated[tuple[str, ...], Field(min_length=1)] = ("none", "bilinear")
-    levels: Annotated[tuple[Annotated[int, Field(ge=0, le=16)], ...], Field(min_length=1)] = (0,)
+    noise: Annotated[tuple[Noise, ...], Field(min_length=1), Once] = ("awgn", "sd")
+    demosaic: Annotated[tuple[str, ...], Field(min_length=1), Once] = ("none", "bilinear")
+    levels: Annotated[
+        tuple[Annotated[int, Field(ge=0, le=LEVEL_MAX)], ...], Field(min_length=1), Once
+    ] = (0,)
 
     @field_validator("demosaic")
     @classmethod
@@ -154,15 +209,6 @@ class Conditions(Model):
             message = f"unknown demosaicker {', '.join(unknown)}, must be of: {', '.join(allowed)}"
             raise ValueError(message)
         return methods
-
-    @field_validator("noise", "demosaic", "levels")
-    @classmethod
-    def _once(cls, values: tuple[Any, ...]) -> tuple[Any, ...]:
-        twice = [str(value) for value, count in Counter(values).items() if count > 1]
-        if twice:
-            message = f"named twice: {', '.join(twice)}"
-            raise ValueError(message)
-        return values
 
 
 class Session(Model):
@@ -196,7 +242,7 @@ class Spec(Model):
     schema_: Annotated[Literal["dsis-test/1"], Field(alias="schema")]
     title: str = ""
     seed: Seed
-    formats: Annotated[tuple[Format, ...], Field(min_length=1)] = ("player",)
+    formats: Annotated[tuple[Format, ...], Field(min_length=1), Once] = ("player",)
     sequence: Sequence
     viewing: Viewing = Viewing(diagonal_inch=23.0, distance_heights=3.0, peak_cd_m2=100.0)
     content: Annotated[tuple[Content, ...], Field(min_length=1)]
@@ -206,46 +252,3 @@ class Spec(Model):
     awgn: Awgn
     conditions: Conditions
     session: Session = Session()
-
-
-@dataclass(frozen=True)
-class Test:
-    """A test spec with everything that it refers to, checked.
-
-    Attributes
-    ----------
-    spec
-        The spec; paths in it count from `folder`.
-    camera
-        The camera model it names.
-    folder
-        Folder that holds the spec.
-    footage
-        Files of every content that has any, by the content's name; stills are one content each.
-    sigma
-        White noise in 8-bit codes that a manifest has solved, by content and level; else empty.
-    """
-
-    __test__ = False  # no test case, whatever the name says to a test runner
-
-    spec: Spec
-    camera: Camera
-    folder: Path
-    footage: Mapping[str, tuple[Path, ...]]
-    sigma: Mapping[tuple[str, int], float]
-
-    def contents(self) -> tuple[Content, ...]:
-        """Return the contents, each still on its own."""
-        found: list[Content] = []
-        for content in self.spec.content:
-            if content.stills is None:
-                found.append(content)
-            else:
-                names = [still_name(path) for path in find_files(self.folder, content.stills)]
-                found += [content.model_copy(update={"name": name}) for name in names]
-        return tuple(found)
-
-
-def still_name(path: Path) -> str:
-    """Return the content's name of a still: its file's, with what no name may hold replaced."""
-    return re.sub(r"[^A-Za-z0-9]+", "-", path.stem).strip("-") or "still"

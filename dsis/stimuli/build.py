@@ -1,19 +1,16 @@
 """Test spec -> four conditions -> frames and manifest; resumable, whatever the workers."""
 
 import hashlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor, as_completed
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from filelock import FileLock, Timeout
 from numpy.typing import NDArray
 
-from dsis.errors import InputError
 from dsis.manifest import MANIFEST, Clip, ClipFiles, Manifest, Quality, write_manifest
-from dsis.outdir import check_replaceable, finish, partial_of
+from dsis.outdir import result_folder
 from dsis.spec import TRAINING, Test
 from dsis.stimuli.assess import Assessor
 from dsis.stimuli.clipfiles import clip_path, read_frame_bytes, write_frame
@@ -57,34 +54,34 @@ def build_stimuli(
     ------
     InputError
         `out` holds something else, or recorded votes, or unfinished work of another spec.
+    OSError
+        The disk is full, or the place cannot be written.
     """
     digest = build_digest(test)
-    check_replaceable(out, MANIFEST, kept=VOTES)
-    partial = partial_of(out)
-    with _locked(partial):
-        journal = Journal(partial, digest)
-        work = jobs_of(test)
-        total = len(work) * test.spec.sequence.frames
-        tell = progress or _silent
+    work = jobs_of(test)
+    frames = test.spec.sequence.frames
+    total = len(work) * frames
+    tell = progress or _silent
+    with result_folder(out, MANIFEST, keep=recorded_votes, resume=digest) as folder:
+        journal = Journal(folder)
         clips: list[Clip] = []
         sigmas: dict[str, dict[str, float]] = {}
-        for i, job in enumerate(work):
-            done = i * test.spec.sequence.frames
+        for done, job in zip(range(0, total, frames), work, strict=True):
             tell(done, total, f"{job.name}: light")
-            builder = Builder(test, job, partial, journal)
+            builder = Builder(test, job, folder, journal)
             sigmas[job.name] = {str(level): s for level, s in builder.maker.sigma.items()}
             builder.build(jobs, _from(tell, done, total, job.name))
             clips += builder.clips(jobs)
-            write_figures(
-                builder.maker.figure_frames(test.spec.sequence.frames // 2),
-                partial / "figures",
-                job.name,
-            )
+            middle = builder.maker.figure_frames(frames // 2)
+            write_figures(middle, folder / "figures", job.name)
         manifest = manifest_of(test, tuple(clips), sigmas)
-        write_manifest(manifest, partial)
-        journal.remove()
-        finish(partial, out)
+        write_manifest(manifest, folder)
     return manifest
+
+
+def recorded_votes(folder: Path) -> str | None:
+    """Return what must not be lost with a stimuli folder: its recorded votes."""
+    return f"recorded votes ({VOTES})" if (folder / VOTES).exists() else None
 
 
 class Builder:
@@ -114,7 +111,7 @@ class Builder:
 
     def clips(self, jobs: int) -> list[Clip]:
         """Return the manifest's entries of all clips, from what the journal holds."""
-        conditions = {c.stimulus(self.job.name): c for c in self.job.conditions}
+        conditions = self._conditions()
         names = [self.job.reference, *conditions]
         with ThreadPoolExecutor(max(1, jobs)) as pool:
             files = list(pool.map(self._files, names))
@@ -172,6 +169,9 @@ class Builder:
             )
         return found
 
+    def _conditions(self) -> dict[str, Condition]:
+        return {c.stimulus(self.job.name): c for c in self.job.conditions}
+
     def _record(self, name: str, frame: int) -> dict[str, Any]:
         record: dict[str, Any] = self.journal.frames[self.job.name, frame]["clips"][name]
         return record
@@ -180,9 +180,10 @@ class Builder:
         """Tell whether a frame of all clips is on disk with the digests that the journal has."""
         line = self.journal.frames.get((self.job.name, frame))
         return line is not None and all(
-            sha256(read_frame_bytes(self.folder, name, form, frame, self.size)) == digest
-            for name, record in line["clips"].items()
-            for form, digest in record["sha256"].items()
+            sha256(read_frame_bytes(self.folder, name, form, frame, self.size))
+            == line["clips"].get(name, {}).get("sha256", {}).get(form)
+            for name in (self.job.reference, *self._conditions())
+            for form in self.test.spec.formats
         )
 
     def _write(self, frame: int) -> None:
@@ -217,19 +218,3 @@ def _silent(done: int, total: int, what: str) -> None:
 def _from(tell: Progress, start: int, total: int, what: str) -> Callable[[int], None]:
     """Return what tells that so many frames after `start` are done."""
     return lambda done: tell(start + done, total, what)
-
-
-@contextmanager
-def _locked(partial: Path) -> Iterator[None]:
-    """Hold the unfinished folder for this process: a second build of it is refused."""
-    partial.mkdir(parents=True, exist_ok=True)
-    lock = FileLock(partial.with_name(partial.name + ".lock"))
-    try:
-        lock.acquire(blocking=False)
-    except Timeout:
-        raise InputError.of(partial, "", "another process is at work on it") from None
-    try:
-        yield
-    finally:
-        lock.release()
-        Path(lock.lock_file).unlink(missing_ok=True)

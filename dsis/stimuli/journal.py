@@ -11,34 +11,31 @@ from pathlib import Path
 from threading import Lock
 from typing import Any
 
-from dsis.errors import InputError
-
-JOURNAL = "journal.jsonl"
+from dsis.outdir import UNFINISHED
 
 
 class Journal:
-    """Append-only record of a build in its unfinished folder.
+    """Append-only record of a build in its unfinished folder (`dsis.outdir.result_folder`).
 
     Parameters
     ----------
     folder
-        The unfinished folder.
-    digest
-        Digest of all that decides the bytes; a journal of another build is refused.
+        The unfinished folder, which already holds the journal with its first line.
+
+    Attributes
+    ----------
+    frames
+        What is finished, by content and frame.
     """
 
-    def __init__(self, folder: Path, digest: str) -> None:
-        self.path = folder / JOURNAL
-        self.frames: dict[tuple[str, int], dict[str, Any]] = {}
+    def __init__(self, folder: Path) -> None:
+        self.path = folder / UNFINISHED
         self._lock = Lock()
-        lines = self._lines()
-        if lines and lines[0].get("build") != digest:
-            fact = "holds unfinished stimuli of another spec, seed or version: remove it, or give "
-            raise InputError.of(folder, "", fact + "another folder with --out")
-        for line in lines[1:]:
-            self.frames[line["content"], line["frame"]] = line
-        if not lines:
-            self._append({"build": digest})
+        self.frames: dict[tuple[str, int], dict[str, Any]] = {
+            (line["content"], line["frame"]): line
+            for line in self._lines()
+            if {"content", "frame", "clips"} <= line.keys()
+        }
 
     def add(self, content: str, frame: int, clips: dict[str, Any]) -> None:
         """Record a frame whose files are all written."""
@@ -47,23 +44,26 @@ class Journal:
             self.frames[content, frame] = line
             self._append(line)
 
-    def remove(self) -> None:
-        """Take the journal away: the build is complete."""
-        self.path.unlink()
-
     def _lines(self) -> list[dict[str, Any]]:
-        if not self.path.exists():
-            return []
         whole = self.path.read_bytes()
         # A line that was cut off by a kill has no newline: what it says is not finished.
         complete = whole[: whole.rfind(b"\n") + 1]
         if len(complete) < len(whole):
             os.truncate(self.path, len(complete))
-        return [json.loads(line) for line in complete.splitlines()]
+        return [entry for line in complete.splitlines() if (entry := _entry(line)) is not None]
 
     def _append(self, line: dict[str, Any]) -> None:
         with self.path.open("ab") as file:
             file.write(json.dumps(line).encode() + b"\n")
+
+
+def _entry(line: bytes) -> dict[str, Any] | None:
+    """Return what a line says; None where a crash left something else: that frame is made again."""
+    try:
+        entry = json.loads(line)
+    except ValueError:
+        return None
+    return entry if isinstance(entry, dict) else None
 
 
 def sha256(data: bytes | memoryview) -> str:

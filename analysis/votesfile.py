@@ -10,12 +10,13 @@ import numpy as np
 import pandas as pd
 
 from analysis.scale import describe_test
-from analysis.table import DTYPES, Column, to_csv
+from analysis.table import DTYPES, Column, Kind, to_csv
 from analysis.votes import COLUMNS, complete, contradictions
 from dsis.errors import Fault, InputError
 
 FAULTS_LISTED = 20
 _DELIMITERS = (",", ";", "\t")
+_WHOLE_MAX = 2**53  # beyond it neighbouring whole numbers are one number
 
 _Found = list[tuple[int, str, str]]  # row, column, what is wrong
 
@@ -131,6 +132,11 @@ def _check_shape(
     if not found and not rows:
         raise InputError.of(file, "", "holds a header and no votes")
     found += [
+        (line, "", "holds a NUL byte (save the file as CSV UTF-8, not UTF-16)")
+        for line, row in [(at, header), *zip(lines, rows, strict=True)]
+        if any("\0" in cell for cell in row)
+    ]
+    found += [
         (line, "", f"has {len(row)} cells, the header {len(header)}")
         for line, row in zip(lines, rows, strict=True)
         if len(row) != len(header)
@@ -151,7 +157,10 @@ def _parse_column(
     wrong: dict[int, str] = {}
     for code, text in enumerate(distinct):
         try:
-            values.append(column.parse(str(text), decimal_comma=decimal_comma))
+            value = column.parse(str(text), decimal_comma=decimal_comma)
+            if column.kind is Kind.WHOLE and isinstance(value, float):
+                _check_whole(value)
+            values.append(value)
         except ValueError as error:
             values.append(column.default if not column.filled else "")
             wrong[code] = str(error)
@@ -159,6 +168,12 @@ def _parse_column(
         (int(at), wrong[int(codes[at])]) for at in np.flatnonzero(np.isin(codes, list(wrong)))
     ]
     return [values[code] for code in codes], faults
+
+
+def _check_whole(value: float) -> None:
+    if abs(value) > _WHOLE_MAX:
+        fact = f"is {value:g}, must be at most 2^53 = {_WHOLE_MAX}"
+        raise ValueError(fact)
 
 
 def _faults(file: str, found: _Found) -> list[Fault]:

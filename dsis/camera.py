@@ -35,8 +35,8 @@ class Segment(Model):
     """One read-out path: variance = slope * x + intercept, x in DN above black."""
 
     upper_dn: Positive | None = None
-    slope: NotNegative
-    intercept: float
+    slope: Annotated[float, Field(ge=0, le=1e6)]
+    intercept: Annotated[float, Field(ge=-1e12, le=1e12)]
     slope_se: NotNegative | None = None
     intercept_se: NotNegative | None = None
 

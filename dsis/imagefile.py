@@ -34,26 +34,37 @@ def find_files(folder: Path, patterns: Iterable[str]) -> tuple[Path, ...]:
     """Return the files that globs, folders (their images) and paths name, in natural order.
 
     Relative patterns count from `folder`. Each pattern's files are sorted so that 2 comes before
-    10; the order of the patterns is kept.
+    10; the order of the patterns is kept. Whatever exists is meant literally, brackets included:
+    `take[1]/*.png` looks into a folder `take[1]` if there is one. Hidden files of folders are
+    passed over, and so are names that no file can have.
     """
     found: list[Path] = []
     for pattern in patterns:
-        path = folder / Path(pattern).expanduser()
-        if path.is_dir():
-            hits = [p for p in path.iterdir() if p.suffix.lower() in READABLE]
-        elif path.is_file():
-            hits = [path]
-        else:
-            # `Path.glob` takes no absolute patterns.
-            hits = [Path(p) for p in glob.glob(str(path)) if Path(p).is_file()]  # noqa: PTH207
+        try:
+            hits = _hits(folder / Path(pattern).expanduser())
+        except (OSError, RuntimeError, ValueError):  # too long, an unknown ~user, a NUL
+            hits = []
         found += sorted(hits, key=natural_order)
     return tuple(found)
+
+
+def _hits(path: Path) -> list[Path]:
+    if path.is_file():
+        return [path]
+    there = next(base for base in (path, *path.parents) if base.exists())
+    if there == path:
+        inside = (p for p in path.iterdir() if not p.name.startswith("."))
+        return [p for p in inside if p.suffix.lower() in READABLE and p.is_file()]
+    # `Path.glob` knows no root that is no pattern itself.
+    pattern = str(path.relative_to(there))
+    named = glob.glob(pattern, root_dir=there)  # noqa: PTH207
+    return [there / name for name in named if (there / name).is_file()]
 
 
 def natural_order(path: Path) -> list[tuple[int, int, str]]:
     """Return a sorting key under which `frame2` comes before `frame10`."""
     parts = re.split(r"(\d+)", str(path))
-    return [(1, int(p), "") if p.isdigit() else (0, 0, p) for p in parts]
+    return [(1, int(p), "") if p.isdecimal() else (0, 0, p) for p in parts]
 
 
 def info(path: Path) -> ImageInfo:

@@ -1,6 +1,6 @@
 """Frozen, strict models of what users write in TOML; every fault with its path in the file."""
 
-import datetime
+import datetime as dt
 import difflib
 import json
 import tomllib
@@ -67,8 +67,7 @@ def attempt(
     text = json.dumps(values, default=str)
     dates = list(_dates(values, file, prefix))  # as text they would pass for titles and names
     try:
-        value = TypeAdapter(kind).validate_json(text, context=context)
-        return (None, dates) if dates else (value, [])
+        value = TypeAdapter(kind).validate_json(text, strict=True, context=context)
     except ValidationError as error:
         items = error.errors()
         places = [item["loc"] for item in items]
@@ -84,11 +83,12 @@ def attempt(
         ]
         dated = {fault.key for fault in dates}
         return None, [*dates, *(fault for fault in faults if fault.key not in dated)]
+    return (None, dates) if dates else (value, [])
 
 
 def _dates(values: Any, file: str, key: str) -> Iterator[Fault]:
     """Yield a fault for every TOML date or time: no key of ours takes one."""
-    if isinstance(values, datetime.date | datetime.time):
+    if isinstance(values, dt.date | dt.time):
         yield Fault(file, key, f"is the date or time {values}, must be a number, or text in quotes")
     elif isinstance(values, Mapping):
         for name, value in values.items():

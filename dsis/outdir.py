@@ -25,7 +25,7 @@ from pathlib import Path
 
 from filelock import FileLock, Timeout
 
-from dsis.errors import InputError
+from dsis.errors import DsisError, InputError
 
 UNFINISHED = "journal.jsonl"
 """Marks a folder in which dsis is at work: what lies in it may be deleted.
@@ -78,7 +78,13 @@ def result_folder(
             replaced.rename(out)
         _check_replaceable(out, mark, keep)
         _make_ready(partial, keep, resume)
-        yield partial
+        try:
+            yield partial
+        except DsisError:
+            # What the input cannot give leaves nothing behind, unless frames were finished.
+            if (partial / UNFINISHED).read_bytes().count(b"\n") <= 1:
+                shutil.rmtree(partial)
+            raise
         if out.exists():
             shutil.rmtree(replaced, ignore_errors=True)
             out.rename(replaced)

@@ -164,8 +164,8 @@ def test_a_shift_by_parts_of_a_pixel(shift_px: tuple[float, float], oversampling
 
 @settings(max_examples=20, deadline=None)  # the first transform of a size plans it
 @given(
-    rows=st.integers(8, 40),
-    columns=st.integers(8, 40),
+    rows=st.integers(11, 40),  # more than the longest shift, 5 pixels of 2 samples
+    columns=st.integers(11, 40),
     down=st.integers(-5, 5),
     right=st.integers(-5, 5),
     oversampling=st.integers(1, 2),

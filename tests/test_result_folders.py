@@ -86,6 +86,12 @@ def test_unfinished_work_that_cannot_be_resumed_begins_anew(
         (folder / MARK).touch()
 
 
+def test_a_refusal_leaves_nothing_behind(tmp_path: Path) -> None:
+    with pytest.raises(InputError), result_folder(tmp_path / "out", MARK, resume="digest"):
+        raise InputError.of("spec.toml", "key", "cannot be")
+    make(tmp_path / "out", resume="other")
+
+
 def test_a_kill_between_the_two_renames_loses_nothing(tmp_path: Path) -> None:
     make(tmp_path / "out", "old")
     (tmp_path / "out").rename(tmp_path / "out.replaced")

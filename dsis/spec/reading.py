@@ -16,13 +16,11 @@ from dsis.model import attempt, read_toml
 from dsis.spec.checked import Test
 from dsis.spec.fits import misfits, too_long
 from dsis.spec.footage import footage_of, still_name
-from dsis.spec.schema import LEVEL_MAX, SEED_MAX, CameraChoice, Spec
+from dsis.spec.schema import SEED_MAX, SOLVED_SIGMA_MAX, CameraChoice, Spec
 
 # Beside the packages, in a checkout as in an installation.
 SHIPPED = Path(__file__).resolve().parents[2] / "stimuli_specs"
 
-# No wider than what `dsis.stimuli.match` may solve, or a manifest could not be read again.
-SOLVED_SIGMA_MAX = 255.0 * 2**LEVEL_MAX
 Sigmas = dict[str, dict[str, Annotated[float, Field(ge=0, le=SOLVED_SIGMA_MAX)]]]
 
 
@@ -52,15 +50,9 @@ def read_spec(name: str | Path, source: Many[str | Path] = (), seed: int | None 
     """
     path = spec_path(name)
     values, sigma = _values(path)
-    if seed is not None:
-        if not 0 <= seed <= SEED_MAX:
-            raise InputError.of("--seed", "", f"is {seed}, must be from 0 to {SEED_MAX}")
-        values["seed"] = seed
     if source or seed is not None:
+        values |= _overrides(values, source, seed)
         sigma = {}  # solved for other noise, or on other footage
-    if source:
-        _check_source(source)
-        values["content"] = _replaced(values.get("content"), source)
     faults: list[Fault] = []
     camera = _camera(values.get("camera"), path, faults)
     sections: dict[str, Any] = {}
@@ -137,7 +129,8 @@ def _camera(section: object, path: Path, faults: list[Fault]) -> Camera | None:
         found = False
     if not found:
         shipped = sorted(p.name for p in SHIPPED.glob("cameras/*.toml"))
-        fact = f"is {model!r}: no such file, neither from {path.parent.resolve()} nor shipped"
+        shown = model if len(model) <= 60 else model[:57] + "..."
+        fact = f"is {shown!r}: no such file, neither from {path.parent.resolve()} nor shipped"
         faults.append(Fault(str(path), "camera.model", f"{fact} (cameras/: {', '.join(shipped)})"))
         return None
     try:
@@ -163,6 +156,21 @@ def _camera_of(
     return camera
 
 
+def _overrides(
+    values: Mapping[str, Any], source: Many[str | Path], seed: int | None
+) -> dict[str, Any]:
+    """Return the values that options of the command line put in the place of the spec's."""
+    found: dict[str, Any] = {}
+    if seed is not None:
+        if not 0 <= seed <= SEED_MAX:
+            raise InputError.of("--seed", "", f"is {seed}, must be from 0 to {SEED_MAX}")
+        found["seed"] = seed
+    if source:
+        _check_source(source)
+        found["content"] = _replaced(values.get("content"), source)
+    return found
+
+
 def _check_source(source: Many[str | Path]) -> None:
     empty = [str(s) for s in source if not find_files(Path.cwd(), [str(s)])]
     if empty:
@@ -185,4 +193,3 @@ def _replaced(contents: object, source: Many[str | Path]) -> list[dict[str, Any]
         return [{**kept, "stills": paths}]
     stem = re.sub(r"[\d*?\[\]]+$", "", Path(paths[0]).stem)
     return [{**kept, "name": still_name(Path(stem or "footage")), "files": paths}]
-

@@ -31,6 +31,7 @@ Noise = Literal["awgn", "sd"]
 
 FRAMES_MAX = 10**6
 LEVEL_MAX = 16
+SOLVED_SIGMA_MAX = 255.0 * 2**LEVEL_MAX  # 8-bit codes: the largest sigma that a level may have
 SCENE_OVERSAMPLING = 2
 TRAINING = "training"  # the content of the training presentations; no content of a test has it
 
@@ -40,12 +41,12 @@ FILE_NAME_RULE = "letters, digits and single '-', '_' or '.' between them"
 
 
 def _listed(globs: object) -> object:
-    """Return one glob as a list of one; refuse what names no files at all."""
+    """Return one glob as a tuple of one; refuse what names no files at all."""
     listed = [globs] if isinstance(globs, str) else globs
     if not isinstance(listed, list) or not all(isinstance(g, str) and g for g in listed):
         message = f"is {globs!r}, must be a file, folder or glob in quotes, or a list of them"
         raise ValueError(message)
-    return listed
+    return tuple(listed)
 
 
 def _once(values: tuple[Any, ...]) -> tuple[Any, ...]:

@@ -6,6 +6,7 @@ import numpy as np
 
 from dsis.scenes import SCENES
 from dsis.spec import TRAINING, Content, Test
+from dsis.spec.schema import SEED_MAX
 from dsis.stimuli.conditions import Condition, conditions_of
 
 _TRAINING_SEED_STEP = 1_000_003
@@ -51,4 +52,5 @@ def training_content(test: Test) -> Content:
     model = shown[0] if shown else Content(name=TRAINING, scene=SCENES[0])
     scene = unused[0] if unused else model.scene
     seed = max((c.scene_seed for c in shown), default=0) + _TRAINING_SEED_STEP
+    seed %= SEED_MAX + 1
     return model.model_copy(update={"name": TRAINING, "scene": scene, "scene_seed": seed})

@@ -14,12 +14,11 @@ from numpy.typing import NDArray
 from dsis.color import DisplayTransform
 from dsis.imagefile import info, read
 from dsis.optics import Optics, through_optics
-from dsis.scenes import panorama
-from dsis.spec import Content, Sequence, Test
+from dsis.scenes import FEWEST_ROWS, panorama
+from dsis.spec import Content, Footage, Sequence, Test
 
 Light = NDArray[np.float32]
 
-SCENE_OVERSAMPLING = 2
 _CONTEXT_PX = 64  # sensor pixels beside the window that a fractional shift sees
 
 
@@ -70,7 +69,7 @@ class Window(Source):
         return np.ascontiguousarray(window)
 
 
-class Footage(Source):
+class Numbered(Source):
     """A numbered sequence: one file per frame, centred on the sensor."""
 
     def __init__(
@@ -93,34 +92,32 @@ class Footage(Source):
 def source_of(content: Content, test: Test, transform: DisplayTransform) -> Source:
     """Return the source of a content of a test."""
     spec = test.spec
-    size = spec.sequence
+    size, scale = spec.sequence, content.scale
     if content.scene is not None:
-        scale = content.oversampling or SCENE_OVERSAMPLING
         travel = int(np.ceil(abs(content.pan_px_per_frame) * (size.frames - 1)))
-        image = panorama(
-            content.scene, content.scene_seed, scale * size.height, scale * (size.width + travel)
-        )
+        rows = max(FEWEST_ROWS, scale * size.height)  # of which the window shows the middle
+        image = panorama(content.scene, content.scene_seed, rows, scale * (size.width + travel))
         light = transform.scene_from_linear_rec709(image)
         return Window(light, spec.optics, size, scale, content.pan_px_per_frame)
-    paths = test.footage[content.name or ""]
-    scale = content.oversampling or 1
-    linear = _as_they_are if is_linear(content, paths) else transform.scene_from_display
-    if len(paths) == 1:
-        return Window(linear(read(paths[0])), spec.optics, size, scale, content.pan_px_per_frame)
-    return Footage(paths, linear, spec.optics, size, scale)
+    footage = test.footage[content.name or ""]
+    linear = _as_they_are if is_linear(content, footage) else transform.scene_from_display
+    if footage.still:
+        image = linear(read(footage.paths[0]))
+        return Window(image, spec.optics, size, scale, content.pan_px_per_frame)
+    return Numbered(footage.paths, linear, spec.optics, size, scale)
 
 
-def is_linear(content: Content, paths: tuple[Path, ...]) -> bool:
+def is_linear(content: Content, footage: Footage) -> bool:
     """Tell whether files hold linear light: as the spec says, else floating-point files do."""
     if content.encoding is not None:
         return content.encoding == "linear"
-    return info(paths[0]).floating
+    return info(footage.paths[0]).floating
 
 
 def remarks_on(content: Content, test: Test) -> tuple[str, ...]:
     """Return what a reader of the results must know of a content's footage."""
-    paths = test.footage.get(content.name or "", ())
-    if content.scene is not None or is_linear(content, paths):
+    footage = test.footage.get(content.name or "")
+    if footage is None or is_linear(content, footage):
         return ()
     says = "not noise-free, display-referred: the footage carries noise and rendering of its own, "
     says += "so the reference is not noise-free and linear light is an inversion of the view"

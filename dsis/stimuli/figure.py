@@ -22,12 +22,12 @@ def fig5(frames: dict[str, Frame]) -> NDArray[np.uint8]:
     Parameters
     ----------
     frames
-        `reference` and one display frame per demosaicking method, `none` first. Upper row: crops
-        from the middle of the frame; lower row: difference x 4 + 128.
+        `reference` and one display frame per demosaicking method. Upper row: crops from the middle
+        of the frame, that of `none` first; lower row: difference x 4 + 128.
     """
     reference = _crop(delivered(frames["reference"]))
     columns = []
-    for name, frame in frames.items():
+    for name, frame in sorted(frames.items(), key=lambda item: item[0] != "none"):
         if name != "reference":
             noisy = _crop(delivered(frame))
             difference = noisy.astype(np.int32) - reference

@@ -4,7 +4,6 @@ import json
 from importlib.metadata import version
 from typing import Any
 
-import dsis
 from dsis.camera import camera_values
 from dsis.color import STUDIO_CONFIG
 from dsis.manifest import Clip, Manifest
@@ -55,9 +54,8 @@ def manifest_of(
 
 
 def _versions() -> dict[str, str]:
-    packages = ("numpy", "scipy", "numba", "opencolorio", "OpenImageIO")
+    packages = ("dsis", "numpy", "scipy", "numba", "opencolorio", "OpenImageIO")
     return {
-        "dsis": dsis.__version__,
         "ocio_config": STUDIO_CONFIG,
         **{name: version(name) for name in packages},
     }

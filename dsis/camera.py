@@ -29,6 +29,7 @@ from dsis.noise import Segments, read_noise, shot_noise
 Row = tuple[float, float, float]
 Positive = Annotated[float, Field(gt=0)]
 NotNegative = Annotated[float, Field(ge=0)]
+_MOST_BITS = 24  # of float32's significand
 
 
 class Segment(Model):
@@ -68,7 +69,7 @@ class Camera(Model):
     cfa: Cfa
     black_level: NotNegative
     white_level: Positive
-    bit_depth: Annotated[int, Field(ge=1, le=32)]
+    bit_depth: Annotated[int, Field(ge=1)]
     saturation_dn: Positive | None = None
     diffuse_white_dn: Positive | None = None
     white_balance: tuple[Positive, Positive, Positive] = (1.0, 1.0, 1.0)
@@ -78,6 +79,13 @@ class Camera(Model):
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
+        if self.bit_depth > _MOST_BITS:
+            message = f"bit_depth is {self.bit_depth}, must be <= {_MOST_BITS}: frames are "
+            message += "computed in single precision, which holds no longer codes exactly"
+            raise ValueError(message)
+        if not self.white_level.is_integer():
+            message = f"white_level is {self.white_level}, must be a whole number: it is a code"
+            raise ValueError(message)
         if self.white_level > 2**self.bit_depth - 1:
             message = f"white_level is {self.white_level}, must be <= {2**self.bit_depth - 1}: "
             message += f"the largest code of bit_depth = {self.bit_depth}"
@@ -213,7 +221,8 @@ class Camera(Model):
             ReadNoise(laws=tuple(law for law in physics if law.reshapes == "read_noise")),
             Conversion(),
         )
-        return tuple(sorted((*base, *physics), key=_place))
+        full = () if self.saturation_dn is None else (FullWell(saturation_dn=self.saturation_dn),)
+        return tuple(sorted((*base, *full, *physics), key=_place))
 
     def _physics(self) -> tuple[Effect, ...]:
         """Return the effects, what `noise.shot` asks for among them."""
@@ -307,6 +316,22 @@ class ShotNoise(BaseLink):
         e = exposure
         draw = _Reshaped.of(e, self.laws, image)
         return shot_noise(image, e.read_out.segments, draw, e.grid, e.frame, e.threads)
+
+
+class FullWell(BaseLink):
+    """Charge stops growing at the camera's `saturation_dn`: shot noise ends there, too."""
+
+    kind: str = "full_well"
+    saturation_dn: Positive
+    stage: ClassVar[Stage] = Stage.CHARGE
+    measures: ClassVar[frozenset[str]] = frozenset(
+        {"level", "pixel_variance", "skewness", "kurtosis"}
+    )
+
+    def apply(self, image: Image, exposure: Exposure) -> Image:
+        """Cut charge, shot noise included, at the full well."""
+        del exposure
+        return np.minimum(image, np.float32(self.saturation_dn))
 
 
 class ReadNoise(BaseLink):

@@ -152,7 +152,9 @@ def read_codes(path: Path) -> NDArray[np.unsignedinteger]:
     error = opened.geterror().strip()
     opened.close()
     if pixels is None or error:
-        raise InputError.of(path, "", f"is damaged: {error or 'no pixels'}")
+        # The libraries of the formats complain once a strip: the first line says it.
+        reason = error.splitlines() or ["no pixels"]
+        raise InputError.of(path, "", f"is damaged: {reason[0].strip()}")
     stored: NDArray[np.unsignedinteger] = np.asarray(pixels)[:, :, 0]
     if path.suffix.lower() in (".pgm", ".pnm"):
         return _unstretched(stored, _netpbm_maximum(path))

@@ -5,6 +5,7 @@ import difflib
 import json
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, TypeVar, get_args, get_origin
 
@@ -19,6 +20,13 @@ class Model(BaseModel):
     model_config = ConfigDict(
         frozen=True, extra="forbid", strict=True, allow_inf_nan=False, populate_by_name=True
     )
+
+
+@dataclass(frozen=True)
+class Elsewhere:
+    """Marks a tagged union: kinds that users look for in it, and what to write instead."""
+
+    instead: Mapping[str, str]
 
 
 M = TypeVar("M", bound=Model)
@@ -118,9 +126,7 @@ def _fact(problem: str, item: Any, context: Any, parent: Any) -> str:
         case "value_error":
             return str(context["error"])
         case "union_tag_invalid":
-            known = sorted(context["expected_tags"].replace("'", "").split(", "))
-            hint = _near(context["tag"], known, " (did you mean {}?)")
-            return f"is {context['tag']!r}{hint}, must be one of: {', '.join(known)}"
+            return _no_such_kind(context["tag"], context["expected_tags"], _instead(parent))
         case "too_short" | "too_long":
             least = context.get("min_length")
             bound = f"at least {least}" if least else f"at most {context['max_length']}"
@@ -130,6 +136,20 @@ def _fact(problem: str, item: Any, context: Any, parent: Any) -> str:
     shown = json.dumps(item.get("input"), default=str, ensure_ascii=False)
     shown = shown if len(shown) <= 60 else shown[:57] + "..."
     return f"is {shown}, must be {must}"
+
+
+def _no_such_kind(tag: str, expected: str, instead: Mapping[str, str]) -> str:
+    if tag in instead:
+        return f"is {tag!r}, which {instead[tag]}"
+    known = sorted(expected.replace("'", "").split(", "))
+    hint = _near(tag, known, " (did you mean {}?)")
+    return f"is {tag!r}{hint}, must be one of: {', '.join(known)}"
+
+
+def _instead(parent: Any) -> Mapping[str, str]:
+    """Return what the union that `parent` is or lists says of kinds that it lacks."""
+    marks = (mark for part in (parent, *get_args(parent)) for mark in get_args(part))
+    return next((mark.instead for mark in marks if isinstance(mark, Elsewhere)), {})
 
 
 def _near(word: str, known: Sequence[str], says: str) -> str:

@@ -319,6 +319,27 @@ def test_saturation_is_a_censored_law() -> None:
     assert abs(stack.var() - variance) < Z_MAX * variance * np.sqrt(2 / n) + 1 / 12
 
 
+@pytest.mark.parametrize("beyond", [200.0, 5000.0])
+def test_a_full_camera_has_read_noise_alone(beyond: float) -> None:
+    """At 200 DN above the full well shot noise (sd 6.5) never comes below it."""
+    full, read = 4000.0, 25.0
+    noisy = camera(slope=0.01, intercept=read)
+    stack = recorded(noisy.model_copy(update={"saturation_dn": full}), full + beyond, 50)
+    n, variance = stack.size, read + 1 / 12
+    assert abs(stack.mean() - full) < Z_MAX * np.sqrt(variance / n)
+    assert abs(stack.var() / variance - 1) < Z_MAX * np.sqrt(2 / n)
+
+
+def test_a_camera_fills_as_the_effect_saturation_does() -> None:
+    noisy = camera(slope=1.0, intercept=4.0)
+    by_effect = camera(effect("saturation", full_well_dn=3000.0), slope=1.0, intercept=4.0)
+    by_camera = noisy.model_copy(update={"saturation_dn": 3000.0})
+    np.testing.assert_array_equal(recorded(by_camera, 2980.0, 3), recorded(by_effect, 2980.0, 3))
+    # Far above what occurs it changes no bit.
+    unfilled = noisy.model_copy(update={"saturation_dn": 9000.0})
+    np.testing.assert_array_equal(recorded(unfilled, 2980.0, 3), recorded(noisy, 2980.0, 3))
+
+
 @given(percent=st.floats(-15, 15))
 def test_nonlinearity_is_the_largest_deviation_from_the_line(percent: float) -> None:
     full_scale = WHITE_DN - BLACK_DN
@@ -341,6 +362,26 @@ def test_quantisation_leaves_multiples_of_the_step(step: float) -> None:
     assert np.abs(codes - BLACK_DN - image).max() <= step / 2 + 1e-3
     error = (codes - BLACK_DN - image).var() * 12 / step**2
     assert abs(error - 1) < Z_MAX * np.sqrt(0.8) / SIDE  # uniform law: kurtosis 1.8
+
+
+@pytest.mark.parametrize("step", [3.0, 4.0, 7.0, 1000.0])
+def test_quantisation_leaves_multiples_where_codes_are_clipped(step: float) -> None:
+    one = camera(effect("quantisation", step_dn=step), intercept=400.0)
+    for level in (-BLACK_DN, WHITE_DN - BLACK_DN):
+        codes = recorded(one, level, 2) + BLACK_DN
+        assert (codes % step == 0).all()
+        assert codes.min() >= 0
+        assert codes.max() <= WHITE_DN
+
+
+def test_readout_memory_remembers_a_shifted_mean() -> None:
+    """Charge cut 100 DN below what the light gives: a tenth of it is missing once more."""
+    memory = effect("readout_memory", fraction=0.1, lag_pixels=2)
+    full = camera(memory, slope=0.0, intercept=4.0).model_copy(update={"saturation_dn": 900.0})
+    stack = recorded(full, 1000.0, 20)
+    rest = stack[:, :, 2:]
+    assert abs(rest.mean() - 890) < Z_MAX * 2.1 * 1.1 / np.sqrt(rest.size)
+    assert abs(stack[:, :, :2].mean() - 900) < Z_MAX * 2.1 / np.sqrt(stack[:, :, :2].size)
 
 
 @pytest.mark.parametrize("rms", [0.1, 0.5, 1.0])

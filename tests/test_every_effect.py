@@ -341,6 +341,28 @@ gain_error_percent = 1.0
         assert "effect[1] (dual_gain_mismatch): needs a second" in str(refused.value)
         self.read(tmp_path, text, segments=2, cfa="RGGB")
 
+    def test_a_second_gain_belongs_to_the_base_model(self, tmp_path: Path) -> None:
+        text = '[[effect]]\nkind = "dual_gain"\n[[effect]]\nkind = "row_nois"\n'
+        with pytest.raises(InputError) as refused:
+            self.read(tmp_path, text)
+        first, second = str(refused.value).splitlines()
+        assert first.endswith(
+            "effect[0].kind: is 'dual_gain', which is no effect: write a second [[noise.segment]]"
+        )
+        assert "effect[1].kind: is 'row_nois' (did you mean row_noise?)" in second
+
+    @pytest.mark.parametrize(("level", "bits", "says"), [
+        ("1022.5", "10", r"white_level is 1022\.5, must be a whole number"),
+        ("1023", "25", "bit_depth is 25, must be <= 24: frames are computed in single precision"),
+    ])  # fmt: skip
+    def test_codes_that_cannot_be(self, tmp_path: Path, level: str, bits: str, says: str) -> None:
+        path = tmp_path / "camera.toml"
+        write_camera(BACKGROUND, path)
+        text = path.read_text().replace("white_level = 65535.0", f"white_level = {level}")
+        path.write_text(text.replace("bit_depth = 16", f"bit_depth = {bits}"))
+        with pytest.raises(InputError, match=says):
+            read_camera(path)
+
     def test_a_law_given_twice(self, tmp_path: Path) -> None:
         with pytest.raises(InputError, match="poisson_shot_noise is given 2 times"):
             self.read(tmp_path, '[[effect]]\nkind = "poisson_shot_noise"\n' * 2)

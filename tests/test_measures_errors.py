@@ -132,6 +132,40 @@ def test_errors_are_right_under_row_noise_flicker_and_fixed_gain(frames: int) ->
     check_errors(found, truth)
 
 
+def scatter_ratio(found: list[Estimate], truth: float) -> tuple[float, np.ndarray]:
+    """Return stated error over scatter, and how the values miss the truth."""
+    missed = np.array([one.value for one in found]) - truth
+    stated = np.sqrt(np.mean([one.standard_error**2 for one in found]))
+    return float(stated / missed.std()), missed
+
+
+def test_the_error_of_skewness_knows_skewed_noise() -> None:
+    """0.3 electrons: without the covariance with the variance the error is far too large."""
+    rng = np.random.default_rng(8)
+    electrons, gain = 0.3, 40
+    found = [
+        measure(gain * rng.poisson(electrons, (16, ROWS, COLUMNS)).astype(np.uint16))["skewness"]
+        for _ in range(RUNS // 2)
+    ]
+    ratio, missed = scatter_ratio(found, electrons**-0.5)
+    assert abs(missed.mean()) < ERRORS * missed.std() / np.sqrt(len(missed))
+    assert abs(ratio - 1) < tolerance(missed)
+
+
+def test_the_error_of_frame_correlation_knows_correlated_pixels() -> None:
+    """A 3 x 3 mean: sum of rho^2 is (1 + 2 (4/9 + 1/9))^2 = 4.46, the error 2.1 times as large."""
+    rng = np.random.default_rng(9)
+    found = []
+    for _ in range(RUNS // 2):
+        white = rng.normal(0, 60, (12, ROWS + 2, COLUMNS + 2))
+        lines = white[:, :-2] + white[:, 1:-1] + white[:, 2:]
+        smooth = (lines[:, :, :-2] + lines[:, :, 1:-1] + lines[:, :, 2:]) / 9
+        found.append(measure(np.rint(900 + smooth).astype(np.uint16))["frame_correlation"])
+    ratio, missed = scatter_ratio(found, 0.0)
+    assert abs(missed.mean()) < ERRORS * missed.std() / np.sqrt(len(missed))
+    assert abs(ratio - 1) < tolerance(missed)
+
+
 def test_few_frames_cannot_hide_a_drift() -> None:
     """An error taken from 4 frames alone would never let a frame variance stand out."""
     rng = np.random.default_rng(1)

@@ -438,6 +438,10 @@ def _white(folder: Path) -> Path:
     return described(folder, exposure("a", '"a.tif"'), sensor=TOML.replace("4095", "65535"))
 
 
+def _fraction(folder: Path) -> Path:
+    return described(folder, exposure("a", '"a.tif"'), sensor=TOML.replace("4095", "4094.5"))
+
+
 def _pattern(folder: Path) -> Path:
     return described(folder, exposure("a", '"a.tif"'), sensor=TOML.replace("MONO", "XTRANS"))
 
@@ -462,9 +466,10 @@ BROKEN: list[tuple[Callable[[Path], Path], list[str]]] = [
     (_pages, ["b.tif holds more than one image, must hold one frame"]),
     (_dark_light, ["exposure[0]: light is 3, must be 0 or absent: the exposure is dark"]),
     (_no_light, ["exposure[0]: light is 0, must be greater than 0 in a flat"]),
-    (_no_time, ["exposure[0].exposure_time_s: is 0.0, must be greater than 0"]),
+    (_no_time, ["exposure[0].exposure_time_s: is 0.0, must be greater than 0: give the time"]),
     (_kind, ["exposure[0].kind: is \"flatfield\", must be 'dark', 'flat' or 'scene'"]),
     (_white, ["sensor: white_level is 65535, must be <= 4095"]),
+    (_fraction, ["sensor: white_level is 4094.5, must be a whole number"]),
     (_pattern, ['sensor.cfa: is "XTRANS", must be']),
 ]
 
@@ -523,6 +528,7 @@ class TestBroken:
         with pytest.raises(InputError, match=r"b\.tif") as refused:
             stream()
         assert "damaged" in str(refused.value) or "no readable image" in str(refused.value)
+        assert len(str(refused.value).splitlines()) == 1
 
     def test_a_code_above_the_white_level(self, tmp_path: Path) -> None:
         codes = frames_of(1)[0]

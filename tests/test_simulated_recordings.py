@@ -289,6 +289,26 @@ class TestLike:
         values = site(stack(made, "b"), (0, 1))
         assert_mean(values, BLACK + 3000, variance_dn2(3000), variance_dn2(3000) / values.size)
 
+    @pytest.mark.parametrize("effects", [[], [Falloff()]])
+    def test_flats_that_fill_the_pixels_follow_the_light(
+        self, tmp_path: Path, effects: list[Effect]
+    ) -> None:
+        """Below the white level no code is clipped; of the noise read noise alone is left."""
+        full = 2000.0
+        shots = (
+            SHOTS[0],
+            flat("half", 1000.0, frames=6, exposure_time_s=0.01, light=1.0),
+            flat("full", 4000.0, frames=6, exposure_time_s=0.01, light=4.0),
+        )
+        camera = camera_of(Cfa.MONO, effects).model_copy(update={"saturation_dn": full})
+        like = simulate(camera, shots, ROWS, COLUMNS, tmp_path / "real", seed=77)
+        made = simulate_like(camera, like, tmp_path / "made", seed=3)
+        codes = stack(made, "full")
+        variance = INTERCEPT + 1 / 12
+        assert_mean(codes, BLACK + full, variance)
+        assert abs(codes.var() / variance - 1) < Z_MAX * np.sqrt(2 / codes.size)
+        assert abs(stack(made, "half").mean() - stack(like, "half").mean()) < 1.0
+
     def test_a_scene_is_its_mean_frame_above_black(self, tmp_path: Path) -> None:
         rng = np.random.default_rng(0)
         picture = rng.uniform(100, 3000, (ROWS, COLUMNS)).astype(np.float32)

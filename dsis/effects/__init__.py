@@ -14,6 +14,7 @@ from typing import Annotated, Any
 from pydantic import Field
 
 from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, ReadOut, Stage
+from dsis.model import Elsewhere
 
 __all__ = [
     "Effect",
@@ -25,6 +26,9 @@ __all__ = [
     "any_effect",
     "registry",
 ]
+
+
+_OF_THE_BASE_MODEL = {"dual_gain": "is no effect: write a second [[noise.segment]]"}
 
 
 @cache
@@ -47,4 +51,5 @@ def registry() -> dict[str, type[Effect]]:
 
 def any_effect() -> Any:
     """Return the type of a value that is one of the effects, told apart by `kind`."""
-    return Annotated[reduce(or_, registry().values()), Field(discriminator="kind")]
+    kinds = reduce(or_, registry().values())
+    return Annotated[kinds, Field(discriminator="kind"), Elsewhere(_OF_THE_BASE_MODEL)]

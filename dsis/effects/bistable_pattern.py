@@ -19,7 +19,9 @@ class BistablePattern(Effect):
 
     v(t, y, x) = S(y, x) + s(t) A cos(2 pi (u x + w y)), s = -1 or 1 with equal chance; (u, w) =
     `frequency` in cycles per pixel, x first: (0.5, 0.5) is a checkerboard, (0.5, 0) are stripes.
-    It adds A^2 to the temporal variance where u and w are 0 or 0.5, else A^2 / 2.
+    It adds A^2 to the temporal variance where u and w are 0 or 0.5, else A^2 / 2. A is half the
+    peak to peak only where the sampled cosine reaches -1 and 1, as it does for 0.5; at other
+    frequencies samples may miss the crests (u = 1/3: 1 and -1/2).
     """
 
     kind: Literal["bistable_pattern"] = "bistable_pattern"

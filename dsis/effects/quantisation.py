@@ -10,9 +10,10 @@ from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, Stage
 
 
 class Quantisation(Effect):
-    """Codes come in steps: only whole multiples of the step occur.
+    """Codes come in steps: only whole multiples of a whole step occur, at both ends too.
 
-    c = step round((v + black) / step). Where the noise is wider than half a step the variance
+    c = step min(round((v + black) / step), floor(white / step)); the converter then rounds what a
+    fractional step gives to whole codes. Where the noise is wider than half a step the variance
     grows by (step^2 - 1) / 12, the finer rounding to whole codes having been there before.
     """
 
@@ -30,9 +31,10 @@ class Quantisation(Effect):
     )
 
     def apply(self, image: Image, exposure: Exposure) -> Image:
-        """Round to whole steps."""
+        """Round to whole steps, none of them above the white level."""
         black, step = np.float32(exposure.read_out.black_level_dn), np.float32(self.step_dn)
-        codes: Image = step * np.rint((image + black) / step)
+        top = np.float32(exposure.read_out.white_level_dn // self.step_dn)
+        codes: Image = step * np.minimum(np.rint((image + black) / step), top)
         return codes - black
 
     def contributions(self, point: OperatingPoint) -> Mapping[str, float]:

@@ -15,7 +15,9 @@ class ReadoutMemory(Effect):
     v'(i) = v(i) + f n(i - lag), n = v - S the deviation from the expected signal, which the clamp,
     the correlated double sampling or the converter bank has in common. A negative fraction takes
     noise away. Correlation f / (1 + f^2) at that lag and at no other; the first samples of a line
-    have nothing to remember.
+    have nothing to remember. S is what the light alone gives: where charge is bent, exchanged or
+    cut (nonlinearity, crosstalk, saturation) or offsets are fixed, v - S has a mean, of which f is
+    remembered like the noise, and the level shifts.
     """
 
     kind: Literal["readout_memory"] = "readout_memory"
@@ -31,6 +33,7 @@ class ReadoutMemory(Effect):
     )
     measures: ClassVar[frozenset[str]] = frozenset(
         {
+            "level",  # where other effects moved the mean from the expected signal
             "pixel_variance",
             "row_variance",
             "column_variance",
@@ -69,4 +72,5 @@ class ReadoutMemory(Effect):
         f, k = self.fraction, self.lag_pixels
         across = point.columns if self.along == "rows" else point.rows
         lag = (0, k) if self.along == "rows" else (k, 0)
-        return point.coupled({(0, 0): v * f**2 * max(across - k, 0) / across, lag: v * f})
+        noise = point.coupled({(0, 0): v * f**2 * max(across - k, 0) / across, lag: v * f})
+        return noise | {"level": 0.0}  # of the effect alone

@@ -47,6 +47,9 @@ class Sensor(Model):
     @model_validator(mode="after")
     def _consistent(self) -> Self:
         largest = 2**self.bit_depth - 1
+        if not self.white_level.is_integer():
+            message = f"white_level is {self.white_level}, must be a whole number: it is a code"
+            raise ValueError(message)
         if self.white_level > largest:
             message = f"white_level is {self.white_level:g}, must be <= {largest}: "
             message += f"the largest code of bit_depth = {self.bit_depth}"

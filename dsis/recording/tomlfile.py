@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 import tomli_w
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from dsis.errors import Fault
 from dsis.imagefile import natural_order
@@ -24,12 +24,20 @@ def _listed(value: object) -> object:
     return tuple(value) if isinstance(value, list) else value
 
 
+def _positive(time_s: float) -> float:
+    if not time_s > 0:
+        message = f"is {time_s}, must be greater than 0: give the time that the camera was set to, "
+        message += "for bias frames the shortest that it has"
+        raise ValueError(message)
+    return time_s
+
+
 class Entry(Model):
     """One `[[exposure]]`; attributes as those of `RecordedExposure`, frames as paths or a glob."""
 
     name: Annotated[str, Field(min_length=1)]
     kind: Kind
-    exposure_time_s: Annotated[float, Field(gt=0)]
+    exposure_time_s: Annotated[float, AfterValidator(_positive)]
     light: Annotated[float, Field(ge=0)] | None = None
     frames: Annotated[tuple[str, ...], BeforeValidator(_listed), Field(min_length=1)]
 

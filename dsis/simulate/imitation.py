@@ -34,8 +34,9 @@ class Imitation:
     A flat is uniform: each colour filter site has the mean that the recording has above black.
     What the camera's own effects do to a mean (dark current, shading, non-linearity ...: all that
     state the measure `level`) is taken off: the signal is sought that, seen through these effects,
-    has the recorded mean. Where a flat is clipped, its signal follows from the brightest flat that
-    is not, in proportion to light (to exposure time where no light is stated).
+    has the recorded mean. Where a flat is clipped or fills the pixels (`saturation_dn`), its signal
+    follows from the brightest flat that does not, in proportion to light (to exposure time where no
+    light is stated).
     """
 
     camera: Camera
@@ -65,7 +66,9 @@ class Imitation:
     def _flats(self) -> dict[str, Sites]:
         """The clean signal of each flat, DN above black."""
         flats = self.recording.of_kind("flat")
-        clipped = {e.name: self._levels.clipped[e.name] > CLIPPED_SHARE for e in flats}
+        clipped = {
+            e.name: (self._levels.clipped[e.name] > CLIPPED_SHARE) | self._full(e) for e in flats
+        }
         found = {e.name: self._solved(e, clipped[e.name]) for e in flats}
         for e in flats:
             for row, column in np.argwhere(clipped[e.name]):
@@ -78,6 +81,19 @@ class Imitation:
     def _above_black(self, exposure: RecordedExposure) -> Sites:
         black = black_dn(self.recording, self._levels, exposure.exposure_time_s)
         return np.maximum(self._levels.mean_dn[exposure.name] - black, 0.0)
+
+    def _full(self, exposure: RecordedExposure) -> NDArray[np.bool_]:
+        """Tell where the light would give more charge than a pixel holds."""
+        saturation, time = self.camera.saturation_dn, exposure.exposure_time_s
+        if saturation is None:
+            return np.zeros((2, 2), bool)
+        # Light that just fills a pixel has half its shot noise cut: a mean of s / sqrt(2 pi) less.
+        cut = np.sqrt(_shot_variance_dn2(self.camera, saturation) / (2 * np.pi))
+        mean = np.full((2, 2), saturation - cut)
+        if self._reshaping.effect:
+            offset = self._own_dark(time) if self.recording.of_kind("dark") else np.zeros((2, 2))
+            mean = self._seen(np.full((2, 2), saturation), time) - offset - cut
+        return np.asarray(self._above_black(exposure) >= mean)
 
     def _solved(self, exposure: RecordedExposure, clipped: NDArray[np.bool_]) -> Sites:
         """Return the signal whose mean, seen through the camera, is the recorded one.
@@ -137,6 +153,13 @@ class Imitation:
         )
         means = site_means(image)
         return np.full((2, 2), means.mean()) if self.camera.cfa == "MONO" else means
+
+
+def _shot_variance_dn2(camera: Camera, signal_dn: float) -> float:
+    """Return the variance of the base model's shot noise, DN^2."""
+    segments = camera.segments
+    i = segments.index(np.array([signal_dn], np.float32))[0]
+    return float(max(segments.slope_dn[i] * signal_dn + min(segments.intercept_dn2[i], 0), 0))
 
 
 def _in_proportion(

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
+from zipfile import BadZipFile
 
 import numpy as np
 from pydantic import ConfigDict
@@ -31,10 +32,14 @@ class SensorMaps:
     prnu_gain
         Response of each pixel relative to the mean of its colour: photo-response non-uniformity
         with shading and taps; mean 1 over each colour.
+    dsnu_noise_dn, prnu_noise
+        Temporal noise left in the maps, standard deviation of a pixel; 0 where it is not known.
     """
 
     dsnu_dn: Image
     prnu_gain: Image
+    dsnu_noise_dn: float = 0.0
+    prnu_noise: float = 0.0
 
 
 def read_maps(camera_file: Path) -> SensorMaps:
@@ -46,9 +51,21 @@ def read_maps(camera_file: Path) -> SensorMaps:
     try:
         with np.load(path, allow_pickle=False) as stored:
             arrays = {name: stored[name] for name in stored.files}
-    except (OSError, ValueError, EOFError) as error:
+    except (OSError, ValueError, EOFError, BadZipFile) as error:
         raise InputError.of(path, "", f"is damaged: {str(error).splitlines()[0]}") from None
+    owner = str(arrays.pop("camera", camera_file.name))
+    if owner != camera_file.name:
+        fact = (
+            f"holds the patterns of {owner}, must be those of {camera_file.name}: a folder holds "
+        )
+        raise InputError.of(path, "camera", f"{fact}the maps of one camera; fit into another")
+    noise = {name: arrays.pop(name, np.float64(0)) for name in ("dsnu_noise_dn", "prnu_noise")}
     faults = [
+        Fault(str(path), name, f"is {value}, must be a number >= 0")
+        for name, value in noise.items()
+        if value.ndim or value.dtype.kind not in "fiu" or not 0 <= value < np.inf
+    ]
+    faults += [
         Fault(str(path), name, "is missing, must be an array (row, column)")
         for name in ("dsnu_dn", "prnu_gain")
         if name not in arrays
@@ -65,7 +82,21 @@ def read_maps(camera_file: Path) -> SensorMaps:
         faults.append(Fault(str(path), "prnu_gain", "holds a gain <= 0, must be greater than 0"))
     if faults:
         raise InputError(faults)
-    return SensorMaps(arrays["dsnu_dn"].astype(_DTYPE), arrays["prnu_gain"].astype(_DTYPE))
+    return SensorMaps(
+        arrays["dsnu_dn"].astype(_DTYPE),
+        arrays["prnu_gain"].astype(_DTYPE),
+        float(noise["dsnu_noise_dn"]),
+        float(noise["prnu_noise"]),
+    )
+
+
+def owner_of(maps_file: Path) -> str | None:
+    """Return the file name of the camera whose maps these are; None where no maps say it."""
+    try:
+        with np.load(maps_file, allow_pickle=False) as stored:
+            return str(stored["camera"])
+    except (OSError, ValueError, EOFError, KeyError, BadZipFile):
+        return None
 
 
 def write_maps(maps: SensorMaps, camera_file: Path) -> None:
@@ -74,6 +105,9 @@ def write_maps(maps: SensorMaps, camera_file: Path) -> None:
         camera_file.parent / MAPS,
         dsnu_dn=maps.dsnu_dn.astype(_DTYPE),
         prnu_gain=maps.prnu_gain.astype(_DTYPE),
+        dsnu_noise_dn=np.float64(maps.dsnu_noise_dn),
+        prnu_noise=np.float64(maps.prnu_noise),
+        camera=np.str_(camera_file.name),
     )
 
 

@@ -162,7 +162,9 @@ def camera_fit(options: argparse.Namespace) -> None:
     from analysis.photon_transfer import fit_camera, summary, write_fit
     from dsis.recording import read_recording
 
-    fit = fit_camera(read_recording(options.recording), options.segments)
+    recording = read_recording(options.recording)
+    with _progress("fit") as progress:
+        fit = fit_camera(recording, options.segments, threads=options.jobs, progress=progress)
     write_fit(fit, options.out)
     print(summary(fit))
     print(f"camera model in {options.out}")
@@ -371,6 +373,7 @@ def _add_camera(commands: Commands) -> None:
     sub.add_argument("-o", "--out", type=Path, required=True, metavar="camera.toml")
     segments = "read-out segments (default: as the data need)"
     sub.add_argument("--segments", type=_whole(1), metavar="N", help=segments)
+    _add_jobs(sub)
     sub = add(
         "simulate",
         camera_simulate,

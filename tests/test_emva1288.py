@@ -14,8 +14,10 @@ from analysis.photon_transfer.emva1288 import figures_of_merit
 from analysis.photon_transfer.statistics import LevelStatistics
 from dsis.camera import read_camera
 from dsis.recording import read_recording
+from dsis.simulate import simulate_like
 
 ONE_PERCENT = 0.01
+Z_MAX = 5.0  # standard errors
 
 PACKAGE = {
     ("K", "DN/e-"): 0.2800626,
@@ -50,7 +52,8 @@ def test_what_is_wrong_with_the_real_ccd_is_said(ccd: Fit) -> None:
     assert ccd.segments.scatter > 0
     assert any("not on straight lines" in remark for remark in ccd.remarks)
     assert any("white level" in remark for remark in ccd.remarks)
-    assert ccd.full_well_reached
+    assert not ccd.full_well_reached  # codes at 4095 are all that was seen
+    assert "converter clips first" in ccd.full_well_means
 
 
 def test_the_shipped_camera_is_that_fit(ccd: Fit) -> None:
@@ -60,7 +63,24 @@ def test_the_shipped_camera_is_that_fit(ccd: Fit) -> None:
     assert shipped.black_level == pytest.approx(ccd.black_dn, abs=0.01)
     assert shipped.noise.segment[0].slope == pytest.approx(line.slope_dn, rel=1e-3)
     assert shipped.noise.segment[0].intercept == pytest.approx(line.intercept_dn2, rel=1e-3)
+    assert [effect.kind for effect in shipped.effect] == [e.kind for e in ccd.effects]
+    for effect, fitted in zip(shipped.effect, ccd.effects, strict=True):
+        value = getattr(effect, fitted.parameter)
+        assert abs(value - fitted.value) < 0.1 * fitted.standard_error
     assert "CC BY-SA 3.0" in (folder / "ccd12.toml").read_text()
+
+
+def test_fit_simulate_fit_gives_the_same_effects(
+    ccd: Fit, shared_data: Path, tmp_path: Path
+) -> None:
+    """A new sensor of the same statistics: dark current, DSNU and PRNU come back."""
+    like = read_recording(shared_data / "emva1288_ccd12" / "EMVA1288_Data.txt")
+    again = fit_camera(simulate_like(ccd.camera, like, tmp_path / "made"))
+    assert {effect.kind for effect in ccd.effects} == {"dark_current", "dsnu", "prnu"}
+    for first, second in zip(ccd.effects, again.effects, strict=True):
+        assert first.kind == second.kind
+        error = np.hypot(first.standard_error, second.standard_error)
+        assert abs(first.value - second.value) < Z_MAX * error, first.kind
 
 
 def level(

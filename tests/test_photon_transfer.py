@@ -25,6 +25,7 @@ from dsis.draw import Draw
 from dsis.effects import registry
 from dsis.errors import InputError
 from dsis.grid import PixelGrid
+from dsis.simulate import read_maps
 
 Z_MAX = 5.0
 LEVELS_DN = (0.0, 0.0, 60.0, 200.0, 500.0, 1100.0, 1800.0, 3000.0, 6000.0, 12000.0)
@@ -142,7 +143,7 @@ def test_two_frames_give_equation_1_with_the_change_removed() -> None:
 @pytest.mark.parametrize("effect", [None, "row_noise", "column_noise"])
 def test_error_of_the_variance_is_right(effect: str | None) -> None:
     """Oracle: the scatter of 150 repetitions; its own relative error is 1 / sqrt(300) = 6 %."""
-    extra = () if effect is None else (registry()[effect](sigma_dn=6.0),)
+    extra = () if effect is None else (registry()[effect].model_validate({"sigma_dn": 6.0}),)
     made = ONE.model_copy(update={"effect": extra})
     found = []
     for seed in range(150):
@@ -285,6 +286,7 @@ def test_dark_current_and_black_level_at_zero_time() -> None:
     fit = fit_camera(recording)
     dark = fit.channels["MONO"].dark
     assert dark is not None
+    assert dark.current_dn_per_s is not None
     assert dark.current_se_dn_per_s is not None
     assert abs(dark.current_dn_per_s - 300.0) < Z_MAX * dark.current_se_dn_per_s
     assert abs(fit.black_dn - 256.0) < Z_MAX * (fit.black_se_dn or 0)
@@ -380,6 +382,37 @@ class TestBroken:
         fit = fit_camera(replace(self.recording, exposures=tuple(exposures)))
         assert any("equal the frame before" in r and exposures[6].name in r for r in fit.remarks)
 
+    def test_frames_in_turn(self) -> None:
+        exposures = list(self.recording.exposures)
+        exposures[5] = replace(exposures[5], stack=exposures[5].stack[[0, 1, 0, 1]])
+        fit = fit_camera(replace(self.recording, exposures=tuple(exposures)))
+        name = exposures[5].name
+        assert any("occurs elsewhere" in r and name in r for r in fit.remarks)
+        assert any("byte-identical" in r and name in r for r in fit.remarks)
+        assert abs(misses(fit, ONE)["slope 0"]) < Z_MAX
+
+    def test_a_frame_of_another_flat(self) -> None:
+        exposures = list(self.recording.exposures)
+        stack = exposures[6].stack.copy()
+        stack[3] = exposures[5].stack[1]
+        exposures[6] = replace(exposures[6], stack=stack)
+        fit = fit_camera(replace(self.recording, exposures=tuple(exposures)))
+        for exposure in exposures[5:7]:
+            assert any("occurs elsewhere" in r and exposure.name in r for r in fit.remarks)
+        assert abs(misses(fit, ONE)["slope 0"]) < Z_MAX
+
+    def test_codes_in_steps(self) -> None:
+        """Oracle: the same recording with codes one apart; all variances 4^2 times as large."""
+        large = tuple(replace(e, stack=e.stack * np.uint16(4)) for e in self.recording.exposures)
+        sensor = replace(self.recording.sensor, white_level=16383.0 * 4, bit_depth=16)
+        fit = fit_camera(Recording(sensor, large))
+        plain = fit_camera(self.recording)
+        line, before = fit.segments.lines[0], plain.segments.lines[0]
+        assert line.slope_dn == pytest.approx(4 * before.slope_dn, rel=1e-6)
+        assert line.intercept_dn2 == pytest.approx(16 * before.intercept_dn2, rel=1e-6)
+        assert any("steps of 4 DN" in remark for remark in fit.remarks)
+        assert fit.camera.effect[-1].kind == "quantisation"
+
     def test_saturated_only(self) -> None:
         full = tuple(
             e if e.kind == "dark" else replace(e, stack=np.full_like(e.stack, 16383))
@@ -397,6 +430,8 @@ class TestBroken:
         assert fit.black_se_dn is None
         assert any("at code 0" in r for r in fit.remarks)
         assert any("nominal" in r for r in fit.remarks)
+        # Nominal 240 DN, yet the darks' mean is near 0.
+        assert any("the nominal black level 240 DN is wrong" in r for r in fit.remarks)
 
     def test_no_darks(self) -> None:
         fit = fit_camera(self.recording.where(lambda e: e.kind == "flat"))
@@ -434,6 +469,7 @@ def test_what_is_written_reads_back(tmp_path: Path) -> None:
         "camera-ptc.svg",
         "camera-ptc.png",
         "camera-distribution.png",
+        "maps.npz",
     }
     assert {file.name for file in tmp_path.iterdir()} == {file.name for file in files}
     made = read_camera(tmp_path / "camera.toml")
@@ -456,3 +492,76 @@ def test_the_written_camera_makes_the_same_recording_again(tmp_path: Path) -> No
     for a, b in zip(first.segments.lines, second.segments.lines, strict=True):
         error = np.hypot(a.slope_se_dn, b.slope_se_dn)
         assert abs(a.slope_dn - b.slope_dn) < Z_MAX * error
+
+
+def test_an_effect_can_be_appended_to_the_file(tmp_path: Path) -> None:
+    """As the description of camera.toml shows it."""
+    write_fit(fit_camera(record(ONE, 2)), tmp_path / "camera.toml")
+    with (tmp_path / "camera.toml").open("a") as file:
+        file.write('\n[[effect]]\nkind = "row_noise"\nsigma_dn = 3.2\n')
+    text = (tmp_path / "camera.toml").read_text()
+    assert "white_balance" not in text
+    assert "camera_from_scene" not in text
+    assert read_camera(tmp_path / "camera.toml").effect[-1].kind == "row_noise"
+
+
+def test_a_converter_that_clips_first_gives_a_lower_limit() -> None:
+    fit = fit_camera(record(ONE, 6, levels=(*LEVELS_DN, 15900.0, 18000.0)))
+    assert not fit.full_well_reached
+    assert fit.saturation_dn is None
+    assert fit.full_well_dn == 16383.0 - fit.black_dn
+    (well,) = (q for q in fit.quantities if q.name == "full_well")
+    assert "converter clips first" in well.means
+    assert any("converter clips" in remark for remark in fit.remarks)
+    (figure,) = (q for q in fit.channels["MONO"].figures if q.name == "mu_e.sat")
+    assert "lower limit" in figure.means
+
+
+def test_progress_counts_exposures() -> None:
+    calls: list[tuple[int, int, str]] = []
+    recording = record(ONE, 1)
+    fit_camera(recording, threads=2, progress=lambda *call: calls.append(call))
+    assert [done for done, _, _ in calls] == list(range(1, len(LEVELS_DN) + 1))
+    assert {total for _, total, _ in calls} == {len(LEVELS_DN)}
+    assert {name for _, _, name in calls} == {e.name for e in recording.exposures}
+
+
+def test_maps_and_effects_are_those_of_the_sensor(tmp_path: Path) -> None:
+    """Oracle: the fields that the sensor was made with, and the stated noise of the maps."""
+    effects = (
+        registry()["dsnu"].model_validate({"sigma_dn": 6.0}),
+        registry()["prnu"].model_validate({"sigma_percent": 2.0}),
+    )
+    made = ONE.model_copy(update={"effect": effects})
+    levels = (0.0, 0.0, 500.0, 1100.0, 3000.0, 6000.0)
+    fit = fit_camera(record(made, 3, frames=8, levels=levels))
+    write_fit(fit, tmp_path / "camera.toml")
+    maps, grid = read_maps(tmp_path / "camera.toml"), PixelGrid(48, 64, Cfa.MONO)
+    offsets, gains = Draw(99).normal("dsnu", grid), Draw(99).normal("prnu", grid)
+    error = maps.dsnu_dn - 6 * (offsets - offsets.mean())
+    # An sd of n pixels is known to 1 / sqrt(2 n) of itself.
+    bound = Z_MAX / np.sqrt(2 * error.size)
+    assert abs(error.std() / maps.dsnu_noise_dn - 1) < bound
+    error = maps.prnu_gain - (1 + 0.02 * gains) / (1 + 0.02 * gains.mean())
+    assert abs(error.std() / maps.prnu_noise - 1) < bound
+    found = {effect.kind: effect for effect in fit.effects}
+    assert set(found) == {"dsnu", "prnu"}
+    for kind, sigma in (("dsnu", 6.0), ("prnu", 2.0)):
+        assert abs(found[kind].value - sigma) < Z_MAX * found[kind].standard_error
+    other = tmp_path / "other.toml"
+    with pytest.raises(InputError, match=r"patterns of camera\.toml, must be those of other\.toml"):
+        read_maps(other)
+    write_fit(replace(fit, maps=None), tmp_path / "camera.toml")
+    assert not (tmp_path / "maps.npz").exists()
+
+
+@pytest.mark.parametrize("kind", ["row", "column"])
+def test_noise_of_lines_is_said(kind: str) -> None:
+    effect = registry()[f"{kind}_noise"].model_validate({"sigma_dn": 6.0})
+    made = ONE.model_copy(update={"effect": (effect,)})
+    fit = fit_camera(record(made, 1))
+    (remark,) = (r for r in fit.remarks if "noise of" in r and "is in the intercept" in r)
+    assert f"{kind} noise of" in remark
+    # 48 rows or 64 columns, 3 degrees of freedom each: known to 1 / sqrt(2 * 3 * 47).
+    value = float(remark.split("noise of ")[1].split(" DN")[0])
+    assert abs(value / 6 - 1) < Z_MAX / np.sqrt(2 * 3 * 47)

@@ -4,6 +4,7 @@ Public: `fit_camera` gives a `Fit`; `write_fit` writes camera.toml, figures and 
 table to read.
 """
 
+from analysis.photon_transfer.beyond import FittedEffect
 from analysis.photon_transfer.files import camera_text, fit_values, summary, write_fit
 from analysis.photon_transfer.fit import ChannelFit, Fit, fit_camera
 from analysis.photon_transfer.levels import FittedLevel
@@ -14,6 +15,7 @@ from analysis.photon_transfer.segments import SegmentFit, Switch, fit_segments
 __all__ = [
     "ChannelFit",
     "Fit",
+    "FittedEffect",
     "FittedLevel",
     "Line",
     "Quantity",

@@ -21,6 +21,7 @@ Floats = NDArray[np.float64]
 
 SENSITIVITY_END = 0.7  # of saturation: gain and responsivity
 LINEARITY_RANGE = (0.05, 0.95)  # of saturation: linearity error
+CLIPPED_SHARE = 1e-4  # a level with more samples at the white level is clipped
 LEAST_STACK = 4  # frames from which a fixed pattern is worth stating
 
 
@@ -33,6 +34,7 @@ class _Response:
     level_dn: Floats
     variance_dn2: Floats
     saturation: int
+    turned_over: bool
 
     @property
     def sensitive(self) -> slice:
@@ -41,15 +43,17 @@ class _Response:
         return slice(0, int(below.max()) + 1) if below.size else slice(0, 1)
 
 
-def figures_of_merit(levels: Sequence[LevelStatistics]) -> tuple[Quantity, ...]:
+def figures_of_merit(levels: Sequence[LevelStatistics], step_dn: int = 1) -> tuple[Quantity, ...]:
     """Return EMVA 1288's figures of one channel; empty where darks or flats are missing.
 
     Parameters
     ----------
     levels
-        All exposures of one channel, clipped ones included.
+        All exposures of one channel, clipped ones included; those with copied frames are not used.
+    step_dn
+        Step between codes: rounding adds its square over 12.
     """
-    known = [s for s in levels if s.frames > 1]
+    known = [s for s in levels if s.frames > 1 and not (s.repeated_frames or s.copied_frames)]
     darks = [s for s in known if s.kind == "dark"]
     flats = sorted((s for s in known if s.kind == "flat"), key=lambda s: s.level_dn)
     if not darks or not flats:
@@ -68,7 +72,7 @@ def figures_of_merit(levels: Sequence[LevelStatistics]) -> tuple[Quantity, ...]:
     sigma = float(np.sqrt(max(dark_variance, 0.0)))
     sigma_se = dark_variance_se / (2 * sigma) if sigma else np.nan
     found.append(Quantity("sigma_y.dark", "DN", sigma, sigma_se, dark_means))
-    dark_electrons = float(np.sqrt(max(dark_variance - SHEPPARD_DN2, 0.0))) / gain
+    dark_electrons = float(np.sqrt(max(dark_variance - SHEPPARD_DN2 * step_dn**2, 0.0))) / gain
     found.append(
         Quantity(
             "sigma_d",
@@ -101,7 +105,10 @@ def _response(flats: Sequence[LevelStatistics], darks: Sequence[LevelStatistics]
         light = np.array([f.light for f in flats], float)
     elif len({f.exposure_time_s for f in flats}) > 2:
         light, unit = np.array([f.exposure_time_s for f in flats]), "s"
-    return _Response(light, unit, level, np.array(variance), int(np.argmax(variance)))
+    top = int(np.argmax(variance))
+    # Beyond the largest variance there must be a level that the converter does not clip.
+    turned = any(flat.clipped_high <= CLIPPED_SHARE for flat in flats[top + 1 :])
+    return _Response(light, unit, level, np.array(variance), top, turned)
 
 
 def _columns(
@@ -170,12 +177,15 @@ def _sensitivity(response: _Response, gain: float, gain_se: float, sigma: float)
             Quantity("mu_p.sat", "light", float(response.light[top]), None, "light at saturation"),
         ]
     relative = gain_se / gain
+    means = "full well: at the largest variance"
+    if not response.turned_over:
+        means += "; lower limit: no unclipped level lies beyond it"
     snr = float(np.sqrt(full))
     ratio = full / least
     return [
         *found,
         Quantity("mu_e.min", "e-", least, least * relative, "absolute sensitivity threshold"),
-        Quantity("mu_e.sat", "e-", full, full * relative, "full well: at the largest variance"),
+        Quantity("mu_e.sat", "e-", full, full * relative, means),
         Quantity("SNR_max", "1", snr, snr * relative / 2, "sqrt(mu_e.sat)"),
         Quantity("SNR_max_dB", "dB", 20 * np.log10(snr), 4.343 * relative, "20 log10 SNR_max"),
         Quantity("DR", "1", ratio, None, "mu_e.sat / mu_e.min"),
@@ -227,7 +237,7 @@ def _non_uniformity(
     found = []
     half = 0.5 * float(response.level_dn[response.saturation])
     above = dict(zip((f.exposure for f in flats), response.level_dn, strict=True))
-    unclipped = [f for f in flats if max(f.clipped_low, f.clipped_high) <= 1e-4]
+    unclipped = [f for f in flats if max(f.clipped_low, f.clipped_high) <= CLIPPED_SHARE]
     flat = max(unclipped, key=lambda f: (f.frames, -abs(above[f.exposure] - half)), default=None)
     time_s = flat.exposure_time_s if flat else 0.0
     dark = max(darks, key=lambda d: (d.frames, -abs(d.exposure_time_s - time_s)))

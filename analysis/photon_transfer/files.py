@@ -3,7 +3,7 @@
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, is_dataclass
+from dataclasses import asdict, is_dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,14 +13,15 @@ import tomli_w
 from analysis.figures_camera import draw_distribution, draw_photon_transfer
 from analysis.photon_transfer.fit import Fit
 from analysis.photon_transfer.quantity import Quantity
-from dsis.camera import camera_values
+from dsis.camera import Camera, camera_values
 from dsis.errors import InputError
+from dsis.simulate.maps import MAPS, owner_of, write_maps
 
 SCHEMA = "dsis-camera-fit/1"
 
 
 def write_fit(fit: Fit, out_toml: Path, origin: str = "") -> tuple[Path, ...]:
-    """Write camera.toml and, beside it, -ptc.svg/.png, -distribution.png and -fit.json.
+    """Write camera.toml and, beside it, -ptc.svg/.png, -distribution.png and -fit.json; maps.npz.
 
     Parameters
     ----------
@@ -48,6 +49,12 @@ def write_fit(fit: Fit, out_toml: Path, origin: str = "") -> tuple[Path, ...]:
     written = [numbers, *draw_photon_transfer(fit, beside("-ptc"))]
     if fit.distribution is not None:
         written.append(draw_distribution(fit, fit.distribution, beside("-distribution.png")))
+    maps = out_toml.parent / MAPS
+    if fit.maps is not None:
+        write_maps(fit.maps, out_toml)
+        written.append(maps)
+    elif owner_of(maps) == out_toml.name:
+        maps.unlink()  # of an earlier fit
     unfinished = beside(".toml.partial")
     unfinished.write_text(text, encoding="utf-8")
     unfinished.replace(out_toml)
@@ -61,20 +68,46 @@ def camera_text(fit: Fit, origin: str = "") -> str:
         "Fitted by photon transfer; slopes in DN, intercepts in DN^2, rounding taken off."
     )
     if fit.black_se_dn is not None:
-        comments.append(f"black_level = {fit.black_dn:.6g} +- {fit.black_se_dn:.2g} DN")
+        comments.append(
+            f"black_level = {fit.black_dn:.6g} +- {fit.black_se_dn:.2g} DN, of this sensor"
+        )
     for number, switch in enumerate(fit.segments.switches):
         comments.append(
             f"segment {number} ends between {switch.low_dn:.6g} and {switch.high_dn:.6g} DN "
             "(95 %); upper_dn is the middle"
         )
+    comments += [
+        f"{e.kind}.{e.parameter} = {e.value:.6g} +- {e.standard_error:.2g}" for e in fit.effects
+    ]
     comments += fit.remarks
     head = "".join(f"# {line}\n" for line in comments)
-    return head + tomli_w.dumps(camera_values(fit.camera))
+    return head + _tables(camera_values(fit.camera))
+
+
+def _tables(values: dict[str, Any]) -> str:
+    """Return camera.toml with a table per segment and effect, so that more can be appended.
+
+    What a fit cannot know (white balance, matrix) is left out where it is the default.
+    """
+    unsaid = {"effect"} | {
+        name
+        for name in ("white_balance", "camera_from_scene")
+        if values.get(name) == _plain(Camera.model_fields[name].default)
+    }
+    kept = {name: value for name, value in values.items() if name not in unsaid}
+    noise = dict(kept.pop("noise"))
+    segments = noise.pop("segment")
+    text = tomli_w.dumps({**kept, "noise": noise})
+    text += "".join(f"\n[[noise.segment]]\n{tomli_w.dumps(segment)}" for segment in segments)
+    effects = values.get("effect", ())
+    return text + "".join(f"\n[[effect]]\n{tomli_w.dumps(effect)}" for effect in effects)
 
 
 def fit_values(fit: Fit) -> dict[str, Any]:
     """Return every number of a fit as plain values, as JSON holds them; nan becomes null."""
-    values = asdict(fit)
+    values = asdict(replace(fit, maps=None))  # the maps have a file of their own
+    del values["maps"]
+    values["black_level_is"] = "of this sensor: black_se_dn is temporal noise alone"
     values["segments"]["error_of_intervals"] = "standard errors; switches: 95 % intervals"
     plain: dict[str, Any] = {"schema": SCHEMA, **_plain(values)}
     return plain
@@ -106,7 +139,7 @@ def summary(fit: Fit) -> str:
             f"| {number} | {start} | {slope} | "
             f"{line.intercept_dn2:.5g} +- {line.intercept_se_dn2:.2g} |"
         )
-    lines += ["", f"Black level {fit.black_dn:.6g} DN (standard error {black}). "]
+    lines += ["", f"Black level {fit.black_dn:.6g} DN (of this sensor; standard error {black}). "]
     misfit = f"{fit.segments.deviance:.4g} / {fit.segments.dof}"
     lines[-1] += f"Misfit: deviance / dof = {misfit}."
     if math.isfinite(fit.homogeneity_p):

@@ -3,13 +3,16 @@
 Every decision that a reader of the numbers must know of is a sentence in `Fit.remarks`.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from threading import Lock
+from typing import Any
 
 import numpy as np
 from scipy import stats
 
+from analysis.photon_transfer.beyond import FittedEffect, effects_of
 from analysis.photon_transfer.black import DarkLine
 from analysis.photon_transfer.distribution import Distribution, noise_distribution
 from analysis.photon_transfer.emva1288 import figures_of_merit
@@ -25,14 +28,26 @@ from analysis.photon_transfer.levels import (
 )
 from analysis.photon_transfer.lines import Line, Points
 from analysis.photon_transfer.model_figures import model_figures
+from analysis.photon_transfer.patterns import PatternSums
 from analysis.photon_transfer.quantity import Quantity
 from analysis.photon_transfer.recorded import Recorded, channel_names
-from analysis.photon_transfer.remarks import DIFFERENT_P, remark_on_fit
+from analysis.photon_transfer.remarks import (
+    CONVERTER,
+    DIFFERENT_P,
+    SATURATED,
+    UNREACHED,
+    remark_on_fit,
+    remarks_on_clipped_darks,
+)
 from analysis.photon_transfer.segments import SegmentFit, fit_segments, lines_between
 from analysis.photon_transfer.statistics import LevelStatistics, expose_statistics
+from analysis.photon_transfer.watch import Watch
 from dsis.camera import BaseNoise, Camera, Segment
 from dsis.cfa import Cfa
 from dsis.errors import InputError
+from dsis.simulate.maps import SensorMaps
+
+Progress = Callable[[int, int, str], None]
 
 
 @dataclass(frozen=True)
@@ -63,7 +78,8 @@ class Fit:
     name, cfa, white_level, bit_depth
         The sensor's.
     black_dn, black_se_dn
-        Black level over all channels; the error is None where darks are missing (nominal level).
+        Black level over all channels, of this sensor: the error is temporal noise alone (another
+        sensor's fixed pattern has another mean), None where darks are missing (nominal level).
     segments
         Slopes (DN), intercepts (DN^2, rounding's 1/12 taken off) and switches (DN above black).
     levels
@@ -74,12 +90,17 @@ class Fit:
         How likely chance makes the channels' lines differ as they do; nan with one channel.
     saturation_dn
         Where the charge stops growing below the white level; None where it was not seen.
-    full_well_dn, full_well_reached
-        Largest level used or `saturation_dn`; whether levels beyond it were seen to saturate.
+    full_well_dn, full_well_reached, full_well_means
+        `saturation_dn` where it was seen; else a lower limit: white level less black level where
+        the converter clips, the largest level used where nothing does. And which of these.
     quantities
         Gain, read noise, full well and dynamic range of the fitted model.
     distribution
         Noise at one level, for the figure; None where there is no usable flat.
+    effects
+        Dark current, DSNU, PRNU and coarse codes where they are certain: part of the camera.
+    maps
+        Offset and gain of every pixel; None with fewer than four darks or flats of use.
     remarks
         What limits these numbers, in sentences.
     """
@@ -97,8 +118,11 @@ class Fit:
     saturation_dn: float | None
     full_well_dn: float
     full_well_reached: bool
+    full_well_means: str
     quantities: tuple[Quantity, ...]
     distribution: Distribution | None
+    effects: tuple[FittedEffect, ...]
+    maps: SensorMaps | None = field(compare=False, repr=False)
     remarks: tuple[str, ...]
 
     @property
@@ -129,6 +153,7 @@ class Fit:
             bit_depth=self.bit_depth,
             saturation_dn=self.saturation_dn,
             noise=BaseNoise(segment=tuple(pieces)),
+            effect=tuple(fitted.effect for fitted in self.effects),
         )
 
 
@@ -137,6 +162,7 @@ def fit_camera(
     segments: int | None = None,
     *,
     threads: int = 1,
+    progress: Progress | None = None,
     distribution_of: str | None = None,
 ) -> Fit:
     """Return the camera model of a recording, in one pass over its frames.
@@ -149,6 +175,8 @@ def fit_camera(
         Number of read-out segments; None: as many as the data need.
     threads
         Exposures measured at the same time; the result does not depend on it.
+    progress
+        Called with (exposures done, exposures in all, name of the exposure).
     distribution_of
         The exposure whose noise distribution is kept; None: the flat nearest half of the range.
 
@@ -158,11 +186,14 @@ def fit_camera(
         Where no camera can be fitted: why each exposure is of no use.
     """
     remarks: list[str] = []
-    measured = _measure(recording, threads, remarks)
+    watch, patterns = Watch(recording.sensor.white_level), PatternSums()
+    measured = _measure(recording, watch, patterns, threads, progress)
+    step = watch.step_dn()
+    remarks += _remarks_on_frames(recording, watch, step)
     names = list(dict.fromkeys(np.ravel(channel_names(recording.sensor.cfa)).tolist()))
-    darks = {name: dark_of(measured, name) for name in names}
+    darks = {name: dark_of(measured, name, step) for name in names}
     black, black_se = _black(recording, darks, remarks)
-    levels = levels_of(measured, darks, recording.sensor.black_level)
+    levels = levels_of(measured, darks, recording.sensor.black_level, step)
     saturation = saturation_of(levels)
     levels = leave_out(levels, saturation, remarks)
     points = points_of(levels)
@@ -174,19 +205,20 @@ def fit_camera(
         lines[name] = lines_between(own, found.switches)
     alike = _homogeneity(found, lines, points.scattered(found.scatter))
     used = [level for level in levels if not level.left_out and level.statistics.kind == "flat"]
-    full = saturation if saturation is not None else max(level.x_dn for level in used)
-    reached = saturation is not None or any(
-        level.statistics.clipped_high > CLIPPED_SHARE for level in levels
-    )
+    full, full_means = _full_well(recording, levels, saturation, black)
     channels = {
         name: ChannelFit(
             darks[name],
             lines[name][0],
-            figures_of_merit([s for s in measured if s.channel == name]),
+            figures_of_merit([s for s in measured if s.channel == name], step),
         )
         for name in names
     }
-    remark_on_fit(found, alike, darks, levels, remarks, reached=reached)
+    remarks += remarks_on_clipped_darks(measured, recording.sensor.black_level)
+    remark_on_fit(found, alike, darks, levels, remarks, full_well_means=full_means)
+    effects = effects_of(darks, [c.figures for c in channels.values()], step)
+    current = sum(e.value for e in effects if e.kind == "dark_current")
+    patterns.without(recording, {v.statistics.exposure for v in levels if v.left_out})
     return Fit(
         name=recording.sensor.name,
         cfa=recording.sensor.cfa,
@@ -200,24 +232,67 @@ def fit_camera(
         homogeneity_p=alike,
         saturation_dn=saturation,
         full_well_dn=full,
-        full_well_reached=reached,
-        quantities=model_figures(found, full, reached=reached),
+        full_well_reached=full_means == SATURATED,
+        full_well_means=full_means,
+        quantities=model_figures(found, full, full_means),
         distribution=noise_distribution(recording, _chosen(distribution_of, used, recording)),
+        effects=effects,
+        maps=patterns.maps(recording, levels, current),
         remarks=tuple(dict.fromkeys(remarks)),
     )
 
 
-def _measure(recording: Recorded, threads: int, remarks: list[str]) -> list[LevelStatistics]:
+def _full_well(
+    recording: Recorded, levels: Sequence[FittedLevel], saturation: float | None, black: float
+) -> tuple[float, str]:
+    """Return the largest signal, DN above black, and what it is."""
+    if saturation is not None:
+        return saturation, SATURATED
+    flats = [level for level in levels if level.statistics.kind == "flat"]
+    if any(level.statistics.clipped_high > CLIPPED_SHARE for level in flats):
+        return recording.sensor.white_level - black, CONVERTER
+    return max(level.x_dn for level in flats if not level.left_out), UNREACHED
+
+
+def _measure(
+    recording: Recorded,
+    watch: Watch,
+    patterns: PatternSums,
+    threads: int,
+    progress: Progress | None,
+) -> list[LevelStatistics]:
+    """Return the statistics of darks and flats, in the recording's order."""
     exposures = [e for e in recording.exposures if str(e.kind) in ("dark", "flat")]
-    scenes = len(recording.exposures) - len(exposures)
+    done, lock = 0, Lock()
+
+    def measure(exposure: Any) -> list[LevelStatistics]:
+        nonlocal done
+        part = expose_statistics(recording, exposure, watch, patterns)
+        with lock:
+            done += 1
+            if progress is not None:
+                progress(done, len(exposures), str(exposure.name))
+        return part
+
+    with ThreadPoolExecutor(max(threads, 1)) as pool:
+        parts = list(pool.map(measure, exposures))
+    copied = watch.copied()
+    return [replace(s, copied_frames=s.exposure in copied) for part in parts for s in part]
+
+
+def _remarks_on_frames(recording: Recorded, watch: Watch, step_dn: int) -> list[str]:
+    """Return what the frames show of themselves: copies, clipping, odd codes, scenes."""
+    # Levels at the white level are named where they are left out.
+    found = [r for r in watch.remarks(recording.exposures) if "at the white level" not in r]
+    scenes = sum(str(e.kind) not in ("dark", "flat") for e in recording.exposures)
     if scenes:
-        remarks.append(f"{scenes} exposure(s) of kind scene are not used.")
-    if threads > 1:
-        with ThreadPoolExecutor(threads) as pool:
-            parts = list(pool.map(lambda e: expose_statistics(recording, e), exposures))
-    else:
-        parts = [expose_statistics(recording, exposure) for exposure in exposures]
-    return [statistics for part in parts for statistics in part]
+        found.append(f"{scenes} exposure(s) of kind scene are not used.")
+    if step_dn > 1:
+        found.append(
+            f"Codes come in steps of {step_dn} DN: rounding is taken as {step_dn}^2 / 12 DN^2, and "
+            "the camera model has the effect quantisation."
+        )
+    return found
 
 
 def _black(

@@ -46,20 +46,18 @@ class FittedLevel:
 
 def useless(s: LevelStatistics) -> str:
     """Return why a level cannot be used; empty where it can."""
-    if s.frames < 2:
-        return "one frame only: no noise to be seen"
-    if s.clipped_high > CLIPPED_SHARE:
-        return "more than 0.01 % of its samples are at the white level"
-    if s.clipped_low > CLIPPED_SHARE:
-        return "more than 0.01 % of its samples are at code 0"
-    if s.repeated_frames:
-        return "frames equal the frame before bit for bit"
-    if not s.variance_dn2 > 0 or not s.variance_se_dn2 > 0:
-        return "its frames do not vary"
-    return ""
+    reasons = (
+        (s.frames < 2, "one frame only: no noise to be seen"),
+        (s.clipped_high > CLIPPED_SHARE, "more than 0.01 % of its samples are at the white level"),
+        (s.clipped_low > CLIPPED_SHARE, "more than 0.01 % of its samples are at code 0"),
+        (s.repeated_frames > 0, "frames equal the frame before bit for bit"),
+        (s.copied_frames, "a frame occurs elsewhere in the recording bit for bit"),
+        (not s.variance_dn2 > 0 or not s.variance_se_dn2 > 0, "its frames do not vary"),
+    )
+    return next((why for holds, why in reasons if holds), "")
 
 
-def dark_of(measured: Sequence[LevelStatistics], channel: str) -> DarkLine | None:
+def dark_of(measured: Sequence[LevelStatistics], channel: str, step_dn: int = 1) -> DarkLine | None:
     """Return the black level of one channel, from the darks that are not clipped at code 0."""
     usable = [
         s
@@ -70,7 +68,9 @@ def dark_of(measured: Sequence[LevelStatistics], channel: str) -> DarkLine | Non
         return None
     times, levels, errors = [], [], []
     for s in usable:
-        plain = unrounded(s.level_dn, s.level_se_dn, s.variance_dn2, s.variance_se_dn2, s.fixed_dn2)
+        plain = unrounded(
+            s.level_dn, s.level_se_dn, s.variance_dn2, s.variance_se_dn2, s.fixed_dn2, step_dn
+        )
         # A frame offset that wanders moves the mean more than the pixels' noise does.
         wanders = stats.f.sf(s.wander, s.frames - 1, 1e6) < WANDER_P
         error = plain.level_se_dn * (np.sqrt(s.wander) if wanders else 1.0)
@@ -81,13 +81,18 @@ def dark_of(measured: Sequence[LevelStatistics], channel: str) -> DarkLine | Non
 
 
 def levels_of(
-    measured: Iterable[LevelStatistics], darks: dict[str, DarkLine | None], nominal_dn: float
+    measured: Iterable[LevelStatistics],
+    darks: dict[str, DarkLine | None],
+    nominal_dn: float,
+    step_dn: int = 1,
 ) -> list[FittedLevel]:
     """Return every measured level above black and before rounding, with why it is of no use."""
     levels = []
     for s in measured:
         dark, why = darks[s.channel], useless(s)
-        plain = unrounded(s.level_dn, s.level_se_dn, s.variance_dn2, s.variance_se_dn2, s.fixed_dn2)
+        plain = unrounded(
+            s.level_dn, s.level_se_dn, s.variance_dn2, s.variance_se_dn2, s.fixed_dn2, step_dn
+        )
         if not why and not plain.recovered:
             why = "its noise is too small beside one code to be recovered from rounding"
         x = plain.level_dn - (dark.black_dn if dark else nominal_dn)

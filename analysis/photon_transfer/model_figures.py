@@ -6,8 +6,10 @@ from analysis.photon_transfer.quantity import Quantity
 from analysis.photon_transfer.segments import SegmentFit
 
 
-def model_figures(fit: SegmentFit, full_well_dn: float, *, reached: bool) -> tuple[Quantity, ...]:
+def model_figures(fit: SegmentFit, full_well_dn: float, bound: str) -> tuple[Quantity, ...]:
     """Return the model's figures: gain and read noise of the first segment, full well of the last.
+
+    `bound` says what `full_well_dn` is: a saturation seen, or a lower limit.
 
     Where a switch changes the slope alone, electrons before it and after it differ by that ratio.
     """
@@ -20,7 +22,6 @@ def model_figures(fit: SegmentFit, full_well_dn: float, *, reached: bool) -> tup
     inverse = Quantity("1/gain", "e-/DN", 1 / slope, slope_se / slope**2, "its inverse")
     top = fit.lines[-1]
     full = full_well_dn / top.slope_dn if top.slope_dn > 0 else None
-    bound = "saturation over the highest slope" if reached else "at least: none saturates"
     full_se = None if full is None else full * top.slope_se_dn / top.slope_dn
     well = Quantity("full_well", "e-", full, full_se, bound)
     if not read2 > 0:

@@ -2,11 +2,17 @@
 
 from collections.abc import Sequence
 
+import numpy as np
 from scipy import stats
 
 from analysis.photon_transfer.black import DarkLine
-from analysis.photon_transfer.levels import WANDER_P, FittedLevel
+from analysis.photon_transfer.levels import CLIPPED_SHARE, WANDER_P, FittedLevel
 from analysis.photon_transfer.segments import SegmentFit
+from analysis.photon_transfer.statistics import LevelStatistics
+
+SATURATED = "saturation over the highest slope"
+CONVERTER = "the converter clips first: lower limit of the full well"
+UNREACHED = "at least: none saturates"
 
 DIFFERENT_P = 1e-3  # channels that differ more than chance does so often differ
 
@@ -18,7 +24,7 @@ def remark_on_fit(
     levels: Sequence[FittedLevel],
     remarks: list[str],
     *,
-    reached: bool,
+    full_well_means: str,
 ) -> None:
     """Add what limits a fit and its levels to `remarks`."""
     if fit.dof == 0:
@@ -38,12 +44,58 @@ def remark_on_fit(
         remarks.append(
             f"The channels' lines differ (p = {alike:.1g}): one slope and intercept stand for all."
         )
-    if not reached:
+    if full_well_means == CONVERTER:
+        remarks.append(
+            "The converter clips before the charge is full: full well and dynamic range are lower "
+            "limits, (white level - black level) / gain."
+        )
+    if full_well_means == UNREACHED:
         remarks.append("No level saturates: full well and dynamic range are lower limits.")
     for name, dark in darks.items():
         if dark is not None and dark.black_dn < 0:
             remarks.append(f"The black level of {name} extrapolates to {dark.black_dn:.3g} DN < 0.")
     remarks.extend(_remarks_on_levels(levels))
+    remarks.extend(_remarks_on_lines(levels))
+
+
+def remarks_on_clipped_darks(measured: Sequence[LevelStatistics], nominal_dn: float) -> list[str]:
+    """Return a remark for each clipped dark whose mean a pedestal at the nominal black forbids.
+
+    Clipping at code 0 only lifts a mean, by at most 0.4 of the noise's standard deviation.
+    """
+    remarks = []
+    for s in measured:
+        if s.kind != "dark" or s.frames < 2 or s.clipped_low <= CLIPPED_SHARE:
+            continue
+        # Clipped noise is narrower than it was: three of its own sd leave room for that.
+        room = 3 * float(np.sqrt(max(s.variance_dn2, 0.0) + max(s.fixed_dn2, 0.0))) + 0.5
+        if s.level_dn < nominal_dn - 3 * s.level_se_dn - 0.5 or s.level_dn > nominal_dn + room:
+            current = " or a dark current adds to it" if s.level_dn > nominal_dn else ""
+            remarks.append(
+                f"{s.exposure} ({s.channel}): {100 * s.clipped_low:.3g} % of its samples are at "
+                f"code 0 and its mean is {s.level_dn:.4g} DN: the nominal black level "
+                f"{nominal_dn:g} DN is wrong{current}, and every intercept with it."
+            )
+    return remarks
+
+
+def _remarks_on_lines(levels: Sequence[FittedLevel]) -> list[str]:
+    """Return a remark on row and column noise in the darkest level, by channel."""
+    darkest: dict[str, FittedLevel] = {}
+    for level in sorted((v for v in levels if not v.left_out), key=lambda v: v.x_dn):
+        darkest.setdefault(level.statistics.channel, level)
+    remarks = []
+    for channel, level in darkest.items():
+        s = level.statistics
+        for name, square in (("row", s.row_variance_dn2), ("column", s.column_variance_dn2)):
+            if square > 0:
+                share = 100 * square / max(s.variance_dn2, 1e-12)
+                remarks.append(
+                    f"{channel}: {name} noise of {np.sqrt(square):.3g} DN in {s.exposure} is in "
+                    f"the intercept ({share:.2g} % of the variance there); the model has it "
+                    "pixel by pixel."
+                )
+    return remarks
 
 
 def _remarks_on_levels(levels: Sequence[FittedLevel]) -> list[str]:

@@ -47,6 +47,7 @@ def unrounded(
     variance_dn2: float,
     variance_se_dn2: float,
     fixed_dn2: float = 0.0,
+    step_dn: int = 1,
 ) -> Unrounded:
     """Return level and variance before rounding; `recovered` is false where codes hide the noise.
 
@@ -56,7 +57,21 @@ def unrounded(
         Mean code, temporal variance of codes, and their standard errors.
     fixed_dn2
         Variance of the pixels' fixed offsets.
+    step_dn
+        Step between codes: rounding adds its square over 12.
     """
+    if step_dn > 1:
+        k, k2 = step_dn, step_dn**2
+        one = unrounded(
+            level_dn / k, level_se_dn / k, variance_dn2 / k2, variance_se_dn2 / k2, fixed_dn2 / k2
+        )
+        return Unrounded(
+            one.level_dn * k,
+            one.level_se_dn * k,
+            one.variance_dn2 * k2,
+            one.variance_se_dn2 * k2,
+            one.recovered,
+        )
     plain = variance_dn2 - SHEPPARD_DN2
     if not variance_dn2 <= _SMOOTH_DN2:  # one frame's nan too
         return Unrounded(level_dn, level_se_dn, plain, variance_se_dn2, recovered=True)

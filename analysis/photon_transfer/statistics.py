@@ -9,7 +9,7 @@ so row and column noise do not make it too small.
 
 from dataclasses import dataclass
 from itertools import product
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,8 +25,16 @@ from analysis.photon_transfer.sums import (
     begin,
     square_total,
 )
+from dsis.recording.hygiene import Inspection
 
+CLIPPED_SHARE = 1e-4  # beyond, mean and variance are biased
 LINES_P = 1e-3  # rows or columns that vary more than chance does so often have their own noise
+
+
+class Patterns(Protocol):
+    """Takes the sum over an exposure's frames."""
+
+    def add(self, exposure: Any, total: Ints) -> None: ...  # noqa: D102 - the class says it
 
 
 @dataclass(frozen=True)
@@ -59,6 +67,10 @@ class LevelStatistics:
         Spatial variance of the mean frame less what temporal noise leaves in it.
     repeated_frames
         Number of frames that equal the one before bit for bit.
+    row_variance_dn2, column_variance_dn2
+        Variance of fresh offsets of rows and columns; 0 where chance explains them.
+    copied_frames
+        Whether a frame occurs elsewhere in the recording bit for bit.
     """
 
     exposure: str
@@ -83,6 +95,9 @@ class LevelStatistics:
     fixed_dn2: float
     fixed_se_dn2: float
     repeated_frames: int
+    row_variance_dn2: float = 0.0
+    column_variance_dn2: float = 0.0
+    copied_frames: bool = False
 
     @property
     def pixels(self) -> int:
@@ -90,12 +105,23 @@ class LevelStatistics:
         return self.rows * self.columns
 
 
-def expose_statistics(recording: Recorded, exposure: Any) -> list[LevelStatistics]:
-    """Return the statistics of each CFA channel of one exposure; empty where it has no frames."""
+def expose_statistics(
+    recording: Recorded,
+    exposure: Any,
+    watch: Inspection | None = None,
+    patterns: Patterns | None = None,
+) -> list[LevelStatistics]:
+    """Return the statistics of each CFA channel of one exposure; empty where it has no frames.
+
+    `watch` sees every frame in passing; `patterns` is given the sum of the frames where none is
+    repeated and no more than `CLIPPED_SHARE` of the samples are clipped.
+    """
     white = int(recording.sensor.white_level)
     sums: Sums | None = None
     previous: NDArray[np.uint16] | None = None
     for count, frame in enumerate(recording.frames(exposure)):
+        if watch is not None:
+            watch.look(str(exposure.name), count, frame)
         if sums is None:
             sums = begin(frame)
         row, column = (
@@ -117,6 +143,10 @@ def expose_statistics(recording: Recorded, exposure: Any) -> list[LevelStatistic
         return []
     pattern = np.zeros((2, sums.total.shape[1]), np.int64)
     square_total(sums.total, pattern)
+    samples = sums.total.size * len(sums.rows)
+    sound = not sums.repeats and int(sums.clipped.sum()) <= CLIPPED_SHARE * samples
+    if patterns is not None and sound:
+        patterns.add(exposure, sums.total + np.int64(sums.reference * len(sums.rows)))
     names = channel_names(recording.sensor.cfa)
     found = dict.fromkeys(names[i][j] for i, j in product((0, 1), (0, 1)))
     return [_channel(exposure, name, names, sums, pattern) for name in found]
@@ -177,6 +207,8 @@ def _channel(
         fixed_dn2=spatial - variance / frames,
         fixed_se_dn2=float(spatial * np.sqrt(2 / max(n - 1, 1))),
         repeated_frames=sums.repeats,
+        row_variance_dn2=temporal.row,
+        column_variance_dn2=temporal.column,
     )
 
 
@@ -194,13 +226,15 @@ class _Temporal:
     lines: float
     line_spread: float
     rest: float
+    row: float
+    column: float
 
 
 def _temporal(within: float, row_means: Floats, column_means: Floats) -> _Temporal:
     frames, rows = row_means.shape
     columns = column_means.shape[1]
     if frames < 2:
-        return _Temporal(*[np.nan] * 5)
+        return _Temporal(*[np.nan] * 7)
     frame = row_means.mean(1)
     change = frame - frame.mean()
     row = row_means - row_means.mean(0) - change[:, None]
@@ -213,13 +247,15 @@ def _temporal(within: float, row_means: Floats, column_means: Floats) -> _Tempor
     pixel = max(rest - ss_row - ss_column, 0.0) / dof if dof else 0.0
     white = rest / ((frames - 1) * max(n - 1, 1))
     lines = spread = 0.0
-    for sum_of_squares, count in ((ss_row, rows - 1), (ss_column, columns - 1)):
+    own = [0.0, 0.0]  # variance of the rows' and the columns' offsets
+    for k, (sum_of_squares, count) in enumerate(((ss_row, rows - 1), (ss_column, columns - 1))):
         square = sum_of_squares / ((frames - 1) * max(count, 1))
         if count and stats.f.sf(square / max(pixel, 1e-12), (frames - 1) * count, dof) < LINES_P:
             lines += square - pixel
+            own[k] = (square - pixel) / (columns, rows)[k]
             spread += count * (square**2 - pixel**2)
             white = pixel
-    return _Temporal(ss_frame / (frames - 1), white, lines, spread, rest)
+    return _Temporal(ss_frame / (frames - 1), white, lines, spread, rest, *own)
 
 
 def _variance(

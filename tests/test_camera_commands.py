@@ -1,0 +1,71 @@
+"""Promise: from a recording to a camera model and back, by the two commands that users type."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dsis.camera import BaseNoise, Camera, Segment, read_camera
+from dsis.cfa import Cfa
+from dsis.cli import main
+from dsis.effects import registry
+from dsis.recording import read_recording
+from dsis.simulate import dark, flat, simulate
+
+LEVELS_DN = (100.0, 300.0, 700.0, 1500.0, 2600.0)
+PLANTED = Camera(
+    name="planted",
+    cfa=Cfa.RGGB,
+    black_level=100.0,
+    white_level=4095.0,
+    bit_depth=12,
+    noise=BaseNoise(segment=(Segment(slope=0.5, intercept=20.0),)),
+)
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("camera") / "recording"
+    shots = [dark("dark", frames=8, exposure_time_s=0.01)]
+    for level in LEVELS_DN:
+        shots.append(flat(f"flat-{level:g}", level, frames=8, exposure_time_s=0.01, light=level))
+    simulate(PLANTED, shots, 64, 96, out, seed=5, jobs=2)
+    return out
+
+
+def test_fit_and_simulate_close_the_loop(
+    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    model = tmp_path / "camera.toml"
+    assert main(["camera", "fit", str(recording), "-o", str(model)]) == 0
+    assert "slope" in capsys.readouterr().out
+    segment = read_camera(model).noise.segment[0]
+    assert abs(segment.slope - 0.5) < 5 * segment.slope_se
+    assert abs(segment.intercept - 20.0) < 5 * segment.intercept_se
+    out = tmp_path / "simulated"
+    assert main(["camera", "simulate", str(model), "--like", str(recording), "-o", str(out)]) == 0
+    made, given = read_recording(out), read_recording(recording)
+    assert [e.name for e in made.exposures] == [e.name for e in given.exposures]
+    for a, b in zip(made.exposures, given.exposures, strict=True):
+        levels = [np.mean([f.mean() for f in r.frames(e)]) for r, e in ((made, a), (given, b))]
+        # The mean of 8 frames of 6144 pixels is known to a fifth of a code even at full light.
+        assert abs(levels[0] - levels[1]) < 1.0, a.name
+
+
+def test_effects_can_be_appended_to_what_a_fit_wrote(recording: Path, tmp_path: Path) -> None:
+    model = tmp_path / "camera.toml"
+    assert main(["camera", "fit", str(recording), "-o", str(model)]) == 0
+    with model.open("a", encoding="utf-8") as file:
+        file.write('\n[[effect]]\nkind = "row_noise"\nsigma_dn = 3.0\n')
+    assert registry()["row_noise"](sigma_dn=3.0) in read_camera(model).effect
+
+
+def test_what_cannot_be_fitted_gets_a_message(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for arguments in (
+        ["camera", "fit", str(tmp_path), "-o", str(tmp_path / "camera.toml")],
+        ["camera", "simulate", str(tmp_path / "no.toml"), "--like", str(tmp_path), "-o", "x"],
+    ):
+        assert main(arguments) == 2
+        assert capsys.readouterr().err.startswith("dsis: ")

@@ -26,9 +26,11 @@ PLANTED = Camera(
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("camera") / "recording"
-    shots = [dark("dark", frames=8, exposure_time_s=0.01)]
-    for level in LEVELS_DN:
-        shots.append(flat(f"flat-{level:g}", level, frames=8, exposure_time_s=0.01, light=level))
+    levels = [
+        flat(f"flat-{level:g}", level, frames=8, exposure_time_s=0.01, light=level)
+        for level in LEVELS_DN
+    ]
+    shots = [dark("dark", frames=8, exposure_time_s=0.01), *levels]
     simulate(PLANTED, shots, 64, 96, out, seed=5, jobs=2)
     return out
 

@@ -72,7 +72,7 @@ def shot_noise(
     threads: int = 1,
 ) -> NDArray[np.float32]:
     """Return the expected signal (DN above black, `grid.shape`) with shot noise of variance m x."""
-    out = np.empty_like(expected_dn)
+    out = np.empty(expected_dn.shape, np.float32)  # rows of it are filled as flat views
 
     def block(first: int, last: int) -> None:
         deviates = draw.normal_rows("shot_noise", grid, frame, first, last)
@@ -99,7 +99,7 @@ def read_noise(
     threads: int = 1,
 ) -> NDArray[np.float32]:
     """Return `signal_dn` with read noise of variance t, segment chosen by the expected signal."""
-    out = np.empty_like(signal_dn)
+    out = np.empty(signal_dn.shape, np.float32)  # rows of it are filled as flat views
     sigma = np.sqrt(np.maximum(segments.intercept_dn2, np.float32(0)))
 
     def block(first: int, last: int) -> None:

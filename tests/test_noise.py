@@ -114,6 +114,19 @@ def test_a_crop_of_a_noisy_frame_is_the_noisy_crop() -> None:
     np.testing.assert_array_equal(crop, whole[13:60, 21:80])
 
 
+def test_the_memory_layout_of_the_signal_does_not_matter() -> None:
+    """A transposed or strided signal is the same signal."""
+    signal = np.random.default_rng(0).uniform(0, 5000, (140, 96)).astype(np.float32)
+    grid = PixelGrid(96, 70, Cfa.RGGB)
+    for view in (signal[::2].T, np.asfortranarray(signal[::2].T)):
+        same = np.ascontiguousarray(view)
+        assert not view.flags.c_contiguous
+        np.testing.assert_array_equal(
+            CAMERA.expose(view, Draw(1), Draw(2), 0, grid),
+            CAMERA.expose(same, Draw(1), Draw(2), 0, grid),
+        )
+
+
 def test_scene_to_raw_and_back() -> None:
     """raw_c = clip(black + k (M rgb)_c / g_c, 0, white), and its inverse where nothing clips."""
     matrix = ((0.8, 0.15, 0.05), (0.1, 0.8, 0.1), (0.02, 0.28, 0.7))

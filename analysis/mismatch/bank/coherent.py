@@ -1,0 +1,156 @@
+"""What a channel shows over all exposures: persistent pixels, spectra and lags along lines."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.mismatch.bank.scalars import UNKNOWN, Number, gumbel_score
+from dsis.measures import Channel, Estimate
+from dsis.measures.spectra import line_peak, spectral_peak
+
+Array = NDArray[np.float64]
+LAGS = 16  # along a line, pixels of the plane
+_EULER = 0.5772156649
+
+
+class VarianceSums:
+    """Which pixels are noisy in every exposure.
+
+    Products of the pixel variances of different exposures: what they have in common is a property
+    of the pixel (its read noise, a trap); heavy tails and spikes leave it at zero.
+    """
+
+    def __init__(self, shape: tuple[int, int]) -> None:
+        self.total = np.zeros(shape)
+        self.squares, self.fourths = 0.0, 0.0
+
+    def add(self, variance_map: Array, weight: float) -> None:
+        """Take the variance of each pixel (row, column) of one exposure."""
+        mean = float(variance_map.mean())
+        if not mean > 0:
+            return
+        part = weight * (variance_map / mean - 1)
+        self.total += part
+        square = float((part**2).mean())
+        self.squares += square
+        self.fourths += square**2
+
+    def number(self) -> Number:
+        """Return the mean product of different exposures in units of its null error."""
+        excess = float((self.total**2).mean()) - self.squares
+        null = 2 * (self.squares**2 - self.fourths) / self.total.size
+        if null <= 1e-12 * self.squares**2:
+            return UNKNOWN
+        return excess / sqrt(null), 1.0
+
+
+@dataclass(frozen=True)
+class Peak:
+    """The largest bin of a spectrum: cycles per pixel of the plane along x and y, and its height."""
+
+    fx: float
+    fy: float
+    power: float
+    amplitude_dn2: float
+
+
+class SpectrumSums:
+    """Temporal power over all exposures, white noise scaled to 1.
+
+    Two weightings: amplitudes constant in DN, and in proportion to the signal.
+    """
+
+    def __init__(self, shape: tuple[int, int]) -> None:
+        self.shape = shape
+        n, m = shape
+        self.power = np.zeros((n, m // 2 + 1))
+        self.rows = {key: np.zeros(n // 2 + 1) for key in ("", "signal")}
+        self.columns = np.zeros(m // 2 + 1)
+        self.weight = {key: [0.0, 0.0] for key in ("", "signal")}
+
+    def add(self, channel: Channel, frames: int, variance_dn2: float, signal_dn: float) -> None:
+        """Take the spectra of one exposure."""
+        pixel = channel.estimates["pixel_variance"].value
+        if not pixel > 0:
+            return
+        seen = frames - 1
+        weights = {"": seen / variance_dn2, "signal": seen * max(signal_dn, 0) ** 2 / variance_dn2}
+        self.power += weights[""] * channel.power_spectrum / pixel
+        self.columns += weights[""] * channel.column_spectrum / pixel
+        for key, weight in weights.items():
+            self.rows[key] += weight * channel.row_spectrum / pixel
+            self.weight[key][0] += weight
+            self.weight[key][1] += weight**2 / seen
+
+    def degrees(self, key: str) -> float:
+        """Return how many independent frames the mean is worth."""
+        total, squares = self.weight[key]
+        return total**2 / squares if squares else 0.0
+
+    def numbers(self) -> dict[str, Number]:
+        """Return peaks and lags."""
+        found: dict[str, Number] = {}
+        n, m = self.shape
+        if self.weight[""][0]:
+            degrees = max(round(self.degrees("")), 1)
+            total = self.weight[""][0]
+            found["spectral_peak"] = _peak(spectral_peak(self.power / total, m, degrees))
+            found["column_spectrum_peak"] = _peak(line_peak(self.columns / total, m, degrees))
+            found |= self._lags(degrees)
+        for key, label in (("", "row_spectrum_peak"), ("signal", "row_spectrum_peak of light")):
+            if self.weight[key][0]:
+                degrees = max(round(self.degrees(key)), 1)
+                found[label] = _peak(line_peak(self.rows[key] / self.weight[key][0], n, degrees))
+        return found
+
+    def peak(self) -> Peak | None:
+        """Return where the spectrum off the axes is largest; None without noise."""
+        if not self.weight[""][0]:
+            return None
+        n, m = self.shape
+        power = self.power / self.weight[""][0]
+        inner = power[1:, 1:]
+        y, x = np.unravel_index(int(inner.argmax()), inner.shape)
+        fy = np.fft.fftfreq(n)[y + 1]
+        return Peak(float((x + 1) / m), float(fy), float(inner.max()), 0.0)
+
+    def row_peak(self, key: str) -> Peak | None:
+        """Return where the spectrum of row means is largest."""
+        if not self.weight[key][0]:
+            return None
+        power = self.rows[key][1:] / self.weight[key][0]
+        place = int(power.argmax()) + 1
+        return Peak(0.0, place / self.shape[0], float(power.max()), 0.0)
+
+    def _lags(self, degrees: int) -> dict[str, Number]:
+        n, m = self.shape
+        power = self.power / self.weight[""][0]
+        covariance = np.fft.irfft2(power, s=(n, m))
+        sd = 1 / sqrt(n * m * degrees)
+        found: dict[str, Number] = {}
+        for axis, line in (("rows", covariance[0]), ("columns", covariance[:, 0])):
+            for lag in range(1, min(LAGS, line.size // 2 - 1) + 1):
+                found[f"line_correlation along {axis} {lag}"] = (float(line[lag] / line[0]), sd)
+        return found
+
+
+def _peak(found: Estimate) -> Number:
+    if not found.known or not found.null_error > 0:
+        return UNKNOWN
+    scaled = np.pi / sqrt(6) * (found.value - found.null_value) / found.null_error + _EULER
+    return gumbel_score(float(scaled)), 1.0
+
+
+def split_name(name: str) -> tuple[str, str]:
+    """Return statistic and detail of a name such as `parity of rows`."""
+    for mark in (" of ", " along "):
+        if mark in name:
+            statistic, detail = name.split(mark, 1)
+            return statistic, detail
+    return name, ""
+
+
+Numbers = Mapping[str, Number]

@@ -1,0 +1,29 @@
+"""What a number of the bank is, and where it was taken."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Key:
+    """The name of one number.
+
+    Attributes
+    ----------
+    statistic
+        One of `dsis.measures.MEASURES`, or one of the bank's own.
+    scope
+        What the number is of: `exposure`, or a coherent sum over exposures (`offset`, `gain`,
+        `time`, `pooled` and the weighting of a contrast).
+    exposure
+        Name of the exposure; empty for sums over exposures.
+    channel
+        Name of the channel; empty for sums over channels.
+    detail
+        What else tells it apart: a lag, an axis.
+    """
+
+    statistic: str
+    scope: str
+    exposure: str = ""
+    channel: str = ""
+    detail: str = ""

@@ -1,0 +1,262 @@
+"""The base model's numbers from levels and variances: black level, light, slope and intercept.
+
+Fast enough to be repeated for every simulated recording, so that what the fit itself takes out of
+the residuals is in their null. What rounding, clipping and the camera's own effects add to level
+and variance is handed in as `Offsets`, found by simulation.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from math import sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.mismatch.observe import Layout, Level, Place
+
+Array = NDArray[np.float64]
+CLIPPED_SHARE = 1e-3
+_ROUNDS = 8
+_MOST_STRETCH = 30.0  # a variance that rounding has all but hidden
+_HUBER = 4.0  # standard deviations from which a level counts less
+
+
+@dataclass(frozen=True)
+class Offsets:
+    """What the simulated camera adds to level (DN) and pixel variance (DN^2), by place.
+
+    `stretch` is by how much an error of the recorded variance grows on the way back.
+    """
+
+    level_dn: Mapping[Place, float] = field(default_factory=dict)
+    variance_dn2: Mapping[Place, float] = field(default_factory=dict)
+    stretch: Mapping[Place, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Piece:
+    """One read-out segment: slope (DN), intercept (DN^2), their errors, from which signal on."""
+
+    from_dn: float
+    slope: float
+    intercept: float
+    slope_error: float
+    intercept_error: float
+
+
+@dataclass(frozen=True)
+class BaseFit:
+    """The base model's numbers, and what they leave.
+
+    Attributes
+    ----------
+    black_dn, black_error_dn
+        By channel, above the nominal black; the error is nan where no dark says.
+    light_dn
+        Signal per unit of light, by channel (both greens alike); empty where light is unknown.
+    pieces
+        Read-out segments.
+    signal_dn
+        By place: level above black.
+    expected_dn2
+        Variance expected at each place, offsets included.
+    """
+
+    black_dn: Mapping[str, float]
+    black_error_dn: Mapping[str, float]
+    light_dn: Mapping[str, float]
+    pieces: tuple[Piece, ...]
+    signal_dn: Mapping[Place, float]
+    expected_dn2: Mapping[Place, float]
+
+    def line_dn2(self, signal_dn: Array) -> Array:
+        """Return the variance of the base model at a signal, rounding not included."""
+        table = np.array([[p.slope, p.intercept] for p in self.pieces])
+        starts = np.array([p.from_dn for p in self.pieces[1:]])
+        slope, intercept = table[np.searchsorted(starts, signal_dn, side="right")].T
+        return np.asarray(slope * np.maximum(signal_dn, 0.0) + intercept)
+
+
+def fit_base(
+    layout: Layout,
+    levels: Mapping[Place, Level],
+    switches: Sequence[float],
+    offsets: Offsets,
+    *,
+    black_dn: float,
+    left_out: frozenset[str] = frozenset(),
+    slopes: Sequence[float] = (),
+) -> BaseFit:
+    """Return the numbers of the base model.
+
+    Parameters
+    ----------
+    layout, levels
+        What was observed.
+    switches
+        Where read-out segments change, DN above black, ascending.
+    offsets
+        Taken off levels and variances before the fit.
+    black_dn
+        Above the nominal black, where no dark says.
+    left_out
+        Exposures that are not fitted.
+    slopes
+        Of each segment, for segments whose levels cannot tell it.
+    """
+    black, black_error = _black(layout, levels, offsets, black_dn)
+    signal = _signals(layout, levels, offsets, black)
+    light = _light(layout, levels, signal, left_out)
+    used = [
+        place
+        for place in levels
+        if place[0] not in left_out
+        and _sound(levels[place])
+        and offsets.stretch.get(place, 1.0) < _MOST_STRETCH
+    ]
+    x = np.array([signal[place] for place in used])
+    v = np.array(
+        [levels[place].variance_dn2 - offsets.variance_dn2.get(place, 1 / 12) for place in used]
+    )
+    relative = np.array(
+        [sqrt(2 / levels[place].dof) * offsets.stretch.get(place, 1.0) for place in used]
+    )
+    added = np.array([offsets.variance_dn2.get(place, 1 / 12) for place in used])
+    starts = [-np.inf, *switches]
+    ends = [*switches, np.inf]
+    pieces = []
+    for number, (low, high) in enumerate(zip(starts, ends, strict=True)):
+        inside = (x >= low) & (x < high)
+        known = slopes[number] if number < len(slopes) else None
+        pieces.append(_piece(low, x[inside], v[inside], relative[inside], added[inside], known))
+    fit = BaseFit(black, black_error, light, tuple(pieces), signal, {})
+    at = np.array([signal[place] for place in levels])
+    line = fit.line_dn2(at)
+    expected = {
+        place: float(value) + offsets.variance_dn2.get(place, 1 / 12)
+        for place, value in zip(levels, line, strict=True)
+    }
+    return BaseFit(black, black_error, light, tuple(pieces), signal, expected)
+
+
+def _sound(level: Level) -> bool:
+    low, high = np.nan_to_num([level.clipped_low, level.clipped_high])
+    return bool(high <= CLIPPED_SHARE and low <= CLIPPED_SHARE and level.variance_dn2 > 0)
+
+
+def _black(
+    layout: Layout, levels: Mapping[Place, Level], offsets: Offsets, nominal: float
+) -> tuple[dict[str, float], dict[str, float]]:
+    black, error = {}, {}
+    for channel in layout.channels:
+        places = [(e.name, channel) for e in layout.exposures if e.kind == "dark"]
+        if not places:
+            black[channel], error[channel] = nominal, np.nan
+            continue
+        weight = np.array([1 / max(levels[p].level_error_dn, 1e-9) ** 2 for p in places])
+        value = np.array([levels[p].level_dn - offsets.level_dn.get(p, 0.0) for p in places])
+        black[channel] = float((weight * value).sum() / weight.sum())
+        error[channel] = float(1 / sqrt(weight.sum()))
+    return black, error
+
+
+def _signals(
+    layout: Layout, levels: Mapping[Place, Level], offsets: Offsets, black: Mapping[str, float]
+) -> dict[Place, float]:
+    """Return level above black; where darks have several times, above the dark of that time."""
+    signal: dict[Place, float] = {}
+    for channel in layout.channels:
+        darks: dict[float, list[float]] = {}
+        for e in layout.exposures:
+            if e.kind == "dark":
+                place = (e.name, channel)
+                own = levels[place].level_dn - offsets.level_dn.get(place, 0.0)
+                darks.setdefault(e.exposure_time_s, []).append(own)
+        times = sorted(darks)
+        for e in layout.uniform:
+            place = (e.name, channel)
+            if e.kind == "dark":
+                signal[place] = 0.0
+                continue
+            ground = black[channel]
+            if len(times) > 1:
+                means = [float(np.mean(darks[t])) for t in times]
+                ground = float(np.interp(e.exposure_time_s, times, means))
+            signal[place] = levels[place].level_dn - offsets.level_dn.get(place, 0.0) - ground
+    return signal
+
+
+def colour(channel: str) -> str:
+    """Return the colour of a channel: both greens are one."""
+    return "G" if channel in ("Gr", "Gb") else channel
+
+
+def _light(
+    layout: Layout,
+    levels: Mapping[Place, Level],
+    signal: Mapping[Place, float],
+    left_out: frozenset[str],
+) -> dict[str, float]:
+    """Return DN per unit of light by colour: the weighted median of the ratios of the flats."""
+    ratios: dict[str, list[tuple[float, float]]] = {}
+    for e in layout.uniform:
+        if e.kind != "flat" or e.light is None or e.light <= 0 or e.name in left_out:
+            continue
+        for channel in layout.channels:
+            level = levels[e.name, channel]
+            x = signal[e.name, channel]
+            if not _sound(level) or x <= 0:
+                continue
+            error = sqrt(level.level_error_dn**2 + (2e-4 * x) ** 2) / e.light
+            ratios.setdefault(colour(channel), []).append((x / e.light, 1 / error**2))
+    light = {}
+    for name, pairs in ratios.items():
+        if len(pairs) < 2:
+            continue
+        value, weight = np.array(pairs).T
+        mean = float((value * weight).sum() / weight.sum())
+        for _ in range(_ROUNDS):  # Huber: a few levels off the line do not bend it
+            far = np.abs(value - mean) * np.sqrt(weight)
+            w = weight * np.minimum(1, _HUBER / np.maximum(far, 1e-12))
+            mean = float((value * w).sum() / w.sum())
+        light[name] = mean
+    return light
+
+
+def _piece(
+    low: float, x: Array, v: Array, relative: Array, added: Array, slope: float | None
+) -> Piece:
+    """Return the line through the variances of one segment, by reweighting."""
+    if x.size == 0:
+        return Piece(low, slope or 0.0, 0.0, np.inf, np.inf)
+    free = np.unique(np.round(x / max(np.abs(x).max(), 1e-12), 3)).size > 1
+    if not free and slope is None:
+        slope = 0.0
+    # Weights need a variance: start from the observed, go on with the fitted.
+    total = np.maximum(v + added, 1e-9)
+    parameters = np.zeros(2)
+    inverse = np.zeros((2, 2))
+    for _ in range(_ROUNDS):
+        sd = relative * total
+        w = 1 / sd**2
+        if free:
+            rest = (v - parameters[0] * x - parameters[1]) / sd if parameters.any() else 0 * v
+            spread = max(1.0, float(np.median(np.abs(rest))) * 1.4826)
+            w = w * np.minimum(1, _HUBER * spread / np.maximum(np.abs(rest), 1e-12))
+            design = np.stack([x, np.ones_like(x)], 1)
+            normal = (design * w[:, None]).T @ design
+            size = np.sqrt(np.diag(normal))
+            inverse = np.linalg.pinv(normal / np.outer(size, size)) / np.outer(size, size)
+            parameters = inverse @ (design.T @ (w * v))
+        else:
+            rest_v = v - (slope or 0.0) * x
+            parameters = np.array([slope or 0.0, float((w * rest_v).sum() / w.sum())])
+            inverse = np.array([[np.inf, 0.0], [0.0, 1 / w.sum()]])
+        total = np.maximum(parameters[0] * x + parameters[1] + added, 0.05 * np.maximum(v + added, 1e-9))
+    return Piece(
+        low,
+        float(parameters[0]),
+        float(parameters[1]),
+        sqrt(inverse[0, 0]),
+        sqrt(inverse[1, 1]),
+    )

@@ -1,0 +1,83 @@
+"""The model of a recording: a camera, and the clean signal of every exposure.
+
+Simulations of it are made in memory, frame numbers as recorded. Draws are counted, so two models
+share their noise: the difference that an effect makes is known far better than either.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.mismatch.observe import Layout, Observation, observe
+from dsis.camera import Camera
+from dsis.draw import Draw
+from dsis.effects import Image
+from dsis.grid import PixelGrid
+from dsis.simulate.shot import tiled
+
+Sites = NDArray[np.float64]
+T = TypeVar("T")
+R = TypeVar("R")
+
+
+@dataclass(frozen=True)
+class Model:
+    """A camera model, and the light of each exposure.
+
+    Attributes
+    ----------
+    camera
+        The camera.
+    signals
+        Clean signal of each flat and dark before all effects, DN above black, for rows 0, 1 and
+        columns 0, 1: (2, 2).
+    """
+
+    camera: Camera
+    signals: Mapping[str, Sites]
+
+    def with_camera(self, camera: Camera) -> "Model":
+        """Return the model with another camera."""
+        return replace(self, camera=camera)
+
+    def frames(self, layout: Layout, replicate: int, seed: int) -> Callable[[str], Iterator[Image]]:
+        """Return what gives the codes of an exposure's frames: float32 (row, column), DN."""
+        grid = PixelGrid(layout.rows, layout.columns, layout.cfa)
+        sensor = Draw(seed).within("sensor", str(replicate))
+        times = {e.name: e.exposure_time_s for e in layout.exposures}
+        numbers = {e.name: e.numbers for e in layout.exposures}
+        black = np.float32(self.camera.black_level)
+
+        def of(name: str) -> Iterator[Image]:
+            temporal = Draw(seed).within("exposure", name, str(replicate))
+            clean = tiled(self.signals[name], grid)
+            for number in numbers[name]:
+                image = self.camera.expose(
+                    clean, temporal, sensor, number, grid, exposure_time_s=times[name]
+                )
+                yield np.rint(image + black)
+
+        return of
+
+
+def simulate(
+    model: Model, layout: Layout, replicates: Sequence[int], seed: int, jobs: int
+) -> list[Observation]:
+    """Return the observations of simulated recordings, one for each replicate number."""
+
+    def one(replicate: int) -> Observation:
+        return observe(layout, model.frames(layout, replicate, seed))
+
+    return in_threads(one, replicates, jobs)
+
+
+def in_threads(work: Callable[[T], R], items: Sequence[T], jobs: int) -> list[R]:
+    """Return `work` of each item, in order, by so many threads."""
+    if jobs <= 1 or len(items) < 2:
+        return [work(item) for item in items]
+    with ThreadPoolExecutor(jobs) as pool:
+        return list(pool.map(work, items))

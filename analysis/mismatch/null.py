@@ -1,0 +1,121 @@
+"""What a model says that the bank's numbers should be, and how far a recording is from it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.stats
+from numpy.typing import NDArray
+
+from analysis.mismatch.bank.key import Key
+from analysis.mismatch.observe import Layout
+from analysis.mismatch.vector import Contrasts, Vector, contrasts
+
+Array = NDArray[np.float64]
+_OWN = 40.0  # degrees of freedom that the closed form, scaled by name, is worth
+_LEAST_SCALE = 0.8
+
+
+@dataclass(frozen=True)
+class Null:
+    """Mean and spread of every number under a model.
+
+    Attributes
+    ----------
+    keys
+        Of the numbers, then of the contrasts.
+    mean, sd
+        Of the numbers, under the model; the error of the mean is in the spread.
+    known
+        Which numbers can be judged.
+    contrasts
+        Sums of departures over exposures.
+    contrast_mean, contrast_sd
+        Of the contrasts, under the model.
+    degrees
+        Degrees of freedom of the spread: departures are Student's.
+    """
+
+    keys: tuple[Key, ...]
+    mean: Array
+    sd: Array
+    known: NDArray[np.bool_]
+    contrasts: Contrasts
+    contrast_mean: Array
+    contrast_sd: Array
+    degrees: float
+
+    def departures(self, seen: Vector) -> Array:
+        """Return departures in standard deviations, of numbers and contrasts; 0 where unknown."""
+        single = self._single(seen.values)
+        sums = (self.contrasts.matrix @ single - self.contrast_mean) / self.contrast_sd
+        return np.concatenate([single, sums])
+
+    def _single(self, values: Array) -> Array:
+        usable = self.known & np.isfinite(values)
+        z = np.zeros(len(values))
+        z[usable] = (values[usable] - self.mean[usable]) / self.sd[usable]
+        return z
+
+    def chances(self, departures: Array) -> Array:
+        """Return the two-sided probability of each departure."""
+        return np.asarray(2 * scipy.stats.t.sf(np.abs(departures), self.degrees))
+
+
+def null_of(layout: Layout, simulated: Sequence[Vector], seen: Vector) -> Null:
+    """Return the null from simulated recordings.
+
+    The closed-form errors are scaled, name by name, to the spread that the simulations show; each
+    number's own spread counts by its degrees of freedom.
+    """
+    values = np.stack([one.values for one in simulated])
+    errors = np.stack([one.errors for one in simulated])
+    count = len(simulated)
+    known = np.isfinite(values).all(0) & np.isfinite(seen.values) & np.isfinite(errors).all(0)
+    mean = np.where(known, np.nan_to_num(values).mean(0), 0.0)
+    error = np.where(known, np.sqrt(np.mean(np.where(np.isfinite(errors), errors, 1.0) ** 2, 0)), 1)
+    own = np.where(known, ((np.nan_to_num(values) - mean) ** 2).sum(0) / (count - 1), 1) / error**2
+    scale = _by_name(seen.keys, own, known)
+    blended = (_OWN * scale + (count - 1) * own) / (_OWN + count - 1)
+    sd = error * np.sqrt(np.maximum(blended, _LEAST_SCALE**2) * (1 + 1 / count))
+    sums = contrasts(layout, Vector(seen.keys, seen.values, sd), known)
+    parts = np.where(known, (np.nan_to_num(values) - mean) / sd, 0.0)
+    along = parts @ sums.matrix.T
+    spread = (along**2).sum(0) / (count - 1)
+    white = 1 / (1 + 1 / count)
+    pooled = (_OWN * np.maximum(white, 0.0) + (count - 1) * spread) / (_OWN + count - 1)
+    return Null(
+        (*seen.keys, *sums.keys),
+        mean,
+        sd,
+        known,
+        sums,
+        np.zeros(len(sums.keys)),
+        np.sqrt(np.maximum(pooled, _LEAST_SCALE**2) * (1 + 1 / count)),
+        _OWN + count - 1,
+    )
+
+
+def _by_name(keys: Sequence[Key], own: Array, known: NDArray[np.bool_]) -> Array:
+    """Return the mean squared ratio of spread to closed form of each statistic and scope."""
+    groups: dict[tuple[str, str], list[int]] = {}
+    for i, key in enumerate(keys):
+        if known[i]:
+            groups.setdefault((key.statistic, key.scope), []).append(i)
+    scale = np.ones(len(keys))
+    for which in groups.values():
+        # Few numbers leave the closed form its say.
+        scale[which] = (own[which].sum() + 4.0) / (len(which) + 4.0)
+    return scale
+
+
+def adjusted(chances: Array) -> Array:
+    """Return Holm's adjusted probabilities: family-wise, step-down."""
+    order = np.argsort(chances)
+    count = len(chances)
+    stepped = np.minimum(1.0, chances[order] * (count - np.arange(count)))
+    result = np.empty(count)
+    result[order] = np.maximum.accumulate(stepped)
+    return result
+
+

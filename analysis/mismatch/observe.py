@@ -1,0 +1,221 @@
+"""One pass over the frames of a recording, or of a simulation of it: everything the bank needs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.mismatch.bank.coherent import Peak, SpectrumSums, VarianceSums
+from analysis.mismatch.bank.maps import PatternSums, Regressors, parts
+from analysis.mismatch.bank.scalars import Number, scalars
+from dsis.cfa import Cfa
+from dsis.measures import Accumulator, Measured
+
+Array = NDArray[np.float64]
+Frames = Callable[[str], Iterable[NDArray[np.generic]]]
+Watcher = Callable[[str, Measured], None]
+Place = tuple[str, str]
+"""Exposure and channel."""
+
+
+@dataclass(frozen=True)
+class Taken:
+    """One exposure as the bank takes it.
+
+    Attributes
+    ----------
+    name, kind
+        Of the exposure.
+    exposure_time_s
+        Exposure time, s.
+    light
+        Light per frame; None: unknown.
+    numbers
+        Numbers of the frames that are used, from 0.
+    """
+
+    name: str
+    kind: str
+    exposure_time_s: float
+    light: float | None
+    numbers: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Layout:
+    """What is observed, and how sums over exposures are weighted.
+
+    Attributes
+    ----------
+    exposures
+        In the order of the recording.
+    rows, columns, cfa
+        Of the frames.
+    black_dn, white_dn
+        Nominal black level and largest code: levels are counted from this black.
+    signal_dn, variance_dn2
+        Expected by the re-calibrated model, by exposure and channel: weights only.
+    """
+
+    exposures: tuple[Taken, ...]
+    rows: int
+    columns: int
+    cfa: Cfa
+    black_dn: float
+    white_dn: float
+    signal_dn: Mapping[Place, float]
+    variance_dn2: Mapping[Place, float]
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Names of the channels."""
+        return ("MONO",) if self.cfa is Cfa.MONO else ("R", "Gr", "Gb", "B")
+
+    @property
+    def uniform(self) -> tuple[Taken, ...]:
+        """Darks and flats."""
+        return tuple(e for e in self.exposures if e.kind != "scene")
+
+    def regressors(self, channel: str) -> Regressors:
+        """Return what the mean frames of a channel are regressed on."""
+        names = [e.name for e in self.uniform]
+        return Regressors.of(
+            names,
+            {name: self.signal_dn[name, channel] for name in names},
+            {e.name: e.exposure_time_s for e in self.uniform},
+            {
+                e.name: len(e.numbers) / self.variance_dn2[e.name, channel]
+                for e in self.uniform
+            },
+        )
+
+
+@dataclass(frozen=True)
+class Level:
+    """Mean and pixel variance of one channel of one exposure.
+
+    Attributes
+    ----------
+    level_dn, level_error_dn
+        Above the nominal black, and its error from pixel noise alone.
+    variance_dn2, dof
+        Of a pixel over time, and its degrees of freedom.
+    clipped_low, clipped_high
+        Share of samples at the ends of the converter.
+    pixels
+        Pixels of the channel.
+    """
+
+    level_dn: float
+    level_error_dn: float
+    variance_dn2: float
+    dof: float
+    clipped_low: float
+    clipped_high: float
+    pixels: int
+
+
+@dataclass(frozen=True)
+class Observation:
+    """What one pass found.
+
+    Attributes
+    ----------
+    levels
+        By exposure and channel.
+    scalars
+        Transformed measures, by exposure and channel.
+    maps
+        Statistics of the maps over all exposures: by channel, map and name.
+    pooled
+        Statistics of spectra and persistent variances: by channel and name.
+    peaks
+        Where the spectra are largest: by channel and kind.
+    """
+
+    levels: Mapping[Place, Level]
+    scalars: Mapping[Place, Mapping[str, Number]]
+    maps: Mapping[tuple[str, str], Mapping[str, Number]]
+    pooled: Mapping[str, Mapping[str, Number]]
+    peaks: Mapping[tuple[str, str], Peak]
+
+
+def measure(layout: Layout, exposure: Taken, frames: Iterable[NDArray[np.generic]]) -> Measured:
+    """Return the measures of one exposure's frames."""
+    sums = Accumulator(
+        layout.rows, layout.columns, layout.cfa, layout.black_dn, layout.white_dn
+    )
+    for frame in frames:
+        sums.add(frame)
+    return sums.result()
+
+
+class _Channel:
+    """Sums over exposures of one channel."""
+
+    def __init__(self, regressors: Regressors, shape: tuple[int, int]) -> None:
+        self.patterns = PatternSums(regressors, shape)
+        self.variances = VarianceSums(shape)
+        self.spectra = SpectrumSums(shape)
+
+
+def observe(layout: Layout, frames_of: Frames, watch: Watcher | None = None) -> Observation:
+    """Return the observation of a recording.
+
+    Parameters
+    ----------
+    layout
+        What to observe.
+    frames_of
+        Gives the frames (row, column) of an exposure, codes in DN, in the order of its numbers.
+    watch
+        Sees the measures of every exposure on their way.
+    """
+    levels: dict[Place, Level] = {}
+    found: dict[Place, Mapping[str, Number]] = {}
+    sums: dict[str, _Channel] = {}
+    for exposure in layout.uniform:
+        measured = measure(layout, exposure, frames_of(exposure.name))
+        if watch is not None:
+            watch(exposure.name, measured)
+        frames = len(exposure.numbers)
+        for name, channel in measured.channels.items():
+            place = (exposure.name, name)
+            shape = channel.mean_frame.shape
+            estimates = channel.estimates
+            levels[place] = Level(
+                estimates["level"].value,
+                estimates["level"].null_error,
+                estimates["pixel_variance"].value,
+                (frames - 1) * (shape[0] - 1) * (shape[1] - 1),
+                channel.clipped_low,
+                channel.clipped_high,
+                shape[0] * shape[1],
+            )
+            found[place] = scalars(channel, frames)
+            if name not in sums:
+                sums[name] = _Channel(layout.regressors(name), (shape[0], shape[1]))
+            own, variance = sums[name], layout.variance_dn2[place]
+            pixel = estimates["pixel_variance"].value
+            own.patterns.add(exposure.name, channel.mean_frame, pixel, frames)
+            if frames > 2:
+                own.variances.add(channel.variance_map, (frames - 1) / variance)
+            own.spectra.add(channel, frames, variance, layout.signal_dn[place])
+    maps: dict[tuple[str, str], Mapping[str, Number]] = {}
+    pooled: dict[str, Mapping[str, Number]] = {}
+    peaks: dict[tuple[str, str], Peak] = {}
+    for name, own in sums.items():
+        for kind, (image, noise) in own.patterns.maps().items():
+            maps[name, kind] = parts(image, noise).numbers
+        pooled[name] = {"variance_persistence": own.variances.number(), **own.spectra.numbers()}
+        for kind, peak in (
+            ("spectrum", own.spectra.peak()),
+            ("rows", own.spectra.row_peak("")),
+            ("rows of light", own.spectra.row_peak("signal")),
+        ):
+            if peak is not None:
+                peaks[name, kind] = peak
+    return Observation(levels, found, maps, pooled, peaks)

@@ -1,0 +1,344 @@
+"""The base model's numbers again, from the training frames; and whether the camera model's differ."""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from math import hypot, isfinite, sqrt
+
+import numpy as np
+import scipy.stats
+from numpy.typing import NDArray
+
+from analysis.mismatch.basefit import BaseFit, Offsets, colour, fit_base
+from analysis.mismatch.finding import ParameterError
+from analysis.mismatch.model import Model, Sites, simulate
+from analysis.mismatch.observe import Layout, Level, Observation, Place, Taken
+from analysis.mismatch.rounding import rounded, unrounded
+from dsis.camera import BaseNoise, Camera, Segment
+from dsis.cfa import Cfa, pattern
+from dsis.recording import Recording
+
+_ROUNDS = 3
+_REPLICATES = 3
+P_PARAMETERS = 0.004  # chance that numbers without error are called wrong
+_SWITCH_DEVIANCE = 12.0  # by which another gap must fit better before the switch is moved
+
+
+@dataclass(frozen=True)
+class Calibrated:
+    """The re-calibrated model and what it was fitted with.
+
+    Attributes
+    ----------
+    model
+        Camera and clean signals.
+    fit
+        The base numbers and their errors.
+    residual
+        The same with what the model itself says of rounding: what simulations are judged by.
+    offsets
+        What rounding, clipping and the camera's own effects add.
+    switches
+        Where read-out segments change, DN above black.
+    """
+
+    model: Model
+    fit: BaseFit
+    residual: BaseFit
+    offsets: Offsets
+    switches: tuple[float, ...]
+    left_out: frozenset[str]
+
+    def refit(self, layout: Layout, levels: Mapping[Place, Level]) -> BaseFit:
+        """Return the base numbers of another observation, fitted in the same way."""
+        camera = self.model.camera
+        return fit_base(
+            layout,
+            levels,
+            self.switches,
+            self.offsets,
+            black_dn=camera.black_level - layout.black_dn,
+            left_out=self.left_out,
+            slopes=[s.slope for s in camera.noise.segment],
+        )
+
+
+def layout_of(
+    recording: Recording,
+    numbers: Mapping[str, Sequence[int]],
+    first: Callable[[str, Sequence[int]], Iterable[NDArray[np.generic]]],
+) -> Layout:
+    """Return the layout of the frames `numbers`; two frames of each exposure set the weights.
+
+    `first(exposure, numbers)` gives frames. Exposures with fewer than two frames are left out.
+    """
+    taken = tuple(
+        Taken(e.name, e.kind, e.exposure_time_s, e.light, tuple(numbers[e.name]))
+        for e in recording.exposures
+        if len(numbers.get(e.name, ())) >= 2
+    )
+    sensor = recording.sensor
+    means: dict[Place, float] = {}
+    variances: dict[Place, float] = {}
+    for e in taken:
+        a, b = (np.asarray(f, np.float32) for f in first(e.name, e.numbers[:2]))
+        for channel, (y, x) in sites(sensor.cfa).items():
+            step = 1 if sensor.cfa is Cfa.MONO else 2
+            one, two = a[y::step, x::step], b[y::step, x::step]
+            means[e.name, channel] = float(one.mean() + two.mean()) / 2 - sensor.black_level
+            spread = np.percentile(two - one, [15.865, 84.135])
+            robust = float(spread[1] - spread[0]) ** 2 / 8
+            variances[e.name, channel] = max(robust, 0.05)
+    signal = {}
+    for e in taken:
+        for channel in sites(sensor.cfa):
+            darks = [means[d.name, channel] for d in taken if d.kind == "dark"]
+            ground = float(np.mean(darks)) if darks else 0.0
+            signal[e.name, channel] = (
+                0.0 if e.kind == "dark" else max(means[e.name, channel] - ground, 0.0)
+            )
+    return Layout(
+        taken,
+        recording.rows,
+        recording.columns,
+        sensor.cfa,
+        sensor.black_level,
+        sensor.white_level,
+        signal,
+        variances,
+    )
+
+
+def sites(cfa: Cfa) -> dict[str, tuple[int, int]]:
+    """Return the first row and column of each channel."""
+    if cfa is Cfa.MONO:
+        return {"MONO": (0, 0)}
+    colours = pattern(cfa)
+    found = {}
+    for y in (0, 1):
+        for x in (0, 1):
+            name = "RGB"[colours[y, x]]
+            if name == "G":
+                name += "r" if 0 in colours[y] else "b"
+            found[name, (y, x)] = (y, x)
+    return {name: place for name in ("R", "Gr", "Gb", "B") for (n, _), place in found.items() if n == name}
+
+
+def calibrate(
+    camera: Camera,
+    layout: Layout,
+    seen: Observation,
+    interpolated: str | None,
+    *,
+    seed: int,
+    jobs: int,
+) -> Calibrated:
+    """Return the base model with its numbers fitted to an observation."""
+    switches = tuple(
+        s.upper_dn for s in camera.noise.segment if s.upper_dn is not None
+    )
+    left_out = frozenset([interpolated] if interpolated else [])
+    start = camera.black_level - layout.black_dn
+    slopes = [s.slope for s in camera.noise.segment]
+    undone = _undone(layout, seen.levels)
+    effects = Offsets()
+
+    def fitted(offsets: Offsets, at: tuple[float, ...]) -> BaseFit:
+        return fit_base(
+            layout, seen.levels, at, offsets, black_dn=start, left_out=left_out, slopes=slopes
+        )
+
+    for _ in range(_ROUNDS if camera.effect else 1):
+        recorded = _sum(undone, effects)
+        fit = fitted(recorded, switches)
+        if len(switches) == 1:
+            switches = _moved(seen.levels, left_out, switches, fit, lambda s: fitted(recorded, s))
+            fit = fitted(recorded, switches)
+        model = Model(
+            with_numbers(camera, fit, switches, layout.black_dn), signals_of(layout, fit)
+        )
+        effects = _effects(model, layout, seed, jobs)
+    offsets = _sum(_rounding(model, layout, fit), effects)
+    return Calibrated(model, fit, fitted(offsets, switches), offsets, switches, left_out)
+
+
+def with_numbers(
+    camera: Camera, fit: BaseFit, switches: Sequence[float], nominal_black_dn: float
+) -> Camera:
+    """Return a camera with the base numbers of a fit."""
+    ends: list[float | None] = [*switches, None]
+    segments = tuple(
+        Segment(
+            upper_dn=end,
+            slope=max(piece.slope, 0.0),
+            intercept=piece.intercept,
+            slope_se=piece.slope_error if isfinite(piece.slope_error) else None,
+            intercept_se=piece.intercept_error if isfinite(piece.intercept_error) else None,
+        )
+        for piece, end in zip(fit.pieces, ends, strict=True)
+    )
+    black = nominal_black_dn + float(np.mean(list(fit.black_dn.values())))
+    noise = BaseNoise(shot=camera.noise.shot, segment=segments)
+    return camera.model_copy(update={"noise": noise, "black_level": max(black, 0.0)})
+
+
+def signals_of(layout: Layout, fit: BaseFit) -> dict[str, Sites]:
+    """Return the clean signal of each exposure: by its light where that is known."""
+    signals = {}
+    where = sites(layout.cfa)
+    for e in layout.uniform:
+        values = np.zeros((2, 2))
+        for channel, (y, x) in where.items():
+            if e.kind == "dark":
+                value = 0.0
+            elif e.light is not None and colour(channel) in fit.light_dn:
+                value = fit.light_dn[colour(channel)] * e.light
+            elif channel in ("Gr", "Gb"):
+                value = (fit.signal_dn[e.name, "Gr"] + fit.signal_dn[e.name, "Gb"]) / 2
+            else:
+                value = fit.signal_dn[e.name, channel]
+            if channel == "MONO":
+                values[:] = value
+            else:
+                values[y, x] = value
+        signals[e.name] = np.maximum(values, 0.0)
+    return signals
+
+
+def _undone(layout: Layout, levels: Mapping[Place, Level]) -> Offsets:
+    """Return what rounding added to the recorded levels and variances, by undoing it."""
+    shift, added, stretch = {}, {}, {}
+    for place, level in levels.items():
+        mean = level.level_dn + layout.black_dn
+        before, variance, slope = unrounded(mean, level.variance_dn2, layout.white_dn)
+        shift[place], added[place] = mean - before, level.variance_dn2 - variance
+        stretch[place] = slope
+    return Offsets(shift, added, stretch)
+
+
+def _rounding(model: Model, layout: Layout, fit: BaseFit) -> Offsets:
+    """Return what rounding and clipping add under a model, exactly."""
+    level, variance = {}, {}
+    for e in layout.uniform:
+        for channel, (y, x) in sites(layout.cfa).items():
+            signal = float(model.signals[e.name][y, x])
+            line = float(fit.line_dn2(np.array([signal]))[0])
+            mean = layout.black_dn + fit.black_dn[channel] + signal
+            level[e.name, channel], variance[e.name, channel] = rounded(
+                mean, line, layout.white_dn
+            )
+    return Offsets(level, variance)
+
+
+def _effects(model: Model, layout: Layout, seed: int, jobs: int) -> Offsets:
+    """Return what the camera's own effects add to level and variance, by simulation."""
+    if not model.camera.effect:
+        return Offsets()
+    plain = model.with_camera(model.camera.model_copy(update={"effect": ()}))
+    replicates = range(_REPLICATES)
+    pairs = list(
+        zip(
+            simulate(model, layout, replicates, seed + 1, jobs),
+            simulate(plain, layout, replicates, seed + 1, jobs),
+            strict=True,
+        )
+    )
+
+    def change(of: Callable[[Level], float]) -> dict[Place, float]:
+        return {
+            place: float(np.mean([of(a.levels[place]) - of(b.levels[place]) for a, b in pairs]))
+            for place in pairs[0][0].levels
+        }
+
+    return Offsets(change(lambda v: v.level_dn), change(lambda v: v.variance_dn2))
+
+
+def _sum(first: Offsets, second: Offsets) -> Offsets:
+    def added(a: Mapping[Place, float], b: Mapping[Place, float]) -> dict[Place, float]:
+        return {place: value + b.get(place, 0.0) for place, value in a.items()}
+
+    return Offsets(
+        added(first.level_dn, second.level_dn),
+        added(first.variance_dn2, second.variance_dn2),
+        first.stretch,
+    )
+
+
+def _moved(
+    levels: Mapping[Place, Level],
+    left_out: frozenset[str],
+    switches: tuple[float, ...],
+    fit: BaseFit,
+    fitted: Callable[[tuple[float, ...]], BaseFit],
+) -> tuple[float, ...]:
+    """Return the switch; moved to another gap between levels where that fits far better."""
+    signals = sorted(set(fit.signal_dn.values()))
+
+    def deviance(switch: float) -> float:
+        total = 0.0
+        for place, expected in fitted((switch,)).expected_dn2.items():
+            level = levels[place]
+            if place[0] in left_out or level.variance_dn2 <= 0 or expected <= 0:
+                continue
+            total += level.dof / 2 * float(np.log(level.variance_dn2 / expected)) ** 2
+        return total
+
+    gaps = [
+        sqrt(max(a, b / 100) * b)
+        for a, b in zip(signals, signals[1:], strict=False)
+        if b > 1.02 * a and b > 1.0
+    ]
+    here = deviance(switches[0])
+    best = min(gaps, key=deviance, default=switches[0])
+    return (best,) if deviance(best) < here - _SWITCH_DEVIANCE else switches
+
+
+def parameter_errors(
+    camera: Camera, calibrated: Calibrated, layout: Layout
+) -> tuple[ParameterError, ...]:
+    """Return the numbers of the camera model that the recording contradicts.
+
+    Judged together (chi-squared over all numbers, at `P_PARAMETERS`) and one by one (Bonferroni).
+    """
+    fit = calibrated.fit
+    rows: list[tuple[str, float, float, float]] = []
+    many = len(fit.pieces) > 1
+    for number, (piece, segment) in enumerate(zip(fit.pieces, camera.noise.segment, strict=True)):
+        at = f"noise.segment[{number}]" if many else "noise"
+        for name, recorded, own, error in (
+            ("slope", piece.slope, segment.slope, (piece.slope_error, segment.slope_se)),
+            ("intercept", piece.intercept, segment.intercept,
+             (piece.intercept_error, segment.intercept_se)),
+        ):  # fmt: skip
+            if isfinite(error[0]):
+                rows.append((f"{at}.{name}", own, recorded, hypot(error[0], error[1] or 0.0)))
+    errors = [e for e in fit.black_error_dn.values() if isfinite(e)]
+    if errors:
+        recorded = layout.black_dn + float(np.mean(list(fit.black_dn.values())))
+        error = sqrt(sum(e**2 for e in errors)) / len(errors)
+        rows.append(("black_level", camera.black_level, recorded, error))
+    return _contradicted(rows, camera, calibrated)
+
+
+def _contradicted(
+    rows: list[tuple[str, float, float, float]], camera: Camera, calibrated: Calibrated
+) -> tuple[ParameterError, ...]:
+    found = []
+    if rows:
+        z = np.array([(recorded - own) / error for _, own, recorded, error in rows])
+        single = float(scipy.stats.norm.isf(P_PARAMETERS / 4 / len(rows)))
+        joint = float(scipy.stats.chi2.sf((z**2).sum(), len(rows)))
+        least = single
+        if joint < P_PARAMETERS / 2:
+            least = min(single, max(2.0, float(np.abs(z).max())))
+        found = [
+            ParameterError(name, own, recorded, error)
+            for (name, own, recorded, error), departure in zip(rows, z, strict=True)
+            if abs(departure) >= least
+        ]
+    stated = [s.upper_dn for s in camera.noise.segment if s.upper_dn is not None]
+    for own, recorded in zip(stated, calibrated.switches, strict=True):
+        if own != recorded:
+            found.append(ParameterError("noise.switch_dn", own, recorded, abs(recorded - own) / 4))
+    return tuple(found)
+
+

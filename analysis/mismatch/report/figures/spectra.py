@@ -1,0 +1,117 @@
+"""Spectra of the temporal noise, of pixels and of line means, with the line that stands out."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import scipy.stats
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from analysis.figures import ALARM, COLOURS, GREY, INK
+from analysis.mismatch.evidence import Array, LineSpectrum, Spectrum
+from analysis.mismatch.finding import Where
+from analysis.mismatch.report.figures.maps import PANELS
+
+LINE_SIZE_INCHES = (9.6, 3.0)
+
+
+def size_inches(spectra: Sequence[Spectrum]) -> tuple[float, float]:
+    """Return width and height of a figure with a line of panels for each channel."""
+    panels = len(_panels(spectra[0]))
+    return 1.2 + 2.4 * panels, 3.9 * len(spectra)
+
+
+def draw(figure: Figure, spectra: Sequence[Spectrum], where: Where) -> None:
+    """Draw power over frequency, in decades above its median; the line that was found is ringed."""
+    grid = figure.subplots(len(spectra), len(_panels(spectra[0])), squeeze=False)
+    for line, one in zip(grid, spectra, strict=True):
+        nyquist = 0.5 / one.pitch_px
+        median = float(np.median(one.power[1:, 1:]))
+        decades = [np.log10(np.maximum(p, 1e-12 * median) / median) for p in _panels(one).values()]
+        top = max(float(decades[0][1:, 1:].max()), 0.3)
+        for axes, title, image in zip(line, _panels(one), decades, strict=True):
+            drawn = axes.imshow(
+                _finest(np.fft.fftshift(image, axes=0)),
+                cmap="cividis",
+                vmin=-0.3,
+                vmax=top,
+                extent=(0, nyquist, nyquist, -nyquist),
+                interpolation="none",
+                aspect="equal",
+            )
+            of = "" if one.channel in ("", "MONO") else f"{one.channel}, "
+            axes.set_title(f"{of}{title}", loc="left", fontsize=8.5)
+            axes.set_xlabel("cycles/pixel along a row", fontsize=8)
+        line[0].set_ylabel("cycles/pixel along a column", fontsize=8)
+        if where.spatial_frequency is not None:
+            _ring(line[0], where.spatial_frequency, nyquist)
+        figure.colorbar(drawn, ax=list(line), label="power over median, decades", pad=0.02)
+
+
+def draw_lines(figure: Figure, spectra: Sequence[LineSpectrum], where: Where, axis: int) -> None:
+    """Draw the power of line means: recorded, models, and what chance stays below.
+
+    `axis`: which of the two frequencies of `where` runs along x (0: columns, 1: rows).
+    """
+    panels = np.ravel(figure.subplots(1, len(spectra), squeeze=False, sharey=True))
+    for axes, one in zip(panels, spectra, strict=True):
+        frequency = np.linspace(0, 0.5 / one.pitch_px, one.power.size)[1:]
+        axes.plot(frequency, one.power[1:], color=INK, lw=0.9, label="recorded")
+        if one.before is not None:
+            axes.plot(frequency, one.before[1:], color=ALARM, lw=1.0, label="base model")
+            limit = one.before[1:] * _largest_by_chance(one.degrees, frequency.size)
+            axes.plot(frequency, limit, color=GREY, ls=(0, (4, 3)), lw=0.9, label="chance, 99 %")
+        if one.after is not None:
+            axes.plot(frequency, one.after[1:], color=COLOURS[0], lw=1.1, label="physics named")
+        axes.set_yscale("log")
+        axes.set_xlabel("cycles/pixel")
+        axes.grid(visible=True)
+        axes.set_title(one.channel if len(spectra) > 1 else "Power of line means", loc="left")
+        if where.spatial_frequency is not None:
+            peak = folded(where.spatial_frequency[axis], 0.5 / one.pitch_px)
+            axes.axvline(abs(peak), color=ALARM, lw=0.8, ls=(0, (1, 1.5)))
+            axes.annotate(f" {abs(peak):.4g}", (abs(peak), 0.93), xycoords=("data", "axes fraction"))
+    panels[0].set_ylabel("power, relative")
+    panels[-1].legend(loc="upper right")
+
+
+def folded(frequency: float, nyquist: float) -> float:
+    """Return where a frequency of the mosaic shows in a channel that samples more coarsely."""
+    period = 2 * nyquist
+    return (frequency + nyquist) % period - nyquist
+
+
+def _panels(one: Spectrum) -> dict[str, Array]:
+    images = zip(PANELS, (one.power, one.before, one.after), strict=True)
+    return {title: image for title, image in images if image is not None}
+
+
+def _finest(image: Array) -> Array:
+    """Return a spectrum small enough for a page; a block keeps its largest bin, so no line goes."""
+    step = max(1, -(-max(image.shape) // 512))
+    rows, columns = (size // step for size in image.shape)
+    blocks = image[: rows * step, : columns * step].reshape(rows, step, columns, step)
+    return np.asarray(blocks.max((1, 3)))
+
+
+def _ring(axes: Axes, at: tuple[float, float], nyquist: float) -> None:
+    x, y = (folded(value, nyquist) for value in at)
+    if x < 0:
+        x, y = -x, -y
+    axes.plot(x, y, "o", mfc="none", mec=ALARM, ms=11, mew=1.3, clip_on=False, zorder=5)
+    axes.annotate(
+        f"({at[0]:.3g}, {at[1]:.3g})",
+        (x, y),
+        (0, -9),
+        textcoords="offset points",
+        color=ALARM,
+        ha="right" if x > nyquist / 2 else "left",
+        va="top",
+        fontsize=8,
+    )
+
+
+def _largest_by_chance(degrees: float, bins: int) -> float:
+    """Return what the largest of white noise's bins stays below in 99 %, over their mean."""
+    shape = max(degrees, 1.0)
+    return float(scipy.stats.gamma.ppf(1 - 0.01 / bins, shape)) / shape

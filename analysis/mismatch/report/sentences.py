@@ -1,0 +1,129 @@
+"""What was found, in sentences: for the page and for the terminal."""
+
+from collections.abc import Iterable
+from itertools import pairwise
+
+import numpy as np
+
+from analysis.mismatch.finding import (
+    Alternative,
+    Finding,
+    FittedParameter,
+    Gain,
+    Mismatch,
+    OmittedEffect,
+    ParameterError,
+)
+from analysis.mismatch.report.numbers import interval, measured, plain
+from analysis.mismatch.report.words import effect_words, place, statistic_words, unit
+
+_NAMED = 3
+
+
+def verdict(finding: Finding) -> str:
+    """Return the verdict: what is missing, wrong or unexplained, largest first."""
+    match finding.verdict:
+        case "match":
+            said = ["Simulation and recording agree: nothing differs by more than chance."]
+        case "parameters":
+            said = ["The physics is complete, but numbers of the camera model are off."]
+        case "omitted_physics":
+            names = joined(_effect_in_short(e) for e in finding.omitted_physics)
+            said = [f"The camera model leaves out {names}."]
+        case "unexplained":
+            said = ["Something differs, and no effect of the vocabulary is proven to explain it."]
+    if finding.parameter_errors:
+        said.append(f"To be corrected: {joined(parameter_error(e) for e in _first(finding))}.")
+    if finding.unexplained:
+        most = max(finding.unexplained, key=lambda m: _size(m.z))
+        rest = len(finding.unexplained)
+        departures = "one departure stays" if rest == 1 else f"{rest} departures stay"
+        said.append(
+            f"{departures.capitalize()} unexplained, the largest in the "
+            f"{statistic_words(most.statistic)} (z = {plain(most.z)}; {place(most.where)})."
+        )
+    if finding.undecided:
+        names = joined((effect_words(a.effect) for a in finding.undecided), "or")
+        said.append(f"Not decided: {names}.")
+    return " ".join(said)
+
+
+def _first(finding: Finding) -> tuple[ParameterError, ...]:
+    return finding.parameter_errors[:_NAMED]
+
+
+def parameter_error(error: ParameterError) -> str:
+    """Return which number is off, and by how much."""
+    of = unit(error.parameter)
+    value = measured(error.recorded, error.standard_error)
+    return f"{error.parameter} is {value} {of}".rstrip() + f", not {plain(error.model, 5)}"
+
+
+def parameter_words(name: str) -> str:
+    """Return a parameter's name without its unit; empty where the unit says it all."""
+    for end in ("_dn_per_s", "_percent_full_scale", "_dn", "_percent", "_lsb", "_pixels"):
+        if name.endswith(end):
+            return name.removesuffix(end).replace("_", " ")
+    alone = ("dn_per_s", "per_dn", "percent_full_scale", "cycles_per_frame", "per_megapixel_frame")
+    return "" if name in alone else name.replace("_", " ")
+
+
+def fitted(name: str, parameter: FittedParameter) -> str:
+    """Return a parameter with its standard error and unit, `sigma 3.20 ± 0.10 DN` say."""
+    values = np.ravel(parameter.value)
+    errors = np.broadcast_to(np.ravel(parameter.standard_error), values.shape)
+    numbers = [measured(float(v), float(e)) for v, e in zip(values, errors, strict=True)]
+    text = numbers[0] if len(numbers) == 1 else f"({', '.join(numbers)})"
+    return " ".join(part for part in (parameter_words(name), text, unit(name)) if part)
+
+
+def _effect_in_short(effect: OmittedEffect) -> str:
+    numbers = "; ".join(fitted(name, p) for name, p in effect.parameters.items())
+    return f"{effect_words(effect.effect)} ({numbers})" if numbers else effect_words(effect.effect)
+
+
+def gain(found: Gain | None) -> str:
+    """Return a held-out gain with its interval, nats per frame."""
+    if found is None:
+        return plain(None)
+    return f"{plain(found.nats_per_frame)} ({interval(*found.ci95)})"
+
+
+def because(effect: OmittedEffect) -> str:
+    """Return what pointed to an effect."""
+    return joined(statistic_words(name) for name in effect.because)
+
+
+def considered(finding: Finding) -> list[tuple[str, Alternative]]:
+    """Return what was considered and not named, with the effect in whose place it stood."""
+    beside = [(e.effect, a) for e in finding.omitted_physics for a in e.alternatives]
+    return beside + [("", a) for a in finding.undecided]
+
+
+def joined(items: Iterable[str], last: str = "and") -> str:
+    """Return `a, b and c`."""
+    words = list(items)
+    if len(words) < 2:
+        return "".join(words)
+    return f"{', '.join(words[:-1])} {last} {words[-1]}"
+
+
+def numbers_in_short(numbers: Iterable[int]) -> str:
+    """Return frame numbers with runs shortened: `3, 7–9, 15`."""
+    ordered = sorted(numbers)
+    starts = [0, *(i for i, (a, b) in enumerate(pairwise(ordered), 1) if b != a + 1), len(ordered)]
+    runs = [ordered[a:b] for a, b in pairwise(starts)]
+    return ", ".join(
+        f"{run[0]}\u2013{run[-1]}" if len(run) > 2 else ", ".join(map(str, run))
+        for run in runs
+        if run
+    )
+
+
+def _size(z: float) -> float:
+    return -1.0 if np.isnan(z) else abs(z)
+
+
+def strongest(mismatches: Iterable[Mismatch]) -> list[Mismatch]:
+    """Return mismatches by the size of their departure, largest first."""
+    return sorted(mismatches, key=lambda m: -_size(m.z))

@@ -1,0 +1,64 @@
+"""What the terminal shows of a diagnosis; of several, one line each."""
+
+from collections.abc import Mapping
+
+from analysis.mismatch.finding import Change, Finding
+from analysis.mismatch.report.numbers import plain
+from analysis.mismatch.report.sentences import considered, fitted, gain, strongest, verdict
+from analysis.mismatch.report.words import effect_words, place, statistic_words
+
+_SHOWN = 8
+
+
+def summary(finding: Finding) -> str:
+    """Return a finding as Markdown: verdict, physics, where it differs, what is left, the proof."""
+    lines = [f"**{finding.verdict}**: {verdict(finding)}", ""]
+    if finding.omitted_physics:
+        lines += ["| physics left out | parameters | held-out gain, nats/frame (95 %) |"]
+        lines += ["|---|---|---|"]
+    for effect in finding.omitted_physics:
+        numbers = "; ".join(fitted(name, p) for name, p in effect.parameters.items())
+        lines.append(f"| {effect.effect} | {numbers} | {gain(effect.heldout_gain)} |")
+    ties = [a for of, a in considered(finding) if not of or a.would_settle]
+    lines += [f"- {effect_words(a.effect)}: {a.why_not} {a.would_settle}".rstrip() for a in ties]
+    if finding.mismatches:
+        lines += ["", "| differs | where | z | z after | explained by |", "|---|---|---|---|---|"]
+    for m in strongest(finding.mismatches)[:_SHOWN]:
+        lines.append(
+            f"| {statistic_words(m.statistic)} | {place(m.where)} | {plain(m.z)} | "
+            f"{plain(m.z_after)} | {m.explained_by or 'nothing'} |"
+        )
+    more = len(finding.mismatches) - _SHOWN
+    if more > 0:
+        lines.append(f"and {more} more, in the report")
+    lines += ["", *_proof(finding), *(f"- {remark}" for remark in finding.remarks)]
+    return "\n".join(lines).strip() + "\n"
+
+
+def _proof(finding: Finding) -> list[str]:
+    proof = finding.proof
+    said = [f"departures {_change(proof.discrepancies)}"]
+    if proof.gap_closed is not None:
+        said.append(f"gap closed {plain(proof.gap_closed)}")
+    if proof.classifier_auc is not None:
+        said.append(f"classifier AUC {_change(proof.classifier_auc)}")
+    if proof.photon_transfer_chi2 is not None:
+        said.append(f"photon-transfer chi²/dof {_change(proof.photon_transfer_chi2)}")
+    return ["On the locked frames: " + "; ".join(said) + ".", ""]
+
+
+def _change(change: Change) -> str:
+    return f"{plain(change.before)} -> {plain(change.after)}"
+
+
+def comparison(findings: Mapping[str, Finding]) -> str:
+    """Return one line per recording: verdict, physics, what is left."""
+    lines = [
+        "| recording | verdict | physics left out | unexplained | gap closed |",
+        "|---|---|---|---|---|",
+    ]
+    for name, finding in findings.items():
+        effects = ", ".join(effect.effect for effect in finding.omitted_physics) or "-"
+        left, closed = len(finding.unexplained), plain(finding.proof.gap_closed)
+        lines.append(f"| {name} | {finding.verdict} | {effects} | {left} | {closed} |")
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,79 @@
+"""Which frames train, which select, which stay locked until the proof.
+
+Frames are split by number in alternating blocks (train, select, train, locked), so that slow drift
+is in all parts. Exposures of fewer than six frames are given whole to one part; one flat level is
+left out of the re-calibration, so that the line's interpolation is tested.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from dsis.recording import RecordedExposure, Recording
+
+LEAST_FRAMES = 6
+_BLOCKS = 16  # about so many blocks in a long exposure
+_LEAST_LEVELS = 6  # flat levels from which one can be spared
+
+
+@dataclass(frozen=True)
+class Split:
+    """Numbers of frames by exposure, from 0.
+
+    Attributes
+    ----------
+    train, select, locked
+        By the exposure's name; a name is absent where it has no frames there.
+    interpolated
+        The flat exposure that the re-calibration leaves out; None: too few levels.
+    """
+
+    train: Mapping[str, tuple[int, ...]]
+    select: Mapping[str, tuple[int, ...]]
+    locked: Mapping[str, tuple[int, ...]]
+    interpolated: str | None
+
+    @property
+    def development(self) -> dict[str, tuple[int, ...]]:
+        """Frames that may be looked at before the proof: train and select."""
+        names = dict.fromkeys([*self.train, *self.select])
+        return {
+            name: tuple(sorted((*self.train.get(name, ()), *self.select.get(name, ()))))
+            for name in names
+        }
+
+    @classmethod
+    def of(cls, recording: Recording) -> "Split":
+        """Return the split of a recording."""
+        parts: tuple[dict[str, tuple[int, ...]], ...] = ({}, {}, {})
+        for exposure in recording.exposures:
+            if len(exposure.frames) >= LEAST_FRAMES:
+                for part, numbers in zip(parts, _blocks(len(exposure.frames)), strict=True):
+                    part[exposure.name] = numbers
+        for kind in ("dark", "flat", "scene"):
+            few = [
+                e for e in recording.exposures if e.kind == kind and len(e.frames) < LEAST_FRAMES
+            ]
+            for place, exposure in enumerate(sorted(few, key=_brightness)):
+                whole = (0, 1, 0, 2)[place % 4]
+                parts[whole][exposure.name] = tuple(range(len(exposure.frames)))
+        return cls(*parts, _spared(recording))
+
+
+def _blocks(frames: int) -> tuple[tuple[int, ...], ...]:
+    length = max(frames // _BLOCKS, 1)
+    part = [(0, 1, 0, 2)[(number // length) % 4] for number in range(frames)]
+    return tuple(tuple(i for i, p in enumerate(part) if p == which) for which in range(3))
+
+
+def _brightness(exposure: RecordedExposure) -> tuple[float, float, str]:
+    light = exposure.light
+    return (exposure.exposure_time_s if light is None else light), exposure.exposure_time_s, (
+        exposure.name
+    )
+
+
+def _spared(recording: Recording) -> str | None:
+    flats = sorted(
+        (e for e in recording.of_kind("flat") if len(e.frames) >= LEAST_FRAMES), key=_brightness
+    )
+    return flats[len(flats) // 2].name if len(flats) >= _LEAST_LEVELS else None

@@ -1,0 +1,161 @@
+"""The bank's numbers of one observation in one fixed order."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from math import inf, log, nan, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.mismatch.bank.coherent import split_name
+from analysis.mismatch.bank.key import Key
+from analysis.mismatch.bank.scalars import NAMES, OF_CODES, OF_MEAN_FRAMES, Number
+from analysis.mismatch.basefit import CLIPPED_SHARE, BaseFit, colour
+from analysis.mismatch.observe import Layout, Observation, Place
+
+Array = NDArray[np.float64]
+RELATIVE_LIGHT = 2e-4  # light is stated, and a lamp is stable, no better than this
+RELATIVE_RATIO = 1e-4
+
+
+@dataclass(frozen=True)
+class Vector:
+    """Numbers of one observation.
+
+    Attributes
+    ----------
+    keys
+        What each number is.
+    values
+        Transformed, near normal; nan where unknown.
+    errors
+        Standard deviations in white noise, closed form; inf where unknown.
+    """
+
+    keys: tuple[Key, ...]
+    values: Array
+    errors: Array
+
+
+def vector(layout: Layout, seen: Observation, fit: BaseFit) -> Vector:
+    """Return the numbers of an observation beside the base numbers fitted to it."""
+    rows: list[tuple[Key, Number]] = []
+    for exposure in layout.uniform:
+        for channel in layout.channels:
+            place = (exposure.name, channel)
+            rows += [
+                (Key(name, "exposure", *place), seen.scalars[place][name]) for name in NAMES
+            ]
+            rows.append((Key("pixel_variance", "exposure", *place), _variance(place, seen, fit)))
+            level = _level(layout, exposure.name, channel, seen, fit)
+            rows.append((Key("level", "exposure", *place), level))
+        if "Gr" in layout.channels and exposure.kind == "flat":
+            rows.append((Key("channel_ratio", "exposure", exposure.name, "G"),
+                         _ratio(exposure.name, seen, fit)))  # fmt: skip
+    for (channel, name), numbers in seen.maps.items():
+        for label, number in numbers.items():
+            statistic, detail = split_name(label)
+            rows.append((Key(statistic, name, "", channel, detail), number))
+    for channel, numbers in seen.pooled.items():
+        for label, number in numbers.items():
+            statistic, detail = split_name(label)
+            rows.append((Key(statistic, "all", "", channel, detail), number))
+    keys = tuple(key for key, _ in rows)
+    values, errors = np.array([number for _, number in rows]).T
+    unknown = ~(np.isfinite(values) & np.isfinite(errors) & (errors > 0))
+    return Vector(keys, np.where(unknown, nan, values), np.where(unknown, inf, errors))
+
+
+def _variance(place: Place, seen: Observation, fit: BaseFit) -> Number:
+    level, expected = seen.levels[place], fit.expected_dn2[place]
+    if level.variance_dn2 <= 0 or expected <= 0 or level.clipped_high > CLIPPED_SHARE:
+        return nan, inf
+    return log(level.variance_dn2 / expected), sqrt(2 / level.dof)
+
+
+def _level(layout: Layout, name: str, channel: str, seen: Observation, fit: BaseFit) -> Number:
+    """Return a dark's level against all darks, a flat's against its light, DN."""
+    level = seen.levels[name, channel]
+    exposure = next(e for e in layout.exposures if e.name == name)
+    if exposure.kind == "dark":
+        if sum(e.kind == "dark" for e in layout.exposures) < 2:
+            return nan, inf
+        return level.level_dn - fit.black_dn[channel], level.level_error_dn
+    per_light = fit.light_dn.get(colour(channel))
+    if per_light is None or exposure.light is None or level.clipped_high > CLIPPED_SHARE:
+        return nan, inf
+    signal = fit.signal_dn[name, channel]
+    error = sqrt(level.level_error_dn**2 + (RELATIVE_LIGHT * signal) ** 2)
+    return signal - per_light * exposure.light, error
+
+
+def _ratio(name: str, seen: Observation, fit: BaseFit) -> Number:
+    """Return ln(Gr / Gb)."""
+    first, second = fit.signal_dn[name, "Gr"], fit.signal_dn[name, "Gb"]
+    if min(first, second) <= 0:
+        return nan, inf
+    a, b = seen.levels[name, "Gr"].level_error_dn, seen.levels[name, "Gb"].level_error_dn
+    return log(first / second), sqrt((a / first) ** 2 + (b / second) ** 2 + RELATIVE_RATIO**2)
+
+
+SHAPES: Mapping[str, Callable[[float, float], float]] = {
+    "at all levels": lambda s, v: 1.0,
+    "constant": lambda s, v: 1 / v,
+    "with the signal": lambda s, v: s / v,
+    "with the signal squared": lambda s, v: s**2 / v,
+    "with the signal alone": lambda s, v: s,
+}
+
+
+@dataclass(frozen=True)
+class Contrasts:
+    """Sums of departures over exposures, weighted by how an effect may grow with the signal.
+
+    Attributes
+    ----------
+    keys
+        What each contrast is.
+    matrix
+        (contrast, number): unit rows, applied to departures z.
+    """
+
+    keys: tuple[Key, ...]
+    matrix: Array
+
+
+def contrasts(layout: Layout, reference: Vector, known: NDArray[np.bool_]) -> Contrasts:
+    """Return the contrasts over the numbers of single exposures that are known."""
+    places: dict[tuple[str, str], list[int]] = {}
+    for i, key in enumerate(reference.keys):
+        if key.scope == "exposure" and known[i] and key.statistic not in OF_CODES:
+            places.setdefault((key.statistic, ""), []).append(i)
+            if key.channel not in ("", "MONO") and key.statistic in _BY_CHANNEL:
+                places.setdefault((key.statistic, key.channel), []).append(i)
+    keys: list[Key] = []
+    rows: list[Array] = []
+    for (statistic, channel), which in places.items():
+        if len(which) < 2:
+            continue
+        kept: list[Array] = []
+        for name, shape in SHAPES.items():
+            if statistic in OF_MEAN_FRAMES and name == "with the signal alone":
+                continue
+            row = np.zeros(len(reference.keys))
+            for i in which:
+                place = (reference.keys[i].exposure, reference.keys[i].channel)
+                place = place if place in layout.signal_dn else (place[0], "Gr")
+                s, v = max(layout.signal_dn[place], 0.0), layout.variance_dn2[place]
+                row[i] = shape(s, v) / reference.errors[i]
+            size = float(np.linalg.norm(row))
+            if size == 0:
+                continue
+            row /= size
+            if any(abs(float(row @ other)) > 0.98 for other in kept):
+                continue
+            kept.append(row)
+            keys.append(Key(statistic, "contrast", "", channel, name))
+            rows.append(row)
+    return Contrasts(tuple(keys), np.array(rows).reshape(len(rows), len(reference.keys)))
+
+
+_BY_CHANNEL = frozenset({"pixel_variance", "level"})

@@ -95,7 +95,7 @@ def _proof(proof: Proof) -> Values:
 
 
 def _count(number: float) -> float | int:
-    return int(number) if math.isfinite(number) else number
+    return int(number) if float(number).is_integer() else number
 
 
 def _plain(value: Any) -> Any:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -134,6 +134,9 @@ class Observation:
         Statistics of spectra and persistent variances: by channel and name.
     peaks
         Where the spectra are largest: by channel and kind.
+    images
+        Kept on demand: maps of the fixed pattern (DN at the regressor's largest value, noise) by
+        channel and name, and summed relative pixel variances under the name `variance`.
     """
 
     levels: Mapping[Place, Level]
@@ -141,6 +144,7 @@ class Observation:
     maps: Mapping[tuple[str, str], Mapping[str, Number]]
     pooled: Mapping[str, Mapping[str, Number]]
     peaks: Mapping[tuple[str, str], Peak]
+    images: Mapping[tuple[str, str], tuple[Array, float]] = field(default_factory=dict)
 
 
 def measure(layout: Layout, exposure: Taken, frames: Iterable[NDArray[np.generic]]) -> Measured:
@@ -162,7 +166,9 @@ class _Channel:
         self.spectra = SpectrumSums(shape)
 
 
-def observe(layout: Layout, frames_of: Frames, watch: Watcher | None = None) -> Observation:
+def observe(
+    layout: Layout, frames_of: Frames, watch: Watcher | None = None, *, keep: bool = False
+) -> Observation:
     """Return the observation of a recording.
 
     Parameters
@@ -173,6 +179,8 @@ def observe(layout: Layout, frames_of: Frames, watch: Watcher | None = None) -> 
         Gives the frames (row, column) of an exposure, codes in DN, in the order of its numbers.
     watch
         Sees the measures of every exposure on their way.
+    keep
+        Whether to keep the maps.
     """
     levels: dict[Place, Level] = {}
     found: dict[Place, Mapping[str, Number]] = {}
@@ -207,9 +215,14 @@ def observe(layout: Layout, frames_of: Frames, watch: Watcher | None = None) -> 
     maps: dict[tuple[str, str], Mapping[str, Number]] = {}
     pooled: dict[str, Mapping[str, Number]] = {}
     peaks: dict[tuple[str, str], Peak] = {}
+    images: dict[tuple[str, str], tuple[Array, float]] = {}
     for name, own in sums.items():
         for kind, (image, noise) in own.patterns.maps().items():
             maps[name, kind] = parts(image, noise).numbers
+            if keep:
+                images[name, kind] = (image, noise)
+        if keep:
+            images[name, "variance"] = (own.variances.total, own.variances.squares**0.5)
         pooled[name] = {"variance_persistence": own.variances.number(), **own.spectra.numbers()}
         for kind, peak in (
             ("spectrum", own.spectra.peak()),
@@ -218,4 +231,4 @@ def observe(layout: Layout, frames_of: Frames, watch: Watcher | None = None) -> 
         ):
             if peak is not None:
                 peaks[name, kind] = peak
-    return Observation(levels, found, maps, pooled, peaks)
+    return Observation(levels, found, maps, pooled, peaks, images)

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from math import exp, inf, isfinite, log, nan, pi, sqrt
 
 import numpy as np
-import scipy.stats
+import scipy.special
 
 from dsis.measures import Channel, Estimate
 from dsis.measures.fixed_pattern import Smooth
@@ -156,18 +156,22 @@ def _peak(found: Estimate) -> Number:
 
 def gumbel_score(scaled: float) -> float:
     """Return the normal score of a standard Gumbel variate."""
-    if scaled > 30:
-        return float(scipy.stats.norm.isf(exp(-min(scaled, 700.0))))
-    return float(scipy.stats.norm.isf(-np.expm1(-exp(-scaled))))
+    chance = exp(-min(scaled, 700.0)) if scaled > 30 else -np.expm1(-exp(-scaled))
+    return normal_score(float(chance))
+
+
+def normal_score(chance: float) -> float:
+    """Return the normal deviate that is exceeded with this probability."""
+    return -float(scipy.special.ndtri(max(chance, 1e-300)))
 
 
 def _largest(channel: Channel, frames: int) -> Number:
     """Return the normal score of the largest pixel variance, chi-squared in white noise."""
     if frames < 3:
         return UNKNOWN
-    largest = float(channel.variance_map.max()) / float(np.median(channel.variance_map))
     dof = frames - 1
-    largest *= float(scipy.stats.chi2.median(dof))
-    single = float(scipy.stats.chi2.logsf(largest, dof))
-    chance = -np.expm1(channel.variance_map.size * np.log1p(-exp(max(single, -700))))
-    return float(scipy.stats.norm.isf(max(chance, 1e-300))), 1.0
+    ratio = float(channel.variance_map.max()) / float(np.median(channel.variance_map))
+    largest = ratio * 2 * float(scipy.special.gammaincinv(dof / 2, 0.5))
+    single = float(scipy.special.gammaincc(dof / 2, largest / 2))
+    chance = -np.expm1(channel.variance_map.size * np.log1p(-min(single, 0.5)))
+    return normal_score(float(chance)), 1.0

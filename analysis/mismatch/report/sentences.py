@@ -20,52 +20,55 @@ from analysis.mismatch.report.words import effect_words, place, statistic_words,
 _NAMED = 3
 
 
-def verdict(finding: Finding) -> str:
-    """Return the verdict: what is missing, wrong or unexplained, largest first."""
+def verdict(finding: Finding) -> tuple[str, ...]:
+    """Return the verdict in a sentence, then what is wrong, left over and not decided."""
     match finding.verdict:
         case "match":
             said = ["Simulation and recording agree: nothing differs by more than chance."]
         case "parameters":
-            said = ["The physics is complete, but numbers of the camera model are off."]
+            said = ["The physics is complete; its numbers are off."]
         case "omitted_physics":
             names = joined(_effect_in_short(e) for e in finding.omitted_physics)
             said = [f"The camera model leaves out {names}."]
         case "unexplained":
             said = ["Something differs, and no effect of the vocabulary is proven to explain it."]
     if finding.parameter_errors:
-        said.append(f"To be corrected: {joined(parameter_error(e) for e in _first(finding))}.")
+        said.append(_wrong_numbers(finding.parameter_errors))
     if finding.unexplained:
-        most = max(finding.unexplained, key=lambda m: _size(m.z))
+        most = strongest(finding.unexplained)[0]
         rest = len(finding.unexplained)
-        departures = "one departure stays" if rest == 1 else f"{rest} departures stay"
+        departures = "One departure stays" if rest == 1 else f"{rest} departures stay"
         said.append(
-            f"{departures.capitalize()} unexplained, the largest in the "
-            f"{statistic_words(most.statistic)} (z = {plain(most.z)}; {place(most.where)})."
+            f"{departures} unexplained, the largest in: {statistic_words(most.statistic)} "
+            f"(z = {plain(most.z)}; {place(most.where)})."
         )
     if finding.undecided:
         names = joined((effect_words(a.effect) for a in finding.undecided), "or")
         said.append(f"Not decided: {names}.")
-    return " ".join(said)
+    return tuple(said)
 
 
-def _first(finding: Finding) -> tuple[ParameterError, ...]:
-    return finding.parameter_errors[:_NAMED]
-
-
-def parameter_error(error: ParameterError) -> str:
-    """Return which number is off, and by how much."""
-    of = unit(error.parameter)
-    value = measured(error.recorded, error.standard_error)
-    return f"{error.parameter} is {value} {of}".rstrip() + f", not {plain(error.model, 5)}"
+def _wrong_numbers(errors: tuple[ParameterError, ...]) -> str:
+    """Return which numbers are off, and by how much."""
+    said = []
+    for error in errors[:_NAMED]:
+        value = measured(error.recorded, error.standard_error)
+        recorded = f"{value} {unit(error.parameter)}".rstrip()
+        said.append(f"{error.parameter} is {recorded}, not {plain(error.model, 5)}")
+    more = len(errors) - _NAMED
+    rest = [f"{more} more"] if more > 0 else []
+    return f"Numbers of the camera model are off: {'; '.join([*said, *rest])}."
 
 
 def parameter_words(name: str) -> str:
     """Return a parameter's name without its unit; empty where the unit says it all."""
+    alone = ("dn_per_s", "per_dn", "percent_full_scale", "cycles_per_frame", "per_megapixel_frame")
+    if name in alone:
+        return ""
     for end in ("_dn_per_s", "_percent_full_scale", "_dn", "_percent", "_lsb", "_pixels"):
         if name.endswith(end):
             return name.removesuffix(end).replace("_", " ")
-    alone = ("dn_per_s", "per_dn", "percent_full_scale", "cycles_per_frame", "per_megapixel_frame")
-    return "" if name in alone else name.replace("_", " ")
+    return name.replace("_", " ")
 
 
 def fitted(name: str, parameter: FittedParameter) -> str:
@@ -109,7 +112,7 @@ def joined(items: Iterable[str], last: str = "and") -> str:
 
 
 def numbers_in_short(numbers: Iterable[int]) -> str:
-    """Return frame numbers with runs shortened: `3, 7–9, 15`."""
+    """Return frame numbers with runs shortened: `3, 7-9, 15`."""
     ordered = sorted(numbers)
     starts = [0, *(i for i, (a, b) in enumerate(pairwise(ordered), 1) if b != a + 1), len(ordered)]
     runs = [ordered[a:b] for a, b in pairwise(starts)]

@@ -12,7 +12,7 @@ _SHOWN = 8
 
 def summary(finding: Finding) -> str:
     """Return a finding as Markdown: verdict, physics, where it differs, what is left, the proof."""
-    lines = [f"**{finding.verdict}**: {verdict(finding)}", ""]
+    lines = [f"**{finding.verdict}**: {' '.join(verdict(finding))}", ""]
     if finding.omitted_physics:
         lines += ["| physics left out | parameters | held-out gain, nats/frame (95 %) |"]
         lines += ["|---|---|---|"]

@@ -14,6 +14,7 @@ STATISTICS = {
     "frame_variance": "wander of whole frames",
     "skewness": "asymmetry of the noise",
     "kurtosis": "tails of the noise",
+    "kurtosis_within_pixels": "tails of the noise of single pixels",
     "correlation_0_1": "correlation with the next pixel of the row",
     "correlation_1_0": "correlation with the next pixel of the column",
     "correlation_1_1": "correlation with the diagonal neighbour",
@@ -106,7 +107,7 @@ def effect_says(kind: str) -> str:
 
 def unit(parameter: str) -> str:
     """Return the unit of a parameter, from its name; empty: a pure number."""
-    bare = parameter.split("[")[0]  # noise.slope[1]: of the second segment
+    bare = parameter.partition("[")[0]  # noise.slope[1]: of the second segment
     ends = [end for end in UNITS if bare == end or bare.endswith(("_" + end, "." + end))]
     return UNITS[max(ends, key=len)] if ends else ""
 

@@ -1,7 +1,8 @@
 """The figures of a diagnosis: which picture shows which mismatch, and how it is saved."""
 
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TypeVar
@@ -52,12 +53,9 @@ def pictures(finding: Finding) -> tuple[Picture, ...]:
     found: dict[str, Picture] = {}
     for mismatch in _in_turn(finding):
         for one in _of(mismatch, evidence):
-            before = found.get(one.name)
-            mismatches = (*before.mismatches, mismatch) if before else (mismatch,)
-            drawn = before or one
-            found[one.name] = Picture(
-                one.name, drawn.title, mismatches, drawn.size_inches, drawn.draw
-            )
+            name = re.sub(r"[^\w.-]+", "-", one.name)  # a file is named so
+            seen = found.get(name, replace(one, name=name, mismatches=()))
+            found[name] = replace(seen, mismatches=(*seen.mismatches, mismatch))
     return tuple(found.values())[:MOST]
 
 
@@ -124,34 +122,36 @@ def _of(m: Mismatch, evidence: Evidence) -> Iterator[Picture]:
         if evidence.curves.get(stored_name):
             drawn = evidence.curves[stored_name]
             draw = partial(curves.draw, curves=drawn, threshold_z=evidence.threshold_z)
-            stem = stored_name.replace(" ", "-")
-            yield Picture(stem, statistic_words(stored_name), (m,), curves.SIZE_INCHES, draw)
+            yield Picture(stored_name, statistic_words(stored_name), (m,), curves.SIZE_INCHES, draw)
             break
 
 
 def _map(m: Mismatch, name: str, evidence: Evidence) -> Iterator[Picture]:
-    wanted = _map_name(m, name)
-    parts = evidence.maps.get(wanted, ())
-    channel = m.where.channel
-    parts = tuple(p for p in parts if p.channel == channel) or parts
-    if parts:
-        stem = wanted if len(parts) > 1 or channel is None else f"{wanted}-{channel}"
-        draw = partial(maps.draw, maps=parts, where=m.where)
-        yield Picture(stem, wanted.replace("_", " "), (m,), maps.size_inches(parts), draw)
+    for wanted in _map_names(m, name):
+        parts = evidence.maps.get(wanted, ())
+        channel = m.where.channel
+        parts = tuple(p for p in parts if p.channel == channel) or parts
+        if parts:
+            stem = wanted if len(parts) > 1 or channel is None else f"{wanted}-{channel}"
+            title = f"{statistic_words(m.statistic)}: {wanted.replace('_', ' ')}"
+            draw = partial(maps.draw, maps=parts, where=m.where)
+            yield Picture(stem, title, (m,), maps.size_inches(parts), draw)
 
 
-def _map_name(m: Mismatch, name: str) -> str:
-    """Return which map shows a fixed pattern: of offsets, gains, growth in time, or noise."""
+def _map_names(m: Mismatch, name: str) -> tuple[str, ...]:
+    """Return which maps may show it: of offsets, gains, growth in time, or noise."""
     if name in NOISY_PIXELS:
-        return "variance_map"
+        return ("variance_map",)
     detail = parted(m.statistic)[1].split()
-    for word in ("offset", "gain", "time"):
-        if word in detail:
-            return f"{word}_map"
+    named = tuple(f"{word}_map" for word in ("offset", "gain", "time") if word in detail)
+    if named:
+        return named
     if m.explained_by in TIME or m.where.exposure_time_s is not None:
-        return "time_map"
-    dark = m.explained_by in OFFSET or m.where.kind == "dark"
-    return "offset_map" if dark else "gain_map"
+        return ("time_map",)
+    if m.explained_by in OFFSET or m.where.kind == "dark":
+        return ("offset_map",)
+    known = m.explained_by is not None or m.where.kind == "flat"
+    return ("gain_map",) if known else ("offset_map", "gain_map")
 
 
 def _at(m: Mismatch, stored: Mapping[str, Sequence[Part]]) -> tuple[str, Sequence[Part]]:

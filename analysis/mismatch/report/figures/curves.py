@@ -5,11 +5,11 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from analysis.figures import ALARM, COLOURS, GREY, INK
 from analysis.figures_camera import CHANNEL_COLOURS, CHANNEL_MARKS
 from analysis.mismatch.evidence import Curve
+from analysis.mismatch.report.figures.ticks import plain_numbers
 
 SIZE_INCHES = (9.6, 3.3)
 AXIS = {
@@ -32,7 +32,8 @@ def draw(figure: Figure, curves: Sequence[Curve], threshold_z: float) -> None:
         _departures(left, curve, threshold_z)
         _deviations(right, curve)
     several = len(curves) > 1
-    of = f", {curves[0].unit}" if curves[0].unit else ""
+    unit = curves[0].unit.replace("^2", "\u00b2")
+    of = f", {unit}" if unit else ""
     left.axhline(0, color=GREY, lw=0.8, zorder=0)
     left.set_ylabel(f"recorded less base model{of}")
     left.set_title("What differs", loc="left")
@@ -82,8 +83,8 @@ def _standard(axes: Axes, curves: Sequence[Curve], threshold_z: float) -> None:
     most = max(-low, high, 1.5 * threshold_z)
     if most > 4 * threshold_z:
         axes.set_yscale("symlog", linthresh=threshold_z)
-        axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-        axes.yaxis.set_minor_formatter(NullFormatter())
+        plain_numbers(axes.yaxis)
+        most *= 1.8
     axes.set_ylim(-most if low < -threshold_z else -1.5 * threshold_z, most)
     axes.set_ylabel("departure, standard deviations")
     axes.set_title("Before and after", loc="left")
@@ -94,12 +95,18 @@ def _abscissa(axes: Axes, curves: Sequence[Curve]) -> None:
     against = curves[0].against
     axes.set_xlabel(AXIS[against])
     x = np.concatenate([curve.x for curve in curves])
-    positive = x[np.isfinite(x) & (x > 0)]
+    x = x[np.isfinite(x)]
+    positive = x[x > 0]
     if against == "lag_pixels" or positive.size < 2:
         return
     # The dark stands on the straight part about 0.
-    start = float(np.quantile(positive, 0.1)) if against == "signal_dn" else float(positive.min())
+    start = float(np.quantile(positive, 0.1)) if x.min() <= 0 else float(positive.min())
     if positive.max() > _WIDE * start:
-        axes.set_xscale("symlog", linthresh=start)
-        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-        axes.xaxis.set_minor_formatter(NullFormatter())
+        left = float(x.min()) - 0.4 * start if x.min() <= 0 else float(x.min()) / 1.4
+        axes.set_xscale("symlog" if x.min() <= 0 else "log", **_linear(start, x.min() <= 0))
+        axes.set_xlim(left, 1.4 * float(x.max()))
+        plain_numbers(axes.xaxis)
+
+
+def _linear(reach: float, there: bool) -> dict[str, float]:
+    return {"linthresh": reach, "linscale": 0.5} if there else {}

@@ -6,10 +6,11 @@ from dataclasses import dataclass
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter, SymmetricalLogLocator
+from matplotlib.ticker import MaxNLocator, SymmetricalLogLocator
 
 from analysis.figures import COLOURS, GREY, INK
 from analysis.mismatch.finding import Finding, Gain
+from analysis.mismatch.report.figures.ticks import plain_numbers
 from analysis.mismatch.report.words import effect_words
 
 _LINEAR = 1.0  # nats per frame: within, the scale is linear
@@ -72,9 +73,8 @@ def draw(figure: Figure, ladder: Sequence[Rung]) -> None:
     axes.grid(visible=True, axis="x")
     axes.set_axisbelow(True)
     _scale(axes, [v for r in ladder for v in (r.gain.nats_per_frame, *r.gain.ci95)])
-    for state in LOOKS:
+    for state, (line, face) in LOOKS.items():
         if any(rung.state == state for rung in ladder):
-            line, face = LOOKS[state]
             axes.plot([], [], "o", color=line, mfc=face, label=state)
     axes.legend(loc="best")
 
@@ -87,5 +87,4 @@ def _scale(axes: Axes, values: Sequence[float]) -> None:
         return
     axes.set_xscale("symlog", linthresh=_LINEAR, linscale=0.6)
     axes.xaxis.set_major_locator(SymmetricalLogLocator(base=10, linthresh=_LINEAR))
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axes.xaxis.set_minor_formatter(NullFormatter())
+    plain_numbers(axes.xaxis)

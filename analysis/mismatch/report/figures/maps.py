@@ -12,7 +12,7 @@ from analysis.mismatch.evidence import Array, Map
 from analysis.mismatch.finding import Where
 
 WIDTH_INCHES = 9.6
-MOST_PIXELS = 400  # a picture is not finer than the page
+MOST_PIXELS = 320  # a picture is not finer than the page
 PIXELS_MARKED = 12
 PANELS = ("recorded", "base model", "with the physics named")
 

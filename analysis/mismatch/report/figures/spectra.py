@@ -11,8 +11,12 @@ from analysis.figures import ALARM, COLOURS, GREY, INK
 from analysis.mismatch.evidence import Array, LineSpectrum, Spectrum
 from analysis.mismatch.finding import Where
 from analysis.mismatch.report.figures.maps import PANELS
+from analysis.mismatch.report.figures.ticks import plain_numbers
+from analysis.mismatch.report.numbers import plain
 
-LINE_SIZE_INCHES = (9.6, 3.0)
+LINE_SIZE_INCHES = (9.6, 3.2)
+_CELLS = (96, 48)  # of the picture of a spectrum, down and across
+_MARK = "#ffffff"
 
 
 def size_inches(spectra: Sequence[Spectrum]) -> tuple[float, float]:
@@ -27,13 +31,16 @@ def draw(figure: Figure, spectra: Sequence[Spectrum], where: Where) -> None:
     for line, one in zip(grid, spectra, strict=True):
         nyquist = 0.5 / one.pitch_px
         median = float(np.median(one.power[1:, 1:]))
-        decades = [np.log10(np.maximum(p, 1e-12 * median) / median) for p in _panels(one).values()]
-        top = max(float(decades[0][1:, 1:].max()), 0.3)
+        decades = [
+            _coarse(np.fft.fftshift(np.log10(np.maximum(p, 1e-12 * median) / median), axes=0))
+            for p in _panels(one).values()
+        ]
+        low, top = float(np.quantile(decades[0], 0.01)), max(float(decades[0].max()), 0.3)
         for axes, title, image in zip(line, _panels(one), decades, strict=True):
             drawn = axes.imshow(
-                _finest(np.fft.fftshift(image, axes=0)),
+                image,
                 cmap="cividis",
-                vmin=-0.3,
+                vmin=low,
                 vmax=top,
                 extent=(0, nyquist, nyquist, -nyquist),
                 interpolation="none",
@@ -64,15 +71,18 @@ def draw_lines(figure: Figure, spectra: Sequence[LineSpectrum], where: Where, ax
         if one.after is not None:
             axes.plot(frequency, one.after[1:], color=COLOURS[0], lw=1.1, label="physics named")
         axes.set_yscale("log")
+        plain_numbers(axes.yaxis)
         axes.set_xlabel("cycles/pixel")
         axes.grid(visible=True)
         axes.set_title(one.channel if len(spectra) > 1 else "Power of line means", loc="left")
         if where.spatial_frequency is not None:
             peak = folded(where.spatial_frequency[axis], 0.5 / one.pitch_px)
             axes.axvline(abs(peak), color=ALARM, lw=0.8, ls=(0, (1, 1.5)))
-            axes.annotate(f" {abs(peak):.4g}", (abs(peak), 0.93), xycoords=("data", "axes fraction"))
+            axes.annotate(
+                f" {abs(peak):.4g}", (abs(peak), 0.93), xycoords=("data", "axes fraction")
+            )
     panels[0].set_ylabel("power, relative")
-    panels[-1].legend(loc="upper right")
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
 
 
 def folded(frequency: float, nyquist: float) -> float:
@@ -86,11 +96,11 @@ def _panels(one: Spectrum) -> dict[str, Array]:
     return {title: image for title, image in images if image is not None}
 
 
-def _finest(image: Array) -> Array:
-    """Return a spectrum small enough for a page; a block keeps its largest bin, so no line goes."""
-    step = max(1, -(-max(image.shape) // 512))
-    rows, columns = (size // step for size in image.shape)
-    blocks = image[: rows * step, : columns * step].reshape(rows, step, columns, step)
+def _coarse(image: Array) -> Array:
+    """Return blocks of bins, each its largest one, so that a single line is seen on a page."""
+    down, across = (max(1, size // cells) for size, cells in zip(image.shape, _CELLS, strict=True))
+    rows, columns = image.shape[0] // down, image.shape[1] // across
+    blocks = image[: rows * down, : columns * across].reshape(rows, down, columns, across)
     return np.asarray(blocks.max((1, 3)))
 
 
@@ -98,13 +108,13 @@ def _ring(axes: Axes, at: tuple[float, float], nyquist: float) -> None:
     x, y = (folded(value, nyquist) for value in at)
     if x < 0:
         x, y = -x, -y
-    axes.plot(x, y, "o", mfc="none", mec=ALARM, ms=11, mew=1.3, clip_on=False, zorder=5)
+    axes.plot(x, y, "o", mfc="none", mec=_MARK, ms=11, mew=1.3, clip_on=False, zorder=5)
     axes.annotate(
-        f"({at[0]:.3g}, {at[1]:.3g})",
+        f"({plain(at[0])}, {plain(at[1])})",
         (x, y),
         (0, -9),
         textcoords="offset points",
-        color=ALARM,
+        color=_MARK,
         ha="right" if x > nyquist / 2 else "left",
         va="top",
         fontsize=8,

@@ -1,0 +1,65 @@
+"""What an effect needs to be diagnosed: which statistics call for it, and parameters to start from."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+from pydantic import ValidationError
+
+from analysis.mismatch.clues import Clues
+from dsis.effects import Effect, registry
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """An effect with parameters to start from.
+
+    Attributes
+    ----------
+    effect
+        The effect.
+    free
+        Its parameters that are fitted; others are fixed by the proposal.
+    signed
+        Those of them that may be negative: fitted as they are, others by their logarithm.
+    """
+
+    effect: Effect
+    free: tuple[str, ...]
+    signed: frozenset[str] = field(default_factory=frozenset)
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """How one effect is recognised.
+
+    Attributes
+    ----------
+    kind
+        The effect.
+    calls
+        Statistics one of which must be off before the effect is tried.
+    propose
+        Gives proposals from the clues; empty: the effect cannot be what is seen.
+    """
+
+    kind: str
+    calls: tuple[str, ...]
+    propose: Callable[[Clues], Sequence[Proposal]]
+
+
+def build(kind: str, **parameters: object) -> Effect | None:
+    """Return an effect; None where its parameters are out of bounds."""
+    try:
+        return registry()[kind](**parameters)  # type: ignore[arg-type] # pydantic checks them
+    except ValidationError:
+        return None
+
+
+def proposals(
+    kind: str, free: Sequence[str], signed: Sequence[str] = (), **parameters: object
+) -> list[Proposal]:
+    """Return one proposal, or none where its parameters are out of bounds."""
+    effect = build(kind, **parameters)
+    if effect is None:
+        return []
+    return [Proposal(effect, tuple(free), frozenset(signed))]

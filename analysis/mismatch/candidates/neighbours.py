@@ -1,0 +1,100 @@
+"""Pixels that know of others: crosstalk, brighter-fatter, filtering, memory, lag."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from analysis.mismatch.candidates.candidate import Candidate, Proposal, proposals
+from analysis.mismatch.clues import Clues
+
+_ALONG_ROWS, _ALONG_COLUMNS = "correlation_0_1", "correlation_1_0"
+_NEAR = (_ALONG_ROWS, _ALONG_COLUMNS, "line_correlation", "pixel_variance")
+
+
+def _crosstalk(clues: Clues) -> Sequence[Proposal]:
+    across, _ = clues.amplitude(_ALONG_ROWS, clues.shot_share)
+    down, _ = clues.amplitude(_ALONG_COLUMNS, clues.shot_share)
+    found: list[Proposal] = []
+    for along, rho in (("both", (across + down) / 2), ("rows", across), ("columns", down)):
+        if rho > 0:
+            found += proposals(
+                "crosstalk", ["fraction"], fraction=min(rho / 2, 0.15), along=along
+            )
+    return found
+
+
+def _brighter_fatter(clues: Clues) -> Sequence[Proposal]:
+    def shape(place: tuple[str, str]) -> float:
+        return 2 * clues.signal(place) * clues.shot_share(place)
+
+    across, _ = clues.amplitude(_ALONG_ROWS, shape)
+    down, _ = clues.amplitude(_ALONG_COLUMNS, shape)
+    rate = (across + down) / 2
+    return proposals("brighter_fatter", ["per_dn"], per_dn=rate) if rate > 0 else []
+
+
+def _filtering(clues: Clues) -> Sequence[Proposal]:
+    mono = clues.layout.channels == ("MONO",)
+    names = (_ALONG_ROWS, _ALONG_COLUMNS) if mono else ("correlation_0_2", "correlation_2_0")
+    rho = float(np.mean([clues.amplitude(name, lambda place: 1.0)[0] for name in names]))
+    if rho <= 0:
+        return []
+    return proposals("spatial_filtering", ["fraction"], fraction=min(rho / 2, 0.15))
+
+
+def _memory(clues: Clues) -> Sequence[Proposal]:
+    """Propose the lags along lines that stand out most."""
+    step = 1 if clues.layout.channels == ("MONO",) else 2
+    departures: dict[tuple[str, int], list[float]] = {}
+    for i, key in enumerate(clues.vector.keys):
+        if not clues.null.known[i]:
+            continue
+        if key.statistic == "line_correlation":
+            axis, lag = key.detail.split(" ")
+            departures.setdefault((axis, int(lag) * step), []).append(
+                float(clues.vector.values[i] - clues.null.mean[i])
+            )
+        elif step == 2 and key.statistic in (_ALONG_ROWS, _ALONG_COLUMNS) and key.exposure:
+            axis = "rows" if key.statistic == _ALONG_ROWS else "columns"
+            departures.setdefault((axis, 1), []).append(
+                float(clues.vector.values[i] - clues.null.mean[i])
+            )
+    means = {key: float(np.mean(values)) for key, values in departures.items()}
+    best = sorted(means, key=lambda key: -abs(means[key]))[:2]
+    found: list[Proposal] = []
+    for axis, lag in best:
+        found += proposals(
+            "readout_memory",
+            ["fraction"],
+            ["fraction"],
+            fraction=float(np.clip(means[axis, lag], -0.6, 0.6)),
+            lag_pixels=lag,
+            along=axis,
+        )
+    return found
+
+
+def _lag(clues: Clues) -> Sequence[Proposal]:
+    rho, _ = clues.amplitude("frame_correlation", clues.shot_share)
+    if rho <= 0:
+        return []
+    return proposals("image_lag", ["fraction"], fraction=min(max(rho, 1e-4), 0.45))
+
+
+CANDIDATES = (
+    Candidate("crosstalk", _NEAR, _crosstalk),
+    Candidate("brighter_fatter", _NEAR, _brighter_fatter),
+    Candidate(
+        "spatial_filtering",
+        ("correlation_0_1", "correlation_0_2", "correlation_1_0", "correlation_2_0",
+         "line_correlation"),
+        _filtering,
+    ),
+    Candidate(
+        "readout_memory",
+        ("line_correlation", "correlation_0_1", "correlation_1_0", "correlation_0_2",
+         "correlation_2_0"),
+        _memory,
+    ),
+    Candidate("image_lag", ("frame_correlation",), _lag),
+)  # fmt: skip

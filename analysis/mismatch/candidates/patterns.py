@@ -1,0 +1,173 @@
+"""What mean frames show: fixed patterns, shading, taps, hot pixels, glow."""
+
+from collections.abc import Callable, Sequence
+from math import sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.mismatch.candidates.candidate import Candidate, Proposal, proposals
+from analysis.mismatch.clues import Clues
+from analysis.mismatch.observe import Place
+
+Array = NDArray[np.float64]
+
+
+def _constant(kind: str, statistic: str) -> Candidate:
+    def propose(clues: Clues) -> Sequence[Proposal]:
+        variance, _ = clues.amplitude(statistic, lambda place: 1.0)
+        return proposals(kind, ["sigma_dn"], sigma_dn=sqrt(variance)) if variance > 0 else []
+
+    return Candidate(kind, (statistic,), propose)
+
+
+def _squared(clues: Clues) -> Callable[[Place], float]:
+    return lambda place: clues.signal(place) ** 2
+
+
+def _prnu(clues: Clues) -> Sequence[Proposal]:
+    variance, _ = clues.amplitude("fixed_pixel_variance", _squared(clues))
+    if variance <= 0:
+        return []
+    return proposals("prnu", ["sigma_percent"], sigma_percent=100 * sqrt(variance))
+
+
+def _shading(clues: Clues) -> Sequence[Proposal]:
+    variance, _ = clues.amplitude("fixed_smooth_variance", _squared(clues))
+    if variance <= 0:
+        return []
+    n, m = clues.layout.rows, clues.layout.columns
+    y, x = np.linspace(-1, 1, n) * n, np.linspace(-1, 1, m) * m
+    r2 = (y[:, None] ** 2 + x**2) / (n**2 + m**2)
+    return proposals(
+        "shading", ["falloff_percent"], falloff_percent=min(100 * sqrt(variance / r2.var()), 90.0)
+    )
+
+
+def _taps(clues: Clues) -> Sequence[Proposal]:
+    found: list[Proposal] = []
+    for regions, statistic, axis in (
+        ("left_right", "half_seam", "columns"),
+        ("top_bottom", "half_seam", "rows"),
+        ("even_odd_columns", "parity", "columns"),
+        ("even_odd_rows", "parity", "rows"),
+    ):
+        if abs(clues.number(statistic, "gain", axis)) < 3 and not (
+            statistic == "parity" and len(clues.layout.channels) > 1
+        ):
+            continue
+        gain = 100 * _step(clues, regions)
+        if gain:
+            found += proposals(
+                "tap_mismatch", ["gain_percent"], ["gain_percent"], gain_percent=gain,
+                regions=regions,
+            )  # fmt: skip
+    return found
+
+
+def _step(clues: Clues, regions: str) -> float:
+    """Return the relative step of the gain between two regions."""
+    steps = []
+    if len(clues.layout.channels) > 1 and regions.startswith("even_odd"):
+        ratio, _ = clues.amplitude("channel_ratio", lambda place: 1.0)
+        green = clues.layout.cfa.value.index("G")
+        first_is_odd = green == 1
+        if regions == "even_odd_rows":
+            first_is_odd = "R" not in clues.layout.cfa.value[:2]
+        return ratio if first_is_odd else -ratio
+    for channel, (image, _) in clues.image("gain").items():
+        n, m = image.shape
+        along = image.mean(0) if regions in ("left_right", "even_odd_columns") else image.mean(1)
+        size = along.size
+        if regions.startswith("even_odd"):
+            step = along[1::2].mean() - along[0::2].mean()
+        else:
+            near = max(size // 16, 2)
+            step = along[size // 2 : size // 2 + near].mean() - along[
+                size // 2 - near : size // 2
+            ].mean()
+        steps.append(float(step) / clues.scale("gain", channel))
+        del n, m
+    return float(np.mean(steps)) if steps else 0.0
+
+
+def _imbalance(clues: Clues) -> Sequence[Proposal]:
+    ratio, error = clues.amplitude("channel_ratio", lambda place: 1.0)
+    if len(clues.layout.channels) == 1 or abs(ratio) < 2 * error:
+        return []
+    return proposals(
+        "channel_imbalance", ["gain_percent"], ["gain_percent"], gain_percent=100 * ratio
+    )
+
+
+def _hot(clues: Clues) -> Sequence[Proposal]:
+    values, noise, scale = _pooled(clues, "time")
+    if values is None:
+        return []
+    clear = values > 5 * noise
+    if clear.sum() < 2:
+        return []
+    excess = float((values[clear] - 5 * noise).mean())  # exponential: the same mean beyond any start
+    fraction = float(clear.mean()) * float(np.exp(min(5 * noise / excess, 3.0)))
+    return proposals(
+        "hot_pixels",
+        ["pixel_fraction", "mean_dn_per_s"],
+        pixel_fraction=min(fraction, 0.4),
+        mean_dn_per_s=excess / scale,
+    )
+
+
+def _pooled(clues: Clues, name: str) -> tuple[Array | None, float, float]:
+    images = clues.image(name)
+    if not images:
+        return None, 1.0, 1.0
+    values = np.concatenate([(i - np.median(i)).ravel() for i, _ in images.values()])
+    noise = float(np.mean([s for _, s in images.values()]))
+    return values, noise, clues.scale(name, next(iter(images)))
+
+
+def _glow(clues: Clues) -> Sequence[Proposal]:
+    """Fit exp(-r / L) from each edge and corner to the map that grows with time."""
+    images = clues.image("time")
+    if not images:
+        return []
+    best: list[tuple[float, str, float, float]] = []
+    for place in ("top_left", "top_right", "bottom_left", "bottom_right", "top", "bottom", "left",
+                  "right"):  # fmt: skip
+        for extent in (0.05, 0.1, 0.2, 0.35, 0.6):
+            gain = rate = weight = 0.0
+            for channel, (image, noise) in images.items():
+                shape = _glowing(image.shape, place, extent)
+                rest = shape - shape.mean()
+                size = float((rest**2).sum())
+                slope = float((rest * image).sum()) / size
+                gain += max(slope, 0.0) ** 2 * size / noise**2
+                rate += slope / clues.scale("time", channel) / noise**2
+                weight += 1 / noise**2
+            best.append((gain, place, extent, rate / weight))
+    _, place, extent, rate = max(best)
+    if rate <= 0:
+        return []
+    return proposals("amp_glow", ["dn_per_s"], dn_per_s=rate, place=place, extent=extent)
+
+
+def _glowing(shape: tuple[int, ...], place: str, extent: float) -> Array:
+    n, m = shape
+    y, x = np.arange(n)[:, None], np.arange(m)
+    down = y if "top" in place else (n - 1 - y if "bottom" in place else np.zeros((n, 1)))
+    across = x if "left" in place else (m - 1 - x if "right" in place else np.zeros(m))
+    return np.asarray(np.exp(-np.hypot(down, across) / (extent * max(n, m))))
+
+
+CANDIDATES = (
+    _constant("dsnu", "fixed_pixel_variance"),
+    _constant("row_fpn", "fixed_row_variance"),
+    _constant("column_fpn", "fixed_column_variance"),
+    Candidate("prnu", ("fixed_pixel_variance",), _prnu),
+    Candidate("shading", ("fixed_smooth_variance",), _shading),
+    Candidate("tap_mismatch", ("half_seam", "parity", "channel_ratio"), _taps),
+    Candidate("channel_imbalance", ("channel_ratio",), _imbalance),
+    Candidate("hot_pixels", ("outlying_pixels", "one_off_outliers", "fixed_pixel_variance"), _hot),
+    Candidate("amp_glow", ("fixed_smooth_variance",), _glow),
+)
+

@@ -1,0 +1,108 @@
+"""The law of single pixels' noise: Poisson, tails, pixels that differ or jump, spikes, codes."""
+
+from collections.abc import Sequence
+from math import log, sqrt
+
+import numpy as np
+
+from analysis.mismatch.candidates.candidate import Candidate, Proposal, proposals
+from analysis.mismatch.clues import Clues
+
+
+def _poisson(clues: Clues) -> Sequence[Proposal]:
+    if clues.camera.noise.shot == "poisson":
+        return []
+    return proposals("poisson_shot_noise", [])
+
+
+def _tails(clues: Clues) -> Sequence[Proposal]:
+    k, _ = clues.amplitude("kurtosis", lambda place: clues.read_share(place) ** 2)
+    if k <= 0:
+        return []
+    return proposals("heavy_tailed_read_noise", ["tail_df"], tail_df=4 + 6 / max(k, 0.02))
+
+
+def _spread(clues: Clues) -> Sequence[Proposal]:
+    k, _ = clues.amplitude("kurtosis", lambda place: clues.read_share(place) ** 2)
+    if k <= 0:
+        return []
+    return proposals(
+        "read_noise_spread", ["log_sigma"], log_sigma=min(sqrt(log(1 + k / 3) / 4), 1.5)
+    )
+
+
+def _rts(clues: Clues) -> Sequence[Proposal]:
+    """Start from a share of pixels and the height that the mean excess variance then asks for."""
+    k, _ = clues.amplitude("kurtosis", lambda place: clues.read_share(place) ** 2)
+    if k <= 0:
+        return []
+    read = max(float(clues.fit.line_dn2(np.zeros(1))[0]), 0.02)
+    found: list[Proposal] = []
+    for fraction in (0.003, 0.02, 0.1):
+        # The kurtosis of a mixture: 3 f E[(a^2/4)^2] / V^2, E[a^4] = 24 A^4.
+        height = (k * read**2 / (3 * fraction * 24 / 16)) ** 0.25
+        found += proposals(
+            "rts",
+            ["pixel_fraction", "amplitude_dn"],
+            pixel_fraction=fraction,
+            amplitude_dn=height,
+            switch_probability=0.35,
+        )
+    return found
+
+
+def _impulse(clues: Clues) -> Sequence[Proposal]:
+    k, _ = clues.amplitude("kurtosis", lambda place: clues.read_share(place) ** 2)
+    if k <= 0:
+        return []
+    place = min(clues.places, key=lambda p: clues.seen.levels[p].variance_dn2)
+    v = clues.seen.levels[place].variance_dn2
+    found: list[Proposal] = []
+    for height in (20.0, 100.0, 500.0):
+        mean = height * sqrt(v)
+        # E[h^4] = 24 mean^4: kurtosis p 24 mean^4 / V^2.
+        rate = k * v**2 / (24 * mean**4) * 1e6
+        if rate > 0.01:
+            found += proposals(
+                "impulse",
+                ["per_megapixel_frame", "mean_dn"],
+                per_megapixel_frame=min(rate, 9e4),
+                mean_dn=mean,
+            )
+    return found
+
+
+def _quantisation(clues: Clues) -> Sequence[Proposal]:
+    steps = [
+        2 ** clues.vector.values[i]
+        for i, key in enumerate(clues.vector.keys)
+        if key.statistic == "code_spacing" and clues.null.known[i]
+    ]
+    step = round(float(np.median(steps))) if steps else 1
+    return proposals("quantisation", [], step_dn=float(step)) if step > 1 else []
+
+
+def _dnl(clues: Clues) -> Sequence[Proposal]:
+    values = [v for v, _ in clues.excess("code_imbalance").values()]
+    rms = float(np.median(values)) if values else 0.0
+    if rms <= 0:
+        rms = 0.3
+    return proposals("adc_dnl", ["rms_lsb"], rms_lsb=min(max(rms, 0.02), 1.5))
+
+
+CANDIDATES = (
+    Candidate("poisson_shot_noise", ("skewness",), _poisson),
+    Candidate(
+        "heavy_tailed_read_noise", ("kurtosis", "kurtosis_within_pixels", "variance_spread"), _tails
+    ),
+    Candidate("read_noise_spread", ("variance_spread", "variance_persistence", "kurtosis"), _spread),
+    Candidate(
+        "rts",
+        ("variance_spread", "variance_persistence", "kurtosis", "one_off_outliers",
+         "frame_correlation"),
+        _rts,
+    ),
+    Candidate("impulse", ("one_off_outliers", "kurtosis", "skewness"), _impulse),
+    Candidate("quantisation", ("code_spacing",), _quantisation),
+    Candidate("adc_dnl", ("code_imbalance",), _dnl),
+)  # fmt: skip

@@ -1,0 +1,81 @@
+"""What bends the mean level: dark current, non-linearity, saturation, paths that disagree."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from analysis.mismatch.candidates.candidate import Candidate, Proposal, proposals
+from analysis.mismatch.clues import Clues
+
+
+def _dark_current(clues: Clues) -> Sequence[Proposal]:
+    darks = [e for e in clues.layout.exposures if e.kind == "dark"]
+    times = np.array([e.exposure_time_s for e in darks])
+    if len(set(times.tolist())) < 2:
+        return []
+    level = np.array(
+        [np.mean([clues.seen.levels[e.name, c].level_dn for c in clues.layout.channels])
+         for e in darks]
+    )  # fmt: skip
+    rate = float(np.polyfit(times, level, 1)[0])
+    return proposals("dark_current", ["dn_per_s"], dn_per_s=rate) if rate > 0 else []
+
+
+def _nonlinearity(clues: Clues) -> Sequence[Proposal]:
+    """Solve level residual = a S (0.85 F - S) beside a change of the light's scale."""
+    full = clues.layout.white_dn - clues.layout.black_dn
+    rows = [
+        (clues.signal(place), value, sd)
+        for place, (value, sd) in clues.excess("level").items()
+        if clues.signal(place) > 0
+    ]
+    if len({round(s, 1) for s, _, _ in rows}) < 3:
+        return []
+    s, value, sd = np.array(rows).T
+    design = np.stack([s * (0.85 * full - s), s], 1) / sd[:, None]
+    bend = float(np.linalg.lstsq(design, value / sd, rcond=None)[0][0])
+    percent = 100 * bend * (0.85 * full / 2) ** 2 / full
+    return proposals(
+        "nonlinearity",
+        ["percent_full_scale"],
+        ["percent_full_scale"],
+        percent_full_scale=float(np.clip(percent, -12, 12)),
+    )
+
+
+def _saturation(clues: Clues) -> Sequence[Proposal]:
+    top = max(clues.places, key=clues.signal)
+    level = clues.signal(top)
+    sd = clues.seen.levels[top].variance_dn2 ** 0.5
+    found: list[Proposal] = []
+    for well in (level + 1.5 * sd, level + 0.3 * sd, 0.99 * level):
+        found += proposals("saturation", ["full_well_dn"], full_well_dn=well)
+    return found
+
+
+def _gain_mismatch(clues: Clues) -> Sequence[Proposal]:
+    ends = [s.upper_dn for s in clues.camera.noise.segment if s.upper_dn is not None]
+    if not ends:
+        return []
+    below, above = [], []
+    for place, (value, _) in clues.excess("level").items():
+        s = clues.signal(place)
+        if s > 0:
+            (above if s >= ends[0] else below).append(value / s)
+    if not below or not above:
+        return []
+    step = 100 * (float(np.median(above)) - float(np.median(below)))
+    return proposals(
+        "dual_gain_mismatch",
+        ["gain_error_percent"],
+        ["gain_error_percent"],
+        gain_error_percent=step or 0.1,
+    )
+
+
+CANDIDATES = (
+    Candidate("dark_current", ("level", "pixel_variance"), _dark_current),
+    Candidate("nonlinearity", ("level", "pixel_variance", "skewness"), _nonlinearity),
+    Candidate("saturation", ("level", "pixel_variance", "skewness", "kurtosis"), _saturation),
+    Candidate("dual_gain_mismatch", ("level", "pixel_variance"), _gain_mismatch),
+)

@@ -1,0 +1,120 @@
+"""Lines and frames that move together: row and column noise, drift, flicker, bands, patterns."""
+
+from collections.abc import Sequence
+from math import sqrt
+
+from analysis.mismatch.candidates.candidate import Candidate, Proposal, proposals
+from analysis.mismatch.clues import Clues
+
+
+def _lines(kind: str, statistic: str) -> Candidate:
+    def propose(clues: Clues) -> Sequence[Proposal]:
+        variance, _ = clues.amplitude(statistic, lambda place: 1.0)
+        return proposals(kind, ["sigma_dn"], sigma_dn=sqrt(variance)) if variance > 0 else []
+
+    return Candidate(kind, (statistic,), propose)
+
+
+def _drift(clues: Clues) -> Sequence[Proposal]:
+    variance, _ = clues.amplitude("frame_variance", lambda place: 1.0)
+    if variance <= 0:
+        return []
+    return proposals("black_level_drift", ["sigma_dn"], sigma_dn=sqrt(variance))
+
+
+def _flicker(clues: Clues) -> Sequence[Proposal]:
+    variance, _ = clues.amplitude("frame_variance", lambda place: clues.signal(place) ** 2)
+    if variance <= 0:
+        return []
+    return proposals("flicker", ["sigma_percent"], sigma_percent=100 * sqrt(variance))
+
+
+def _line_flicker(clues: Clues) -> Sequence[Proposal]:
+    variance, _ = clues.amplitude("row_variance", lambda place: clues.signal(place) ** 2)
+    if variance <= 0:
+        return []
+    found: list[Proposal] = []
+    channel = clues.layout.channels[0]
+    for kind in ("rows of light", "rows"):
+        peak = clues.seen.peaks.get((channel, kind))
+        if peak is None:
+            continue
+        cycles = peak.fy * clues.shape(channel)[0]
+        for off in (0.0, 0.35, -0.35):
+            if cycles + off > 0 and not any(
+                abs(p.effect.cycles_per_frame - cycles - off) < 0.2  # type: ignore[attr-defined] # its own kind
+                for p in found
+            ):
+                found += proposals(
+                    "line_flicker",
+                    ["depth_percent", "cycles_per_frame"],
+                    depth_percent=100 * sqrt(2 * variance),
+                    cycles_per_frame=cycles + off,
+                )
+    return found
+
+
+def _pink(clues: Clues) -> Sequence[Proposal]:
+    variance, _ = clues.amplitude("row_variance", lambda place: 1.0)
+    frame, _ = clues.amplitude("frame_variance", lambda place: 1.0)
+    guess = max(variance * 4, frame * 8, 0.0)
+    return proposals("pink_noise", ["sigma_dn"], sigma_dn=sqrt(guess)) if guess > 0 else []
+
+
+def _patterns(kind: str) -> Candidate:
+    def propose(clues: Clues) -> Sequence[Proposal]:
+        found: list[Proposal] = []
+        for fx, fy, amplitude in frequencies(clues):
+            corner = abs(fx) in (0.0, 0.5) and abs(fy) in (0.0, 0.5)
+            size = amplitude / 2 if corner and kind == "bistable_pattern" else amplitude
+            found += proposals(kind, ["amplitude_dn"], amplitude_dn=size, frequency=(fx, fy))
+        return found
+
+    return Candidate(
+        kind,
+        ("spectral_peak", "row_spectrum_peak", "column_spectrum_peak", "correlation_0_1",
+         "frame_variance"),
+        propose,
+    )  # fmt: skip
+
+
+def frequencies(clues: Clues) -> list[tuple[float, float, float]]:
+    """Return candidates (fx, fy) in cycles per pixel of the mosaic, with amplitudes in DN.
+
+    Planes of a mosaic see frequencies modulo half a cycle per pixel: each alias is one.
+    """
+    channel = clues.layout.channels[0]
+    n, m = clues.shape(channel)
+    place = min(clues.places, key=lambda p: clues.seen.levels[p].variance_dn2)
+    v = clues.seen.levels[place].variance_dn2
+    found = []
+    for kind in ("spectrum", "rows", "columns"):
+        peak = clues.seen.peaks.get((channel, kind))
+        if peak is None or peak.power < 1.2:
+            continue
+        amplitude = 2 * sqrt(max(peak.power - 1, 0.05) * v / (n * m))
+        if channel == "MONO":
+            found.append((peak.fx, peak.fy, amplitude))
+            continue
+        for ax in (0.0, 0.5):
+            for ay in (0.0, 0.5):
+                fx, fy = peak.fx / 2 + ax, peak.fy / 2 + ay
+                found.append(((fx + 0.5) % 1 - 0.5, (fy + 0.5) % 1 - 0.5, amplitude))
+    if channel != "MONO":  # what is constant in each plane: stripes and checkerboards of the mosaic
+        frame, _ = clues.amplitude("frame_variance", lambda place: 1.0)
+        if frame > 0:
+            found += [(0.5, 0.0, 2 * sqrt(frame)), (0.0, 0.5, 2 * sqrt(frame)),
+                      (0.5, 0.5, 2 * sqrt(frame))]  # fmt: skip
+    return found
+
+
+CANDIDATES = (
+    _lines("row_noise", "row_variance"),
+    _lines("column_noise", "column_variance"),
+    Candidate("black_level_drift", ("frame_variance", "level"), _drift),
+    Candidate("flicker", ("frame_variance", "level"), _flicker),
+    Candidate("line_flicker", ("row_spectrum_peak", "row_variance"), _line_flicker),
+    Candidate("pink_noise", ("row_variance", "line_correlation", "frame_variance"), _pink),
+    _patterns("periodic_noise"),
+    _patterns("bistable_pattern"),
+)

@@ -1,0 +1,148 @@
+"""Which departures are real, and where they are: family-wise control, floors, one entry a statistic."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.mismatch.bank.key import Key
+from analysis.mismatch.finding import Mismatch, Where
+from analysis.mismatch.null import Null, adjusted
+from analysis.mismatch.observe import Layout, Observation
+from analysis.mismatch.says import sentence
+from analysis.mismatch.vector import Vector
+
+Array = NDArray[np.float64]
+FAMILY = 0.006  # chance of any mismatch in a recording that differs in nothing
+_ROOTS = 2e-3  # of a ratio: 0.6 % of the finer mean square
+_FLOORS = {
+    "pixel_variance": 1e-3,
+    "skewness": 1e-3,
+    "kurtosis": 3e-3,
+    "kurtosis_within_pixels": 3e-3,
+    "variance_spread": 1e-2,
+    "code_imbalance": 2e-3,
+    "channel_ratio": 2e-4,
+    "level": 2e-3,
+}
+
+
+def floor(key: Key) -> float:
+    """Return the least departure that matters, in the unit of the transformed number."""
+    if key.statistic.endswith("variance") and key.statistic != "pixel_variance":
+        return _ROOTS
+    if "correlation" in key.statistic:
+        return 1e-3
+    return _FLOORS.get(key.statistic, 0.0)
+
+
+def tested(null: Null, seen: Vector) -> tuple[Array, Array]:
+    """Return departures and adjusted chances; departures too small to matter are 0."""
+    z = null.departures(seen)
+    size = len(seen.keys)
+    distance = np.abs(np.nan_to_num(seen.values) - null.mean)
+    small = distance < np.array([floor(key) for key in seen.keys])
+    z[:size][small] = 0.0
+    for i, row in enumerate(null.contrasts.matrix):
+        if small[np.flatnonzero(row)].all():
+            z[size + i] = 0.0
+    known = np.concatenate([null.known, np.ones(len(null.contrasts.keys), bool)])
+    chances = np.ones(len(z))
+    chances[known] = adjusted(null.chances(z[known]))
+    return z, chances
+
+
+def located(layout: Layout, seen: Observation, null: Null, z: Array, chances: Array) -> tuple[Mismatch, ...]:
+    """Return one mismatch a statistic, the largest departure first."""
+    groups: dict[str, list[int]] = {}
+    for i in np.flatnonzero(chances < FAMILY):
+        groups.setdefault(null.keys[i].statistic, []).append(int(i))
+    found = []
+    for statistic, which in groups.items():
+        top = max(which, key=lambda i: abs(z[i]))
+        where = _where(layout, seen, null.keys, statistic, which, top, z)
+        departure = float(np.clip(z[top], -1e6, 1e6))
+        says = sentence(statistic, null.keys[top], departure, where)
+        found.append(Mismatch(statistic, departure, float(chances[top]), where, says))
+    return tuple(sorted(found, key=lambda m: -abs(m.z)))
+
+
+def _where(
+    layout: Layout,
+    seen: Observation,
+    keys: Sequence[Key],
+    statistic: str,
+    which: Sequence[int],
+    top: int,
+    z: Array,
+) -> Where:
+    single = [i for i in which if keys[i].exposure]
+    if not single:  # only sums over exposures are certain: those that carry them
+        own = [i for i, k in enumerate(keys) if k.statistic == statistic and k.exposure]
+        most = max((abs(z[i]) for i in own), default=0.0)
+        single = [i for i in own if abs(z[i]) > 0.5 * most and z[i] * z[top] > 0]
+    names = list(dict.fromkeys(keys[i].exposure for i in single))
+    if not names:
+        names = [e.name for e in layout.uniform]
+    exposures = [e for e in layout.exposures if e.name in names]
+    channels = {keys[i].channel for i in (*which, *single) if keys[i].channel}
+    channel = channels.pop() if len(channels) == 1 else None
+    signals = [
+        layout.signal_dn[e.name, c]
+        for e in exposures
+        for c in layout.channels
+        if (channel is None or c == channel) and e.kind != "scene"
+    ]
+    kinds = {e.kind for e in exposures}
+    times = [e.exposure_time_s for e in exposures]
+    return Where(
+        exposures=tuple(e.name for e in exposures),
+        kind=kinds.pop() if len(kinds) == 1 else None,
+        channel=channel,
+        signal_dn=(round(min(signals), 3), round(max(signals), 3)) if signals else None,
+        rows=_middle(keys[top], "rows", layout.rows),
+        columns=_middle(keys[top], "columns", layout.columns),
+        spatial_frequency=_frequency(layout, seen, statistic, keys[top]),
+        pixels=_pixels(layout, seen, keys[top]),
+        exposure_time_s=(min(times), max(times)) if keys[top].scope == "time" else None,
+    )
+
+
+def _middle(key: Key, axis: str, size: int) -> tuple[int, int] | None:
+    if key.statistic == "half_seam" and key.detail == axis:
+        return size // 2 - 1, size // 2
+    return None
+
+
+def _frequency(
+    layout: Layout, seen: Observation, statistic: str, key: Key
+) -> tuple[float, float] | None:
+    kind = {
+        "spectral_peak": "spectrum",
+        "row_spectrum_peak": "rows of light" if key.detail == "light" else "rows",
+    }.get(statistic)
+    channel = key.channel or layout.channels[0]
+    peak = seen.peaks.get((channel, kind or ""))
+    if peak is None:
+        return None
+    step = 1 if layout.channels == ("MONO",) else 2
+    return round(peak.fx / step, 6), round(peak.fy / step, 6)
+
+
+def _pixels(
+    layout: Layout, seen: Observation, key: Key, count: int = 8
+) -> tuple[tuple[int, int], ...] | None:
+    name = {"outlying_pixels": key.scope, "variance_persistence": "variance"}.get(key.statistic)
+    channel = key.channel or layout.channels[0]
+    if name is None or (channel, name) not in seen.images:
+        return None
+    image, _ = seen.images[channel, name]
+    step = 1 if channel == "MONO" else 2
+    order = np.argsort(-np.abs(image - np.median(image)), axis=None)[:count]
+    rows, columns = np.unravel_index(order, image.shape)
+    from analysis.mismatch.recalibrate import sites  # noqa: PLC0415
+
+    y, x = sites(layout.cfa)[channel]
+    return tuple((int(r) * step + y, int(c) * step + x) for r, c in zip(rows, columns, strict=True))
+
+

@@ -1,0 +1,213 @@
+"""Which physics explains the mismatches: add the best effect, fit all again, look again."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.mismatch.candidates import CANDIDATES, Proposal
+from analysis.mismatch.polish import Polished, polish, with_effects
+from analysis.mismatch.predict import Predictor
+from analysis.mismatch.segments import second_path
+from analysis.mismatch.state import Setting, State
+from dsis.camera import Camera
+from dsis.effects import Effect
+
+Array = NDArray[np.float64]
+Step = Callable[[], None]
+LEAST_GAIN = 5.0  # of log-likelihood, for an effect to be taken in
+_TIE = 3.0
+_MOST_EFFECTS = 5
+_POLISHED = 5  # kinds that are fitted in a round, after all were tried as proposed
+_CLEAR = 3.0  # departures below are chance
+_RESOLVED = 0.7  # share of what an effect touches that it must explain
+
+
+@dataclass(frozen=True)
+class Named:
+    """An effect taken in.
+
+    Attributes
+    ----------
+    kind
+        Its name; `dual_gain` is a second read-out segment.
+    proposal
+        The effect with its free parameters; None for `dual_gain`.
+    errors
+        Standard errors of the parameters.
+    gain
+        Log-likelihood of the bank's numbers that it is worth beside the others.
+    rivals
+        Other effects tried in its place: kind, and by how much they were worse.
+    """
+
+    kind: str
+    proposal: Proposal | None
+    errors: dict[str, float]
+    gain: float
+    rivals: tuple[tuple[str, float], ...]
+
+
+@dataclass
+class Search:
+    """The search from a base state; `run` leaves the result in the attributes."""
+
+    setting: Setting
+    camera: Camera
+    base: State
+    vocabulary: frozenset[str]
+    step: Step
+    named: list[Named] = field(default_factory=list)
+    refused: dict[str, str] = field(default_factory=dict)
+    final: State | None = None
+
+    def run(self) -> State:
+        """Return the final state."""
+        state = self.base
+        while state.mismatches and len(self.named) < _MOST_EFFECTS:
+            added = self._best(state)
+            if added is None:
+                break
+            self.named.append(added[0])
+            state = State.of(self.setting, added[1], self.step)
+        state = self._pruned(self._polished(state))
+        self.final = state
+        return state
+
+    def _best(self, state: State) -> tuple[Named, Camera] | None:
+        """Return the effect that explains most, and the camera with it."""
+        predictor = state.predictor()
+        before = predictor.loglik(state.null.mean)
+        off = {m.statistic for m in state.mismatches}
+        taken = {n.kind for n in self.named}
+        tried: list[tuple[float, str, Proposal]] = []
+        clues = state.clues()
+        for kind in sorted(self.vocabulary - taken - set(self.refused)):
+            candidate = CANDIDATES.get(kind)
+            if candidate is None or not off & set(candidate.calls):
+                continue
+            own = []
+            for proposal in candidate.propose(clues):
+                built = with_effects(state.camera, [proposal.effect])
+                if built is not None:
+                    own.append((predictor.loglik(predictor.mean(built)), kind, proposal))
+            if own:
+                tried.append(max(own, key=lambda one: one[0]))
+            self.step()
+        tried.sort(key=lambda one: -one[0])
+        fitted: list[tuple[float, str, Proposal, Polished]] = []
+        for _, kind, proposal in tried[:_POLISHED]:
+            polished = polish(predictor, state.camera, [proposal])
+            if polished is not None:
+                free = len(proposal.free)
+                fitted.append((polished.loglik - before - free, kind, proposal, polished))
+            self.step()
+        fitted.sort(key=lambda one: -one[0])
+        path = None
+        if "dual_gain" in self.vocabulary - taken - set(self.refused) and "pixel_variance" in off:
+            path = second_path(state)
+        if path is not None and path.gain > max([LEAST_GAIN, *(f[0] for f in fitted)]):
+            rivals = tuple((f[1], path.gain - f[0]) for f in fitted[:3])
+            return Named("dual_gain", None, {"switch_dn": path.error_dn}, path.gain, rivals), path.camera
+        if not fitted or fitted[0][0] < LEAST_GAIN:
+            return None
+        gain, kind, proposal, polished = fitted[0]
+        rivals = tuple((f[1], gain - f[0]) for f in fitted[1:4])
+        if path is not None:
+            rivals = (*rivals, ("dual_gain", gain - path.gain))
+        effect = Proposal(polished.effects[0], proposal.free, proposal.signed)
+        camera = with_effects(state.camera, [effect.effect])
+        assert camera is not None
+        return Named(kind, effect, polished.errors[0], gain, rivals), camera
+
+    def _polished(self, state: State) -> State:
+        """Fit the parameters of all effects together, and judge the result once more."""
+        mine = [n for n in self.named if n.proposal is not None]
+        if not mine:
+            return state
+        bare = _without(state.camera, [_own(n) for n in mine], self.camera)
+        predictor = state.predictor(2 * self.setting.replicates)
+        polished = polish(predictor, bare, [p for n in mine if (p := n.proposal)], rounds=2)
+        if polished is None:
+            return state
+        scale = (1 + 1 / (2 * self.setting.replicates)) ** 0.5
+        fitted = iter(zip(polished.effects, polished.errors, strict=True))
+        self.named = [
+            n if n.proposal is None else _renewed(n, *next(fitted), scale) for n in self.named
+        ]
+        camera = with_effects(bare, polished.effects)
+        assert camera is not None
+        return State.of(self.setting, camera, self.step)
+
+    def _pruned(self, state: State) -> State:
+        """Drop effects that the others make needless, and those that leave what they touch."""
+        while True:
+            mine = [n for n in self.named if n.proposal is not None]
+            if not mine:
+                return state
+            predictor = state.predictor()
+            whole = predictor.loglik(state.null.mean)
+            worst: tuple[float, Named, str] | None = None
+            for named in mine:
+                camera = _without(state.camera, [_own(named)], self.camera)
+                mean = predictor.mean(camera)
+                gain = whole - predictor.loglik(mean)
+                share = resolved(predictor, state, mean)
+                reason = ""
+                if gain < LEAST_GAIN:
+                    reason = "the others explain what it would explain"
+                elif share < _RESOLVED:
+                    reason = f"it would explain {max(share, 0):.0%} of what it changes"
+                if reason and (worst is None or share < worst[0]):
+                    worst = (share, named, reason)
+            if worst is None:
+                return state
+            self.refused[worst[1].kind] = worst[2]
+            self.named.remove(worst[1])
+            camera = _without(state.camera, [_own(worst[1])], self.camera)
+            state = State.of(self.setting, camera, self.step)
+
+
+def _own(named: Named) -> Effect:
+    assert named.proposal is not None
+    return named.proposal.effect
+
+
+def _renewed(named: Named, effect: Effect, errors: dict[str, float], scale: float) -> Named:
+    assert named.proposal is not None
+    proposal = Proposal(effect, named.proposal.free, named.proposal.signed)
+    scaled = {name: error * scale for name, error in errors.items()}
+    return Named(named.kind, proposal, scaled, named.gain, named.rivals)
+
+
+def _without(camera: Camera, effects: Sequence[Effect], given: Camera) -> Camera:
+    """Return a camera without some of its effects; those that the user's camera has stay."""
+    left = list(camera.effect)
+    for effect in effects:
+        for i in range(len(left) - 1, len(given.effect) - 1, -1):
+            if left[i] == effect:
+                del left[i]
+                break
+    return camera.model_copy(update={"effect": tuple(left)})
+
+
+def resolved(predictor: Predictor, state: State, without: Array) -> float:
+    """Return the share of departures that an effect explains, of those numbers that it changes.
+
+    `without` are the numbers predicted without it. What is explained within 3 standard errors, or
+    within the likelihood's allowance for the effect's form, is explained.
+    """
+    null = state.null
+    known = null.known & np.isfinite(without)
+    change = np.where(known, (null.mean - without) / null.sd, 0.0)
+    touched = known & (np.abs(change) > _CLEAR)
+    if not touched.any():
+        return 0.0
+    values = state.vector.values[touched]
+    before = np.abs(values - without[touched]) / null.sd[touched]
+    after = np.abs(values - null.mean[touched]) / null.sd[touched]
+    allowed = _CLEAR + 2 * predictor.forms[touched] * np.abs(change[touched])
+    left = np.maximum(after - allowed, 0.0).sum()
+    total = np.maximum(np.maximum(before, np.abs(change[touched])) - _CLEAR, 0.0).sum()
+    return float(1 - left / total) if total > 0 else 0.0

@@ -1,0 +1,146 @@
+"""Parameters of effects by Gauss-Newton steps on the bank's numbers, predicted by simulation."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import exp, log
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import ValidationError
+
+from analysis.mismatch.candidates import Proposal
+from analysis.mismatch.predict import Predictor
+from dsis.camera import Camera
+from dsis.effects import Effect
+
+Array = NDArray[np.float64]
+_STEP = 0.12  # of the logarithm, for the derivative
+_LARGEST = 1.2  # step of a logarithm
+_NU = 6.0
+
+
+@dataclass(frozen=True)
+class Polished:
+    """Effects with fitted parameters.
+
+    Attributes
+    ----------
+    effects
+        As fitted.
+    loglik
+        Of the recorded numbers.
+    mean
+        The numbers predicted.
+    errors
+        Standard errors of the free parameters, by effect and name.
+    """
+
+    effects: tuple[Effect, ...]
+    loglik: float
+    mean: Array
+    errors: tuple[dict[str, float], ...]
+
+
+def polish(
+    predictor: Predictor,
+    camera: Camera,
+    start: Sequence[Proposal],
+    rounds: int = 2,
+) -> Polished | None:
+    """Return `camera` with effects whose parameters are fitted; None where it is no camera.
+
+    `camera` holds what stays as it is; the effects of `start` are added to it.
+    """
+    free = [
+        (i, name, name in proposal.signed)
+        for i, proposal in enumerate(start)
+        for name in proposal.free
+    ]
+    effects: tuple[Effect, ...] | None = tuple(p.effect for p in start)
+    assert effects is not None
+    built = with_effects(camera, effects)
+    if built is None:
+        return None
+    mean = predictor.mean(built)
+    best = predictor.loglik(mean)
+    errors: Array = np.full(len(free), np.inf)
+    for _ in range(rounds if free else 0):
+        jacobian = []
+        for i, name, signed in free:
+            moved = _moved(effects, i, name, signed, _STEP)
+            shifted = None if moved is None else with_effects(camera, moved[0])
+            if moved is None or shifted is None:
+                jacobian.append(np.zeros_like(mean))
+                continue
+            jacobian.append((predictor.mean(shifted) - mean) / moved[1])
+        j = np.stack(jacobian, 1)
+        rest, sd, known = predictor.weights(mean)
+        known &= np.isfinite(j).all(1)
+        r, s = rest[known], sd[known]
+        w = (_NU + 1) / _NU / (1 + (r / s) ** 2 / _NU) / s**2
+        normal = (j[known] * w[:, None]).T @ j[known]
+        size = np.sqrt(np.maximum(np.diag(normal), 1e-12))
+        scaled = normal / np.outer(size, size)
+        solve = np.linalg.pinv(scaled + 1e-6 * np.eye(len(free)), rcond=1e-8) / np.outer(size, size)
+        step = solve @ (j[known].T @ (w * r))
+        errors = np.sqrt(np.diag(solve))
+        found = False
+        for shrink in (1.0, 0.4, 0.15):
+            own: tuple[Effect, ...] | None = effects
+            for (i, name, signed), delta in zip(free, step * shrink, strict=True):
+                limited = delta if signed else float(np.clip(delta, -_LARGEST, _LARGEST))
+                changed = None if own is None else _moved(own, i, name, signed, limited, as_is=True)
+                own = None if changed is None else changed[0]
+            built = None if own is None else with_effects(camera, own)
+            if own is None or built is None:
+                continue
+            trial = predictor.mean(built)
+            value = predictor.loglik(trial)
+            if value > best:
+                small = value - best < 0.05
+                effects, best, mean, found = own, value, trial, True
+                break
+        if not found or small:
+            break
+    by_effect: tuple[dict[str, float], ...] = tuple({} for _ in start)
+    for (i, name, signed), error in zip(free, errors, strict=True):
+        scale = 1.0 if signed else abs(float(getattr(effects[i], name)))
+        by_effect[i][name] = float(error * scale)
+    return Polished(effects, best, mean, by_effect)
+
+
+def _moved(
+    effects: tuple[Effect, ...],
+    which: int,
+    name: str,
+    signed: bool,
+    step: float,
+    *,
+    as_is: bool = False,
+) -> tuple[tuple[Effect, ...], float] | None:
+    """Return effects with one parameter moved, and by how much in the parameter that is fitted."""
+    effect = effects[which]
+    value = float(getattr(effect, name))
+    if signed:
+        by = step if as_is else (abs(value) or 1.0) * step
+        new = value + by
+    else:
+        by = step
+        new = exp(log(max(value, 1e-12)) + step)
+    try:
+        changed = type(effect)(**{**effect.model_dump(), name: new})
+    except ValidationError:
+        return None
+    return (*effects[:which], changed, *effects[which + 1 :]), by
+
+
+def with_effects(camera: Camera, effects: Sequence[Effect]) -> Camera | None:
+    """Return a camera with effects added; None where it cannot have them."""
+    values = {name: getattr(camera, name) for name in Camera.model_fields}
+    values["effect"] = (*camera.effect, *effects)
+    try:
+        return Camera.model_validate(
+            {("schema" if k == "schema_" else k): v for k, v in values.items()}
+        )
+    except ValidationError:
+        return None

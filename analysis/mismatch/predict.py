@@ -1,0 +1,129 @@
+"""Numbers that a camera model predicts for a recording, and how likely the recorded ones then are.
+
+Cameras are compared on the same few simulated recordings: draws are counted, so what two cameras
+have in common cancels. The likelihood has heavy tails, and allows every predicted change an error of
+its own: no effect of the vocabulary is exactly what a sensor does.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.mismatch.bank.key import Key
+from analysis.mismatch.model import Model, simulate
+from analysis.mismatch.null import Null
+from analysis.mismatch.observe import Layout, Observation
+from analysis.mismatch.vector import Vector
+from dsis.camera import Camera
+
+Array = NDArray[np.float64]
+_NU = 6.0  # degrees of freedom of the likelihood's tails
+_FORM = 0.08  # relative error of a predicted change
+_FORMS = {
+    "spectral_peak": 0.3,
+    "row_spectrum_peak": 0.3,
+    "column_spectrum_peak": 0.3,
+    "one_off_outliers": 0.4,
+    "outlying_pixels": 0.3,
+    "variance_persistence": 0.25,
+    "kurtosis": 0.2,
+    "kurtosis_within_pixels": 0.3,
+    "variance_spread": 0.15,
+    "skewness": 0.12,
+}
+
+
+def form_errors(keys: tuple[Key, ...]) -> Array:
+    """Return the relative error of a predicted change of each number."""
+    return np.array([_FORMS.get(key.statistic, _FORM) for key in keys])
+
+
+@dataclass(frozen=True)
+class Reference:
+    """The current model: what candidates are compared with.
+
+    Attributes
+    ----------
+    camera
+        The current camera.
+    null
+        Its mean and spread of every number.
+    vector
+        The recorded numbers.
+    """
+
+    camera: Camera
+    null: Null
+    vector: Vector
+
+
+class Predictor:
+    """Predictions of cameras beside a reference."""
+
+    def __init__(
+        self,
+        layout: Layout,
+        model: Model,
+        numbers_of: Callable[[Observation], Vector],
+        reference: Reference,
+        *,
+        replicates: int,
+        seed: int,
+        jobs: int,
+    ) -> None:
+        self.layout, self.model, self.numbers_of = layout, model, numbers_of
+        self.reference = reference
+        self.replicates, self.seed, self.jobs = replicates, seed, jobs
+        self.cache: dict[str, Array] = {}
+        self.simulations = 0
+        self.forms = form_errors(reference.vector.keys)
+        self.base = self._numbers(reference.camera)
+
+    def mean(self, camera: Camera) -> Array:
+        """Return the mean of every number under a camera; nan where it is unknown."""
+        change = self._numbers(camera) - self.base
+        return self.reference.null.mean + np.nanmean(_quiet(change), axis=0)
+
+    def _numbers(self, camera: Camera) -> Array:
+        key = camera.model_dump_json()
+        if key not in self.cache:
+            seen = simulate(
+                self.model.with_camera(camera),
+                self.layout,
+                range(self.replicates),
+                self.seed,
+                self.jobs,
+            )
+            self.simulations += self.replicates
+            self.cache[key] = np.stack([self.numbers_of(one).values for one in seen])
+        return self.cache[key]
+
+    def weights(self, mean: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
+        """Return residuals, their standard deviations under a prediction, and which are known."""
+        null = self.reference.null
+        known = null.known & np.isfinite(mean)
+        before = null.mean
+        change = np.where(known, mean - before, 0.0)
+        # The cube root of a mean square scatters in proportion to itself.
+        grown = np.array(
+            [k.statistic.endswith("variance") and k.statistic != "pixel_variance"
+             for k in self.reference.vector.keys]
+        )  # fmt: skip
+        ratio = np.where(grown & known, np.abs(mean) / np.maximum(np.abs(before), 0.3), 1.0)
+        sd = np.hypot(null.sd * np.maximum(ratio, 1.0), self.forms * change)
+        return np.where(known, self.reference.vector.values - mean, 0.0), sd, known
+
+    def loglik(self, mean: Array) -> float:
+        """Return the log-likelihood of the recorded numbers, relative to any constant."""
+        rest, sd, known = self.weights(mean)
+        own = rest[known] / sd[known]
+        spread = np.log(sd[known] / self.reference.null.sd[known])
+        return float(-((_NU + 1) / 2 * np.log1p(own**2 / _NU) + spread).sum())
+
+
+def _quiet(values: Array) -> Array:
+    """Return values with at least one finite entry a column, so that a mean of nans does not warn."""
+    dead = ~np.isfinite(values).any(0)
+    return np.where(dead, 0.0, values)

@@ -1,0 +1,93 @@
+"""A virtual sensor of a camera model: its frames before the converter.
+
+The converter is left to `cells`, for what it does is known exactly; and draws are counted, so that
+two models share their noise: what an effect changes is known far better than either simulation.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.mismatch.prove.held import Held, HeldExposure
+from dsis.camera import BaseNoise, Camera
+from dsis.draw import Draw
+from dsis.effects import Effect, Image, Stage
+from dsis.simulate.shot import tiled
+
+Array = NDArray[np.float64]
+Signals = Mapping[str, NDArray[np.float64]]
+_SAMPLES = 100_000  # of an exposure, in frames that nothing was learned from
+
+
+class Analogue(Camera):
+    """A camera without the links of its converter: signals are neither rounded nor clipped."""
+
+    def chain(self) -> tuple[Effect, ...]:
+        """Return the links before the converter."""
+        return tuple(link for link in super().chain() if not of_converter(link))
+
+
+def of_converter(link: Effect) -> bool:
+    """Return whether a link makes codes of signals."""
+    return (link.stage, link.rank) >= (Stage.CODE, 0)
+
+
+def base_of(camera: Camera) -> Camera:
+    """Return the base model alone: Gaussian noise of variance m x + t, whole codes."""
+    noise = BaseNoise(shot="gaussian", segment=camera.noise.segment)
+    return camera.model_copy(update={"effect": (), "saturation_dn": None, "noise": noise})
+
+
+@dataclass(frozen=True)
+class Stack:
+    """Frames of one exposure of a virtual sensor: float32 (frame, row, column), DN above black.
+
+    Attributes
+    ----------
+    training
+        As many as the recording's; a proof learns the sensor's pattern from them.
+    fresh
+        Frames after them.
+    """
+
+    training: Image
+    fresh: Image
+
+
+def clean_signal(held: Held, exposure: HeldExposure, signals: Signals) -> Image:
+    """Return the clean signal of an exposure: uniform, or of a scene the training mean."""
+    if exposure.kind == "scene":
+        return (exposure.mean_dn - held.black_dn).astype(np.float32)
+    return tiled(signals[exposure.name], held.grid)
+
+
+def virtual_sensor(camera: Camera, held: Held, signals: Signals, seed: int) -> dict[str, Stack]:
+    """Return the frames of a virtual sensor, by exposure."""
+    analogue = Analogue.model_construct(**{n: getattr(camera, n) for n in Camera.model_fields})
+    sensor = sensor_draw(seed)
+    fresh = int(np.clip(round(_SAMPLES / held.grid.rows / held.grid.columns), 4, 8))
+    stacks = {}
+    for exposure in held.exposures:
+        clean = clean_signal(held, exposure, signals)
+        temporal = Draw(seed).within("proof", exposure.name)
+        frames = [
+            analogue.expose(
+                clean,
+                temporal,
+                sensor,
+                number,
+                held.grid,
+                exposure_time_s=exposure.exposure_time_s,
+            )
+            for number in range(exposure.trained + fresh)
+        ]
+        whole = np.stack(frames)
+        stacks[exposure.name] = Stack(whole[: exposure.trained], whole[exposure.trained :])
+    return stacks
+
+
+def sensor_draw(seed: int) -> Draw:
+    """Return the random fields of the virtual sensor."""
+    return Draw(seed).within("proof", "sensor")

@@ -1,0 +1,184 @@
+"""The report of a diagnosis: one self-contained page that needs no network."""
+
+from base64 import b64encode
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import jinja2
+import numpy as np
+
+from analysis.mismatch.evidence import Evidence
+from analysis.mismatch.finding import Finding, Mismatch
+from analysis.mismatch.report.figures import Picture, ladder_picture, pictures, save
+from analysis.mismatch.report.numbers import interval, measured, plain
+from analysis.mismatch.report.sentences import (
+    because,
+    considered,
+    fitted,
+    gain,
+    joined,
+    numbers_in_short,
+    strongest,
+    verdict,
+)
+from analysis.mismatch.report.words import (
+    effect_says,
+    effect_words,
+    listed,
+    parted,
+    place,
+    statistic_words,
+    unit,
+)
+from dsis import __version__
+
+HEADLINES = {
+    "match": "Simulation and recording agree",
+    "parameters": "The physics is complete, its numbers are off",
+    "omitted_physics": "The simulation leaves out physics",
+    "unexplained": "Something differs that is not explained",
+}
+_FIRST_PAGE = 8  # kinds of departure listed before the details
+_SAID = 3  # sentences below a picture
+
+
+@dataclass(frozen=True)
+class Difference:
+    """Departures of one statistic that have one explanation: a line of the first table."""
+
+    words: str
+    where: str
+    z: float
+    z_after: float
+    explained_by: str | None
+    says: str
+    count: int
+
+
+def write_page(finding: Finding, folder: Path, origin: str = "") -> None:
+    """Write `report.html` and `figures/` into a folder; same finding, same bytes.
+
+    Parameters
+    ----------
+    finding
+        What was found; without evidence there are no pictures but the ladder.
+    folder
+        An existing one.
+    origin
+        What was compared, in its first line; below it source, copyright, licence.
+    """
+    figures = folder / "figures"
+    figures.mkdir(exist_ok=True)
+    ladder = ladder_picture(finding)
+    ladder_svg = "" if ladder is None else _embedded(ladder, figures)
+    shown = [_shown(picture, figures) for picture in pictures(finding)]
+    page = render(finding, shown, ladder_svg, origin)
+    (folder / "report.html").write_text(page, encoding="utf-8", newline="")
+
+
+def render(
+    finding: Finding, shown: Sequence[dict[str, Any]], ladder_svg: str, origin: str = ""
+) -> str:
+    """Return the page: HTML that holds its style and its figures."""
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(Path(__file__).parent),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=jinja2.StrictUndefined,
+    )
+    environment.filters |= {
+        "plain": plain,
+        "gain": gain,
+        "statistic": statistic_words,
+        "effect": effect_words,
+        "effect_says": effect_says,
+        "unit": unit,
+        "place": place,
+        "because": because,
+    }
+    evidence = finding.evidence if isinstance(finding.evidence, Evidence) else Evidence()
+    differences = _differences([*finding.mismatches, *_only_unexplained(finding)])
+    return environment.get_template("report.html.jinja").render(
+        finding=finding,
+        headline=HEADLINES[finding.verdict],
+        verdict=verdict(finding),
+        origin=[line for line in origin.splitlines() if line],
+        effects=[(e, _parameters(e.parameters.items())) for e in finding.omitted_physics],
+        differences=differences[:_FIRST_PAGE],
+        more=len(differences) - _FIRST_PAGE,
+        mismatches=strongest(finding.mismatches),
+        unexplained=strongest(finding.unexplained),
+        errors=[(e, measured(e.recorded, e.standard_error)) for e in finding.parameter_errors],
+        considered=considered(finding),
+        proof=finding.proof,
+        locked=_locked(finding),
+        evidence=evidence,
+        pictures=shown,
+        ladder=ladder_svg,
+        interval=interval,
+        version=__version__,
+    )
+
+
+def _differences(mismatches: Iterable[Mismatch]) -> list[Difference]:
+    grouped: dict[tuple[str, str | None], list[Mismatch]] = {}
+    for mismatch in strongest(mismatches):
+        key = (parted(mismatch.statistic)[0], mismatch.explained_by)
+        grouped.setdefault(key, []).append(mismatch)
+    return [_difference(some) for some in grouped.values()]
+
+
+def _difference(some: Sequence[Mismatch]) -> Difference:
+    first = some[0]
+    after = [abs(m.z_after) for m in some if not np.isnan(m.z_after)]
+    statistics = {m.statistic for m in some}
+    words = first.statistic if len(statistics) == 1 else parted(first.statistic)[0]
+    return Difference(
+        statistic_words(words),
+        place(first.where),
+        first.z,
+        max(after, default=float("nan")),
+        first.explained_by,
+        first.says,
+        len(some),
+    )
+
+
+def _only_unexplained(finding: Finding) -> list[Mismatch]:
+    """Return what is left over that the base model's departures do not list already."""
+    listed_too = {(m.statistic, m.where) for m in finding.mismatches}
+    return [m for m in finding.unexplained if (m.statistic, m.where) not in listed_too]
+
+
+def _parameters(items: Iterable[tuple[str, Any]]) -> str:
+    return "; ".join(fitted(name, parameter) for name, parameter in items)
+
+
+def _locked(finding: Finding) -> list[tuple[str, str]]:
+    """Return (exposures, frames) of the proof; exposures with the same frames share a line."""
+    alike: dict[tuple[int, ...], list[str]] = {}
+    for name, frames in finding.proof.heldout_frames.items():
+        alike.setdefault(tuple(frames), []).append(name)
+    return [
+        (listed(tuple(names), "exposures"), numbers_in_short(frames))
+        for frames, names in alike.items()
+    ]
+
+
+def _shown(picture: Picture, figures: Path) -> dict[str, Any]:
+    explained = dict.fromkeys(m.explained_by for m in picture.mismatches)
+    names = [effect_words(name) if name else "nothing yet" for name in explained]
+    return {
+        "name": picture.name,
+        "title": picture.title[0].upper() + picture.title[1:],
+        "says": list(dict.fromkeys(m.says for m in picture.mismatches))[:_SAID],
+        "explained": joined(names),
+        "svg": _embedded(picture, figures),
+    }
+
+
+def _embedded(picture: Picture, figures: Path) -> str:
+    return b64encode(save(picture, figures)).decode("ascii")

@@ -1,0 +1,60 @@
+"""One plain sentence for each statistic."""
+
+from analysis.mismatch.bank.key import Key
+from analysis.mismatch.finding import Where
+
+_WORDS = {
+    "level": "the mean level is off what the light (or the other darks) ask for",
+    "channel_ratio": "the two greens differ in level",
+    "pixel_variance": "the pixel noise is off the straight line of variance against signal",
+    "row_variance": "whole rows move together from frame to frame",
+    "column_variance": "whole columns move together from frame to frame",
+    "frame_variance": "the mean of whole frames wanders",
+    "skewness": "the noise is skewed",
+    "kurtosis": "the noise has tails that a Gaussian has not",
+    "kurtosis_within_pixels": "single pixels have tails that a Gaussian has not",
+    "variance_spread": "pixels differ in how noisy they are",
+    "variance_persistence": "the same pixels are noisy in every exposure",
+    "one_off_outliers": "single pixels are far noisier than the others",
+    "outlying_pixels": "a few pixels stand far out of the fixed pattern",
+    "correlation_0_1": "the noise of neighbours along a row is correlated",
+    "correlation_1_0": "the noise of neighbours along a column is correlated",
+    "correlation_1_1": "the noise of diagonal neighbours is correlated",
+    "correlation_0_2": "the noise two pixels apart along a row is correlated",
+    "correlation_2_0": "the noise two pixels apart along a column is correlated",
+    "line_correlation": "the noise is correlated over some distance along a line",
+    "spectral_peak": "the noise has a periodic component",
+    "row_spectrum_peak": "row means have a periodic component",
+    "column_spectrum_peak": "column means have a periodic component",
+    "frame_correlation": "the noise of a frame is correlated with that of the next",
+    "code_spacing": "not every code occurs: codes come in steps",
+    "code_imbalance": "codes are not equally frequent",
+    "fixed_pixel_variance": "every pixel has a fixed deviation of its own",
+    "fixed_row_variance": "rows have fixed deviations",
+    "fixed_column_variance": "columns have fixed deviations",
+    "fixed_smooth_variance": "the mean frame has a smooth fixed surface",
+    "fixed_correlation_0_1": "fixed deviations of neighbours along a row are alike",
+    "fixed_correlation_1_0": "fixed deviations of neighbours along a column are alike",
+    "half_seam": "the two halves of the sensor meet in a step",
+    "parity": "even and odd lines differ",
+}
+_SCOPES = {
+    "offset": ", alike at all signals",
+    "gain": ", in proportion to the signal",
+    "time": ", growing with exposure time",
+}
+
+
+def sentence(statistic: str, key: Key, z: float, where: Where) -> str:
+    """Return what a mismatch says: what, how, where, how clearly."""
+    what = _WORDS.get(statistic, statistic)
+    how = _SCOPES.get(key.scope, "")
+    if key.scope == "contrast" and key.detail not in ("", "at all levels"):
+        how = f" ({key.detail})"
+    if key.detail and key.scope not in ("contrast", "exposure"):
+        how += f" ({key.detail})"
+    places = ", ".join(where.exposures[:4]) + (" ..." if len(where.exposures) > 4 else "")
+    channel = f" in channel {where.channel}" if where.channel not in (None, "MONO") else ""
+    sign = "more" if z > 0 else "less"
+    text = f"{what}{how}: {sign} than the model at {abs(z):.3g} standard errors"
+    return f"{text}{channel} ({places})."[:1].upper() + f"{text}{channel} ({places})."[1:]

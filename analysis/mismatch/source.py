@@ -1,0 +1,40 @@
+"""Frames of a recording, kept in memory where they fit."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsis.recording import Recording
+
+_MOST_BYTES = 1_200_000_000
+
+
+class Source:
+    """Gives the frames of exposures by number; small recordings are read once."""
+
+    def __init__(self, recording: Recording) -> None:
+        self.recording = recording
+        count = sum(len(e.frames) for e in recording.exposures)
+        self.keeps = count * recording.rows * recording.columns * 2 <= _MOST_BYTES
+        self.kept: dict[tuple[str, int], NDArray[np.uint16]] = {}
+
+    def frames(self, exposure: str, numbers: Sequence[int]) -> Iterator[NDArray[np.uint16]]:
+        """Yield frames (row, column) of an exposure in the order of `numbers`."""
+        missing = [n for n in numbers if (exposure, n) not in self.kept]
+        recorded = self.recording.exposure(exposure)
+        if not self.keeps:
+            yield from self.recording.frames(recorded, numbers, ahead=1)
+            return
+        for number, frame in zip(
+            missing, self.recording.frames(recorded, missing, ahead=1), strict=True
+        ):
+            self.kept[exposure, number] = frame
+        for number in numbers:
+            yield self.kept[exposure, number]
+
+    def stack(self, exposure: str, numbers: Sequence[int]) -> NDArray[np.uint16]:
+        """Return frames (frame, row, column) of an exposure."""
+        return np.stack(list(self.frames(exposure, numbers)))
+
+

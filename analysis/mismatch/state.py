@@ -1,0 +1,126 @@
+"""A recording beside one model of it: calibrated, simulated, judged."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.mismatch.basefit import BaseFit
+from analysis.mismatch.clues import Clues
+from analysis.mismatch.finding import Mismatch
+from analysis.mismatch.locate import located, tested
+from analysis.mismatch.model import simulate
+from analysis.mismatch.null import Null, null_of
+from analysis.mismatch.observe import Layout, Observation
+from analysis.mismatch.predict import Predictor, Reference
+from analysis.mismatch.recalibrate import Calibrated, calibrate
+from analysis.mismatch.vector import Vector, vector
+from dsis.camera import Camera
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What stays the same throughout a diagnosis.
+
+    Attributes
+    ----------
+    layout, seen
+        The development frames and what was observed of them.
+    interpolated
+        The exposure that the re-calibration leaves out.
+    seed, jobs
+        Of the simulations.
+    nulls, replicates
+        Simulations for a null, and for the comparison of candidates.
+    """
+
+    layout: Layout
+    seen: Observation
+    interpolated: str | None
+    seed: int
+    jobs: int
+    nulls: int
+    replicates: int
+
+
+@dataclass(frozen=True)
+class State:
+    """One model of the recording, and how far the recording is from it.
+
+    Attributes
+    ----------
+    setting
+        What was observed.
+    calibrated
+        The model.
+    vector, null
+        Recorded numbers, and their null.
+    departures, chances
+        z and adjusted chances of numbers and contrasts.
+    mismatches
+        What is certain.
+    """
+
+    setting: Setting
+    calibrated: Calibrated
+    vector: Vector
+    null: Null
+    departures: Array
+    chances: Array
+    mismatches: tuple[Mismatch, ...]
+
+    @classmethod
+    def of(cls, setting: Setting, camera: Camera, progress: Callable[[], None]) -> "State":
+        """Return the state of a camera after its base numbers were fitted again."""
+        layout, seen = setting.layout, setting.seen
+        calibrated = calibrate(
+            camera, layout, seen, setting.interpolated, seed=setting.seed, jobs=setting.jobs
+        )
+        vectors = []
+        for first in range(0, setting.nulls, setting.jobs):
+            batch = range(first, min(first + setting.jobs, setting.nulls))
+            for one in simulate(calibrated.model, layout, batch, setting.seed, setting.jobs):
+                vectors.append(numbers(layout, calibrated, one))
+            progress()
+        own = vector(layout, seen, calibrated.residual)
+        null = null_of(layout, vectors, own)
+        z, chances = tested(null, own)
+        return cls(
+            setting, calibrated, own, null, z, chances, located(layout, seen, null, z, chances)
+        )
+
+    @property
+    def camera(self) -> Camera:
+        """The camera, re-calibrated."""
+        return self.calibrated.model.camera
+
+    @property
+    def fit(self) -> BaseFit:
+        """The base numbers."""
+        return self.calibrated.fit
+
+    def clues(self) -> Clues:
+        """Return what proposals start from."""
+        s = self.setting
+        return Clues(s.layout, s.seen, self.vector, self.fit, self.null, self.camera)
+
+    def predictor(self, replicates: int | None = None) -> Predictor:
+        """Return predictions of other cameras beside this one."""
+        s = self.setting
+        return Predictor(
+            s.layout,
+            self.calibrated.model,
+            lambda one: numbers(s.layout, self.calibrated, one),
+            Reference(self.camera, self.null, self.vector),
+            replicates=replicates or s.replicates,
+            seed=s.seed,
+            jobs=s.jobs,
+        )
+
+
+def numbers(layout: Layout, calibrated: Calibrated, seen: Observation) -> Vector:
+    """Return the numbers of a simulated recording, its base numbers fitted as the recording's."""
+    return vector(layout, seen, calibrated.refit(layout, seen.levels))

@@ -7,8 +7,8 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.mismatch.basefit import BaseFit
 from analysis.mismatch.bank.key import Key
+from analysis.mismatch.basefit import BaseFit
 from analysis.mismatch.null import Null
 from analysis.mismatch.observe import Layout, Observation, Place
 from analysis.mismatch.vector import Vector

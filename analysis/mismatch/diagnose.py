@@ -3,14 +3,16 @@
 from collections.abc import Callable
 from dataclasses import replace
 
+import numpy as np
 
 from analysis.mismatch.candidates import CANDIDATES
+from analysis.mismatch.explain import because, explained
 from analysis.mismatch.finding import (
     Alternative,
-    Change,
     Finding,
     FittedParameter,
     Gain,
+    Mismatch,
     OmittedEffect,
     Proof,
     Verdict,
@@ -21,11 +23,13 @@ from analysis.mismatch.recalibrate import layout_of, parameter_errors
 from analysis.mismatch.source import Source
 from analysis.mismatch.split import Split
 from analysis.mismatch.state import Setting, State
+from analysis.mismatch.trial import Trial
 from dsis.camera import Camera
 from dsis.recording import Recording
 
 Progress = Callable[[int, int, str], None]
 VOCABULARY = frozenset({*CANDIDATES, "dual_gain"})
+_ERRORS = 2.2  # standard errors from a gain to the end of its interval, of few frames
 _LARGE = 2.5e7  # samples from which fewer simulations must do
 
 
@@ -62,59 +66,85 @@ def find_mismatch(
     words = VOCABULARY if vocabulary is None else vocabulary & VOCABULARY
     search = Search(setting, camera, base, words, step)
     final = search.run()
-    return _finding(camera, split, base, final, search)
+    trial = Trial.of(recording, split, base, seed)
+    final, gains = _proven(search, final, trial)
+    proof = trial.proof(base, final, step, source)
+    return _finding(camera, base, final, search, gains, proof)
+
+
+def _proven(search: Search, final: State, trial: Trial) -> tuple[State, dict[str, Gain]]:
+    """Drop, one by one, effects whose gain on the locked frames is within its uncertainty."""
+    while True:
+        gains = {
+            named.kind: trial.gain(final, search.without(final, named)) for named in search.named
+        }
+        weak = [named for named in search.named if not _certain(gains[named.kind])]
+        if not weak:
+            return final, gains
+        worst = min(weak, key=lambda named: gains[named.kind].nats_per_frame)
+        gain = gains[worst.kind]
+        why = f"gains {gain.nats_per_frame:.3g} nats per locked frame, no more than chance"
+        final = search.drop(final, worst, why)
+
+
+def _certain(gain: Gain) -> bool:
+    """Return whether a gain is more than its standard error, a quarter of its interval or so."""
+    return gain.nats_per_frame > (gain.nats_per_frame - gain.ci95[0]) / _ERRORS
 
 
 def _finding(
-    camera: Camera, split: Split, base: State, final: State, search: Search
+    camera: Camera,
+    base: State,
+    final: State,
+    search: Search,
+    gains: dict[str, Gain],
+    proof: Proof,
 ) -> Finding:
-    errors = parameter_errors(camera, final.calibrated, final.setting.layout)
-    omitted = tuple(_omitted(n) for n in search.named)
-    unexplained = final.mismatches
+    errors = parameter_errors(
+        camera, final.calibrated, final.setting.layout, final.fits
+    )
+    explanations = explained(base, final, search.changes(final))
+    mismatches = tuple(
+        replace(m, explained_by=explanations[m.statistic][0], z_after=explanations[m.statistic][1])
+        for m in base.mismatches
+    )
+    omitted = tuple(_omitted(n, mismatches, gains[n.kind], search) for n in search.named)
     verdict: Verdict = "match"
     if omitted:
         verdict = "omitted_physics"
     elif base.mismatches:
         verdict = "unexplained"
-        unexplained = unexplained or base.mismatches
     elif errors:
         verdict = "parameters"
-    left = {m.statistic: m.z for m in final.mismatches}
-    mismatches = tuple(
-        replace(m, z_after=left.get(m.statistic, 0.0)) for m in base.mismatches
-    )
-    proof = Proof(
-        dict(split.locked),
-        Change(float("nan"), float("nan")),
-        Change(len(base.mismatches), len(final.mismatches)),
-        None,
-        None,
-    )
+    undecided = tuple(Alternative(kind, None, why) for kind, why in search.refused.items())
     return Finding(
         verdict,
         mismatches,
         errors,
-        omitted,
-        unexplained,
-        (),
+        tuple(sorted(omitted, key=lambda one: -one.heldout_gain.nats_per_frame)),
+        final.mismatches,
+        undecided,
         proof,
         final.camera,
         (),
     )
 
 
-def _omitted(named: Named) -> OmittedEffect:
+def _omitted(
+    named: Named, mismatches: tuple[Mismatch, ...], gain: Gain, search: Search
+) -> OmittedEffect:
     parameters = {}
     if named.proposal is not None:
         effect = named.proposal.effect
-        for name in named.proposal.free:
-            parameters[name] = FittedParameter(
-                float(getattr(effect, name)), named.errors.get(name, float("inf"))
-            )
-    nothing = Gain(named.gain, (named.gain, named.gain))
+        for name, value in effect.model_dump(exclude={"kind"}).items():
+            if isinstance(value, (int, float)) and not isinstance(value, bool):
+                error = named.errors.get(name, 0.0 if name not in named.proposal.free else np.inf)
+                parameters[name] = FittedParameter(float(value), error)
+    else:
+        parameters["switch_dn"] = FittedParameter(named.switch_dn, named.errors["switch_dn"])
     rivals = tuple(
-        Alternative(kind, None, f"explains {worse:.3g} nats less") for kind, worse in named.rivals
+        Alternative(kind, None, f"explains the numbers {worse:.3g} nats worse")
+        for kind, worse in named.rivals
     )
-    return OmittedEffect(named.kind, parameters, (), nothing, rivals)
-
-
+    del search
+    return OmittedEffect(named.kind, parameters, because(mismatches, named.kind), gain, rivals)

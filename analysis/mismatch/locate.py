@@ -14,6 +14,7 @@ from analysis.mismatch.vector import Vector
 
 Array = NDArray[np.float64]
 FAMILY = 0.006  # chance of any mismatch in a recording that differs in nothing
+_SUMS = 0.7  # of it, for sums over exposures or channels
 _ROOTS = 2e-3  # of a ratio: 0.6 % of the finer mean square
 _FLOORS = {
     "pixel_variance": 1e-3,
@@ -22,8 +23,8 @@ _FLOORS = {
     "kurtosis_within_pixels": 3e-3,
     "variance_spread": 1e-2,
     "code_imbalance": 2e-3,
-    "channel_ratio": 2e-4,
-    "level": 2e-3,
+    "channel_ratio": 5e-5,
+    "level": 1e-3,
 }
 
 
@@ -48,7 +49,12 @@ def tested(null: Null, seen: Vector) -> tuple[Array, Array]:
             z[size + i] = 0.0
     known = np.concatenate([null.known, np.ones(len(null.contrasts.keys), bool)])
     chances = np.ones(len(z))
-    chances[known] = adjusted(null.chances(z[known]))
+    # Sums over exposures and channels, where an effect shows best, share most of the error rate.
+    summed = np.array([not key.exposure and key.scope == "contrast" for key in null.keys])
+    weights = np.where(
+        summed, _SUMS / max((known & summed).sum(), 1), (1 - _SUMS) / max((known & ~summed).sum(), 1)
+    )
+    chances[known] = adjusted(null.chances(z[known]), weights[known])
     return z, chances
 
 

@@ -47,6 +47,7 @@ class Named:
     errors: dict[str, float]
     gain: float
     rivals: tuple[tuple[str, float], ...]
+    switch_dn: float = float("nan")
 
 
 @dataclass
@@ -60,7 +61,6 @@ class Search:
     step: Step
     named: list[Named] = field(default_factory=list)
     refused: dict[str, str] = field(default_factory=dict)
-    final: State | None = None
 
     def run(self) -> State:
         """Return the final state."""
@@ -71,9 +71,33 @@ class Search:
                 break
             self.named.append(added[0])
             state = State.of(self.setting, added[1], self.step)
-        state = self._pruned(self._polished(state))
-        self.final = state
-        return state
+        return self._pruned(self._polished(state))
+
+    def without(self, state: State, named: Named) -> Camera:
+        """Return a state's camera without one of the effects named."""
+        if named.proposal is None:
+            return state.camera.model_copy(update={"noise": self.base.camera.noise})
+        return _without(state.camera, [_own(named)], self.camera)
+
+    def drop(self, state: State, named: Named, why: str) -> State:
+        """Return the state without an effect, which is refused from now on."""
+        self.refused[named.kind] = why
+        self.named.remove(named)
+        return State.of(self.setting, self.without(state, named), self.step)
+
+    def changes(self, state: State) -> dict[str, Array]:
+        """Return what each effect named changes in the numbers, in deviations of the base null."""
+        base = self.base.null
+        found = {}
+        predictor = state.predictor() if self.named else None
+        for named in self.named:
+            if named.proposal is None or predictor is None:
+                change = _bent(self.base, state)
+            else:
+                change = state.null.mean - predictor.mean(self.without(state, named))
+            known = base.known & np.isfinite(change)
+            found[named.kind] = np.where(known, change, 0.0) / base.sd
+        return found
 
     def _best(self, state: State) -> tuple[Named, Camera] | None:
         """Return the effect that explains most, and the camera with it."""
@@ -109,7 +133,9 @@ class Search:
             path = second_path(state)
         if path is not None and path.gain > max([LEAST_GAIN, *(f[0] for f in fitted)]):
             rivals = tuple((f[1], path.gain - f[0]) for f in fitted[:3])
-            return Named("dual_gain", None, {"switch_dn": path.error_dn}, path.gain, rivals), path.camera
+            error = {"switch_dn": path.error_dn}
+            named = Named("dual_gain", None, error, path.gain, rivals, path.switch_dn)
+            return named, path.camera
         if not fitted or fitted[0][0] < LEAST_GAIN:
             return None
         gain, kind, proposal, polished = fitted[0]
@@ -150,8 +176,7 @@ class Search:
             whole = predictor.loglik(state.null.mean)
             worst: tuple[float, Named, str] | None = None
             for named in mine:
-                camera = _without(state.camera, [_own(named)], self.camera)
-                mean = predictor.mean(camera)
+                mean = predictor.mean(self.without(state, named))
                 gain = whole - predictor.loglik(mean)
                 share = resolved(predictor, state, mean)
                 reason = ""
@@ -163,10 +188,13 @@ class Search:
                     worst = (share, named, reason)
             if worst is None:
                 return state
-            self.refused[worst[1].kind] = worst[2]
-            self.named.remove(worst[1])
-            camera = _without(state.camera, [_own(worst[1])], self.camera)
-            state = State.of(self.setting, camera, self.step)
+            state = self.drop(state, worst[1], worst[2])
+
+
+def _bent(base: State, final: State) -> Array:
+    """Return what a second read-out path changes: the residuals of the variances."""
+    own = np.array([key.statistic == "pixel_variance" for key in base.vector.keys])
+    return np.where(own, base.vector.values - final.vector.values, 0.0)
 
 
 def _own(named: Named) -> Effect:

@@ -12,7 +12,8 @@ from analysis.mismatch.observe import Layout
 from analysis.mismatch.vector import Contrasts, Vector, contrasts
 
 Array = NDArray[np.float64]
-_OWN = 40.0  # degrees of freedom that the closed form, scaled by name, is worth
+_OWN = 40.0  # degrees of freedom that the closed form, scaled by name, is worth for a number
+_POOLED = 160.0  # and for the tails: a scale is shared by all numbers of a name
 _LEAST_SCALE = 0.8
 
 
@@ -92,7 +93,7 @@ def null_of(layout: Layout, simulated: Sequence[Vector], seen: Vector) -> Null:
         sums,
         np.zeros(len(sums.keys)),
         np.sqrt(np.maximum(pooled, _LEAST_SCALE**2) * (1 + 1 / count)),
-        _OWN + count - 1,
+        _POOLED + count - 1,
     )
 
 
@@ -109,13 +110,16 @@ def _by_name(keys: Sequence[Key], own: Array, known: NDArray[np.bool_]) -> Array
     return scale
 
 
-def adjusted(chances: Array) -> Array:
-    """Return Holm's adjusted probabilities: family-wise, step-down."""
-    order = np.argsort(chances)
-    count = len(chances)
-    stepped = np.minimum(1.0, chances[order] * (count - np.arange(count)))
-    result = np.empty(count)
-    result[order] = np.maximum.accumulate(stepped)
+def adjusted(chances: Array, weights: Array) -> Array:
+    """Return weighted Holm's adjusted probabilities: family-wise, step-down (Holm 1979).
+
+    A number of weight w may use w times the share of the error rate that one of weight 1 may.
+    """
+    scaled = chances / weights
+    order = np.argsort(scaled)
+    left = weights[order][::-1].cumsum()[::-1]
+    result = np.empty(len(chances))
+    result[order] = np.maximum.accumulate(np.minimum(1.0, scaled[order] * left))
     return result
 
 

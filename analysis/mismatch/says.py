@@ -40,6 +40,8 @@ _WORDS = {
 }
 _SCOPES = {
     "offset": ", alike at all signals",
+    "offset alone": ", alike at all signals",
+    "gain alone": ", in proportion to the signal",
     "gain": ", in proportion to the signal",
     "time": ", growing with exposure time",
 }

@@ -58,6 +58,8 @@ class State:
         The model.
     vector, null
         Recorded numbers, and their null.
+    fits
+        Base numbers fitted to each simulated recording: how far they scatter.
     departures, chances
         z and adjusted chances of numbers and contrasts.
     mismatches
@@ -68,6 +70,7 @@ class State:
     calibrated: Calibrated
     vector: Vector
     null: Null
+    fits: tuple[BaseFit, ...]
     departures: Array
     chances: Array
     mismatches: tuple[Mismatch, ...]
@@ -79,17 +82,25 @@ class State:
         calibrated = calibrate(
             camera, layout, seen, setting.interpolated, seed=setting.seed, jobs=setting.jobs
         )
-        vectors = []
+        vectors, fits = [], []
         for first in range(0, setting.nulls, setting.jobs):
             batch = range(first, min(first + setting.jobs, setting.nulls))
             for one in simulate(calibrated.model, layout, batch, setting.seed, setting.jobs):
-                vectors.append(numbers(layout, calibrated, one))
+                fits.append(calibrated.refit(layout, one.levels))
+                vectors.append(vector(layout, one, fits[-1]))
             progress()
         own = vector(layout, seen, calibrated.residual)
         null = null_of(layout, vectors, own)
         z, chances = tested(null, own)
         return cls(
-            setting, calibrated, own, null, z, chances, located(layout, seen, null, z, chances)
+            setting,
+            calibrated,
+            own,
+            null,
+            tuple(fits),
+            z,
+            chances,
+            located(layout, seen, null, z, chances),
         )
 
     @property

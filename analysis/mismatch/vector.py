@@ -14,8 +14,8 @@ from analysis.mismatch.basefit import CLIPPED_SHARE, BaseFit, colour
 from analysis.mismatch.observe import Layout, Observation, Place
 
 Array = NDArray[np.float64]
-RELATIVE_LIGHT = 2e-4  # light is stated, and a lamp is stable, no better than this
-RELATIVE_RATIO = 1e-4
+RELATIVE_LIGHT = 3e-5  # light is stated, and a lamp is stable, no better than this
+RELATIVE_RATIO = 3e-5
 
 
 @dataclass(frozen=True)
@@ -129,6 +129,8 @@ def contrasts(layout: Layout, reference: Vector, known: NDArray[np.bool_]) -> Co
     for i, key in enumerate(reference.keys):
         if key.scope == "exposure" and known[i] and key.statistic not in OF_CODES:
             places.setdefault((key.statistic, ""), []).append(i)
+            if key.statistic in _PAIRS:
+                places.setdefault((_PAIRS[key.statistic], BOTH), []).append(i)
             if key.channel not in ("", "MONO") and key.statistic in _BY_CHANNEL:
                 places.setdefault((key.statistic, key.channel), []).append(i)
     keys: list[Key] = []
@@ -138,6 +140,8 @@ def contrasts(layout: Layout, reference: Vector, known: NDArray[np.bool_]) -> Co
             continue
         kept: list[Array] = []
         for name, shape in SHAPES.items():
+            if channel == BOTH and name == "with the signal alone":
+                continue
             if statistic in OF_MEAN_FRAMES and name == "with the signal alone":
                 continue
             row = np.zeros(len(reference.keys))
@@ -153,9 +157,33 @@ def contrasts(layout: Layout, reference: Vector, known: NDArray[np.bool_]) -> Co
             if any(abs(float(row @ other)) > 0.98 for other in kept):
                 continue
             kept.append(row)
-            keys.append(Key(statistic, "contrast", "", channel, name))
+            own = "" if channel == BOTH else channel
+            keys.append(Key(statistic, "contrast", "", own, name))
             rows.append(row)
+    for (statistic, scope, detail), which in _over_channels(reference, known).items():
+        row = np.zeros(len(reference.keys))
+        row[which] = 1 / np.sqrt(len(which))
+        keys.append(Key(statistic, "contrast", "", "", f"{scope} {detail}".strip()))
+        rows.append(row)
     return Contrasts(tuple(keys), np.array(rows).reshape(len(rows), len(reference.keys)))
 
 
+def _over_channels(
+    reference: Vector, known: NDArray[np.bool_]
+) -> dict[tuple[str, str, str], list[int]]:
+    """Return the numbers of sums over exposures, channels together; long lags stay single."""
+    groups: dict[tuple[str, str, str], list[int]] = {}
+    for i, key in enumerate(reference.keys):
+        if key.scope != "exposure" and known[i] and key.statistic != "line_correlation":
+            groups.setdefault((key.statistic, key.scope, key.detail), []).append(i)
+    return groups
+
+
+BOTH = "along rows and columns"
+_PAIRS = {
+    "correlation_0_1": "correlation_0_1",
+    "correlation_1_0": "correlation_0_1",
+    "correlation_0_2": "correlation_0_2",
+    "correlation_2_0": "correlation_0_2",
+}
 _BY_CHANNEL = frozenset({"pixel_variance", "level"})

@@ -17,6 +17,7 @@ from dsis.measures.fixed_pattern import Smooth
 
 Array = NDArray[np.float64]
 MAPS = ("offset", "gain", "time")
+ALONE = ("offset", "gain")
 _LEAST_SPREAD = 0.02  # share of a regressor that the others leave, to be told from them
 
 
@@ -95,14 +96,26 @@ class PatternSums:
         self.noise += weight**2 * np.outer(row, row) * variance_dn2 / frames
 
     def maps(self) -> dict[str, tuple[Array, float]]:
-        """Return each map (row, column) in DN at the regressor's largest value, and its noise."""
+        """Return each map (row, column) in DN at the regressor's largest value, and its noise.
+
+        Those of `offset` and `gain` also alone, as if there were no other: less noise, but what is
+        in one shows in the other.
+        """
         inverse = np.linalg.inv(self.gram)
         solved = np.tensordot(inverse, self.moments, 1)
         noise = inverse @ self.noise @ inverse
-        return {
+        found = {
             name: (solved[i], sqrt(max(float(noise[i, i]), 1e-300)))
             for i, name in enumerate(self.regressors.names)
         }
+        for i, name in enumerate(self.regressors.names):
+            if name in ALONE and len(found) > 1:
+                own = float(self.gram[i, i])
+                found[f"{name} alone"] = (
+                    self.moments[i] / own,
+                    sqrt(max(float(self.noise[i, i]), 1e-300)) / own,
+                )
+        return found
 
 
 @dataclass(frozen=True)

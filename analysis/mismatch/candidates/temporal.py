@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from math import sqrt
 
+from analysis.mismatch.bank.coherent import Peak
 from analysis.mismatch.candidates.candidate import Candidate, Proposal, proposals
 from analysis.mismatch.clues import Clues
 
@@ -34,11 +35,11 @@ def _line_flicker(clues: Clues) -> Sequence[Proposal]:
     if variance <= 0:
         return []
     found: list[Proposal] = []
-    channel = clues.layout.channels[0]
     for kind in ("rows of light", "rows"):
-        peak = clues.seen.peaks.get((channel, kind))
-        if peak is None:
+        clear = clearest(clues, kind)
+        if clear is None:
             continue
+        channel, peak = clear
         cycles = peak.fy * clues.shape(channel)[0]
         for off in (0.0, 0.35, -0.35):
             if cycles + off > 0 and not any(
@@ -83,15 +84,15 @@ def frequencies(clues: Clues) -> list[tuple[float, float, float]]:
 
     Planes of a mosaic see frequencies modulo half a cycle per pixel: each alias is one.
     """
-    channel = clues.layout.channels[0]
-    n, m = clues.shape(channel)
     place = min(clues.places, key=lambda p: clues.seen.levels[p].variance_dn2)
     v = clues.seen.levels[place].variance_dn2
     found = []
     for kind in ("spectrum", "rows", "columns"):
-        peak = clues.seen.peaks.get((channel, kind))
-        if peak is None or peak.power < 1.2:
+        clear = clearest(clues, kind)
+        if clear is None or clear[1].power < 1.2:
             continue
+        channel, peak = clear
+        n, m = clues.shape(channel)
         amplitude = 2 * sqrt(max(peak.power - 1, 0.05) * v / (n * m))
         if channel == "MONO":
             found.append((peak.fx, peak.fy, amplitude))
@@ -100,12 +101,18 @@ def frequencies(clues: Clues) -> list[tuple[float, float, float]]:
             for ay in (0.0, 0.5):
                 fx, fy = peak.fx / 2 + ax, peak.fy / 2 + ay
                 found.append(((fx + 0.5) % 1 - 0.5, (fy + 0.5) % 1 - 0.5, amplitude))
-    if channel != "MONO":  # what is constant in each plane: stripes and checkerboards of the mosaic
+    if len(clues.layout.channels) > 1:  # what is constant in each plane: stripes and checkerboards of the mosaic
         frame, _ = clues.amplitude("frame_variance", lambda place: 1.0)
         if frame > 0:
             found += [(0.5, 0.0, 2 * sqrt(frame)), (0.0, 0.5, 2 * sqrt(frame)),
                       (0.5, 0.5, 2 * sqrt(frame))]  # fmt: skip
     return found
+
+
+def clearest(clues: Clues, kind: str) -> tuple[str, Peak] | None:
+    """Return the channel whose spectrum has the largest peak, and the peak."""
+    own = [(c, peak) for (c, k), peak in clues.seen.peaks.items() if k == kind]
+    return max(own, key=lambda one: one[1].power, default=None)
 
 
 CANDIDATES = (

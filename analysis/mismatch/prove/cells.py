@@ -5,7 +5,6 @@ camera. Where two sensors give two answers the widths of codes are random; then 
 tell them, shrunk by the model's own spread of widths.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,8 +21,9 @@ from dsis.grid import PixelGrid
 Array = NDArray[np.float64]
 _PER_DN = 32  # steps of the ramp
 _SMOOTH_CODES = 4.0  # what varies slower than this is no code's own width
-_REACH = 8.0  # standard deviations
-_OUTER = 1e6  # DN: beyond every signal
+_CLEAR = 4.0  # standard deviations from an end of the converter: nothing is clipped
+_COARSE = 0.6  # of a cell: narrower noise is moved by rounding
+_OUTER = 1e7  # DN: beyond every signal
 
 
 @dataclass(frozen=True)
@@ -34,49 +34,106 @@ class Cells:
     ----------
     lower_dn, upper_dn
         Edges of each code's cell, DN above black; equal where a code never occurs.
+    black_dn
+        The black level.
     width_variance
         Of the codes' relative widths from sensor to sensor; 0: all sensors alike.
     weight
-        Relative width of each code that was learned; None: all as the cells say.
+        Relative width of each code as it was learned; 1 where nothing was.
     """
 
     lower_dn: Array
     upper_dn: Array
+    black_dn: float
     width_variance: float
-    weight: Array | None = None
+    weight: Array
 
     @property
-    def step_dn(self) -> float:
-        """Usual width of the cells that are there, DN."""
-        width = (self.upper_dn - self.lower_dn)[1:-1]
-        return float(np.median(width[width > 0])) if (width > 0).any() else 1.0
+    def plain(self) -> bool:
+        """Whether every sensor has the same cells."""
+        return not self.width_variance
 
     def centre(self, mean_dn: float, sd_dn: float) -> float:
-        """Return the centre of normal noise whose *codes* have a mean, all in DN above black.
+        """Return the centre of normal noise whose codes have a mean, both in DN above black.
 
         Clipping and coarse codes move the mean; elsewhere it is the centre itself.
         """
-        low, high = self.upper_dn[0], self.lower_dn[-1]
-        clear = min(mean_dn - low, high - mean_dn) > 4 * sd_dn
-        if clear and sd_dn > 0.6 * self.step_dn:
+        width = self.upper_dn[1:-1] - self.lower_dn[1:-1]
+        step = float(np.median(width[width > 0]))
+        ends = min(mean_dn - self.upper_dn[0], self.lower_dn[-1] - mean_dn)
+        if ends > _CLEAR * sd_dn and sd_dn > _COARSE * step:
             return mean_dn
-        reach = 1.5 * self.step_dn + 2.5 * sd_dn
+        reach = 1.5 * step + 2.5 * sd_dn
         grid = np.linspace(mean_dn - reach, mean_dn + reach, 81)
         edges = self.upper_dn[:-1]
         first, last = np.searchsorted(edges, [grid[0] - 9 * sd_dn, grid[-1] + 9 * sd_dn])
-        near = slice(first, last + 1)
-        below = ndtr((edges[near] - grid[:, np.newaxis]) / sd_dn)
-        # The mean code is the highest less the probabilities of lying below each edge.
-        top = first + below.shape[1]
-        code = top - below.sum(1)
-        black = -0.5 - float(self.lower_dn[1] - 1) if self.step_dn == 1 else 0.0
-        del black
-        return float(np.interp(mean_dn + self._black_dn(), np.maximum.accumulate(code), grid))
+        below = ndtr((edges[first:last] - grid[:, np.newaxis]) / sd_dn)
+        code = last - below.sum(1)  # the last code less the chances of lying below each edge
+        return float(np.interp(mean_dn + self.black_dn, code, grid))
 
-    def _black_dn(self) -> float:
-        """Return the black level that signals are counted from."""
-        return float(np.median(self._codes_less_centres()))
+    def learned(self, counts: NDArray[np.int64], expected: Array) -> "Cells":
+        """Return the cells with the widths that training frames show.
 
-    def _codes_less_centres(self) -> Array:
-        inner = slice(1, -1)
-        return np.arange(self.lower_dn.size)[inner] - (self.lower_dn + self.upper_dn)[inner] / 2
+        Parameters
+        ----------
+        counts
+            How often each code occurred.
+        expected
+            How often it would have with these cells.
+
+        Widths have mean 1 and variance s: gamma-distributed, of which Poisson counts are seen, so
+        that the posterior mean is (1 / s + counts) / (1 / s + expected). What changes slowly from
+        code to code is the law of the noise, not a width, and divided out.
+        """
+        prior = 1 / self.width_variance
+        weight = (prior + counts) / (prior + expected)
+        smooth = gaussian_filter1d(expected * weight, _SMOOTH_CODES)
+        density = gaussian_filter1d(expected, _SMOOTH_CODES)
+        level = np.divide(smooth, density, out=np.ones_like(smooth), where=density > 0)
+        return replace(self, weight=weight / level)
+
+
+def cells_of(camera: Camera, seed: int) -> Cells:
+    """Return the cells of a camera's converter."""
+    codes = np.arange(int(camera.white_level) + 1)
+    links = [link for link in camera.chain() if of_converter(link)]
+    ones = np.ones(codes.size)
+    if len(links) == 1:  # rounding alone
+        lower = codes - 0.5 - camera.black_level
+        return Cells(*_open(lower, lower + 1), camera.black_level, 0.0, ones)
+    ramp = (np.arange(codes.size * _PER_DN) + 0.5) / _PER_DN - 0.5 - camera.black_level
+    grid = PixelGrid(1, ramp.size, camera.cfa)
+    image = ramp.astype(np.float32)[np.newaxis]
+    one, two = (
+        np.rint(converted(camera, image, grid, Draw(seed).within("ramp", str(k)))[0])
+        for k in range(2)
+    )
+    width = np.bincount(one.astype(np.intp), minlength=codes.size) / _PER_DN
+    other = np.bincount(two.astype(np.intp), minlength=codes.size) / _PER_DN
+    if (width != other).any():
+        inner = np.concatenate([width[1:-1], other[1:-1]])
+        lower = codes - 0.5 - camera.black_level
+        spread = float(((inner - 1) ** 2).mean())
+        return Cells(*_open(lower, lower + 1), camera.black_level, spread, ones)
+    lower = np.concatenate([[0.0], np.cumsum(width)[:-1]]) - 0.5 - camera.black_level
+    return Cells(*_open(lower, lower + width), camera.black_level, 0.0, ones)
+
+
+def _open(lower: Array, upper: Array) -> tuple[Array, Array]:
+    """Return edges whose first and last cells take all that lies beyond."""
+    occurring = np.nonzero(upper > lower)[0]
+    lower, upper = lower.copy(), upper.copy()
+    lower[occurring[0]], upper[occurring[-1]] = -_OUTER, _OUTER
+    return lower, upper
+
+
+def converted(camera: Camera, image: Image, grid: PixelGrid, sensor: Draw) -> Image:
+    """Return codes, float32, of a signal in DN above black."""
+    for link in camera.chain():
+        if of_converter(link):
+            exposure = Exposure(
+                grid, 0, sensor, sensor, image, camera.read_out, lambda _, same=image: same
+            )
+            image = link.apply(image, exposure)
+    codes: Image = image + np.float32(camera.black_level)
+    return codes

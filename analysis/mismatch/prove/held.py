@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import sqrt
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,7 @@ from dsis.recording import RecordedExposure, Recording
 Array = NDArray[np.float64]
 Codes = NDArray[np.uint16]
 Numbers = Mapping[str, Sequence[int]]
+T = TypeVar("T")
 
 MOST_TRAINING = 16
 MOST_LOCKED = 24
@@ -126,7 +128,7 @@ def hold(recording: Recording, training: Numbers, locked: Numbers) -> Held:
     )
 
 
-def _thinned[T](items: list[T], most: int) -> list[T]:
+def _thinned(items: list[T], most: int) -> list[T]:
     """Return at most so many items, evenly spaced."""
     if len(items) <= most:
         return items

@@ -18,9 +18,11 @@ def plain(value: float | None, digits: int = 3) -> str:
 
 
 def measured(value: float, standard_error: float) -> str:
-    """Return value ± standard error, rounded to two digits of the error."""
-    if not (isfinite(value) and isfinite(standard_error) and standard_error > 0):
+    """Return value ± standard error, rounded to two digits of the error; 0: an exact value."""
+    if standard_error == 0:
         return plain(value, 4)
+    if not (isfinite(value) and isfinite(standard_error)):
+        return f"{plain(value, 4)} ± {DASH}"
     decimals = 1 - floor(log10(standard_error))
     if decimals > 6:  # 0.000012 ± 0.000003 is 1.2e-05
         return f"{plain(value, 4)} ± {plain(standard_error, 2)}"

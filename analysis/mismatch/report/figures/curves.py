@@ -31,14 +31,14 @@ def draw(figure: Figure, curves: Sequence[Curve], threshold_z: float) -> None:
     for curve in curves:
         _departures(left, curve, threshold_z)
         _deviations(right, curve)
-    several = len(curves) > 1
     unit = curves[0].unit.replace("^2", "\u00b2")
     of = f", {unit}" if unit else ""
     left.axhline(0, color=GREY, lw=0.8, zorder=0)
     left.set_ylabel(f"recorded less base model{of}")
     left.set_title("What differs", loc="left")
-    if several or any(c.expected_after is not None for c in curves):
-        left.legend(loc="best")
+    if any(curve.expected_after is not None for curve in curves):
+        left.plot([], [], color=COLOURS[0] if len(curves) == 1 else GREY, label="physics named")
+    left.legend(loc="best")
     _standard(right, curves, threshold_z)
     for axes in (left, right):
         _abscissa(axes, curves)
@@ -53,9 +53,8 @@ def _departures(axes: Axes, curve: Curve, threshold_z: float) -> None:
     axes.fill_between(x, -threshold_z * sd, threshold_z * sd, color=GREY, alpha=0.18, lw=0)
     if curve.expected_after is not None:
         added = (curve.expected_after - curve.expected_before)[order]
-        mono = curve.channel in ("", "MONO")
-        label = "physics named" if mono else f"{curve.channel}, physics named"
-        axes.plot(x, added, color=COLOURS[0] if mono else colour, lw=1.4, label=label)
+        line = COLOURS[0] if curve.channel in ("", "MONO") else colour
+        axes.plot(x, added, color=line, lw=1.4)
     seen = (curve.observed - curve.expected_before)[order]
     mark = CHANNEL_MARKS.get(curve.channel, "o")
     label = "recorded" if curve.channel in ("", "MONO") else curve.channel
@@ -79,13 +78,16 @@ def _standard(axes: Axes, curves: Sequence[Curve], threshold_z: float) -> None:
     axes.plot([], [], "o", mfc="white", mec=ALARM, label="before")
     if any(curve.expected_after is not None for curve in curves):
         axes.plot([], [], "o", color=COLOURS[0], label="after")
-    low, high = axes.get_ylim()
-    most = max(-low, high, 1.5 * threshold_z)
+    seen = np.concatenate([np.asarray(line.get_ydata(), np.float64) for line in axes.lines])
+    seen = seen[np.isfinite(seen)]
+    low, high = float(seen.min(initial=0.0)), float(seen.max(initial=0.0))
+    most = max(-1.15 * low, 1.15 * high, 1.5 * threshold_z)
     if most > 4 * threshold_z:
         axes.set_yscale("symlog", linthresh=threshold_z)
         plain_numbers(axes.yaxis)
         most *= 1.8
-    axes.set_ylim(-most if low < -threshold_z else -1.5 * threshold_z, most)
+    least = 1.5 * threshold_z
+    axes.set_ylim(-most if low < -threshold_z else -least, most if high > threshold_z else least)
     axes.set_ylabel("departure, standard deviations")
     axes.set_title("Before and after", loc="left")
     axes.legend(loc="best", ncols=3)

@@ -18,19 +18,23 @@ PANELS = ("recorded", "base model", "with the physics named")
 
 
 def size_inches(maps: Sequence[Map]) -> tuple[float, float]:
-    """Return width and height of a figure with a line of panels for each channel."""
-    panels = len(_panels(maps[0]))
+    """Return width and height of the figure."""
+    lines, panels = _shape(maps)
     rows, columns = maps[0].recorded.shape
-    width = {1: 5.6, 2: 8.0, 3: WIDTH_INCHES}[panels]
+    width = {1: 5.6, 2: 8.0}.get(panels, WIDTH_INCHES)
     height = min(0.82 * width / panels * rows / columns, 5.0)
-    return width, len(maps) * (height + 0.55)
+    return width, lines * (height + 0.55)
 
 
 def draw(figure: Figure, maps: Sequence[Map], where: Where) -> None:
-    """Draw the maps of some channels on one scale each; what stands out is marked in the first."""
-    panels = len(_panels(maps[0]))
-    grid = figure.subplots(len(maps), panels, squeeze=False)
-    for line, one in zip(grid, maps, strict=True):
+    """Draw maps: a line for each channel, one scale a line, what stands out marked in its first.
+
+    Channels of which there is no simulation stand side by side, two a line.
+    """
+    grid = figure.subplots(*_shape(maps), squeeze=False)
+    alone = len(_panels(maps[0])) == 1
+    lines = [[axes] for axes in grid.flat] if alone else [list(line) for line in grid]
+    for line, one in zip(lines, maps, strict=False):
         low, high = _limits(one.recorded)
         for axes, (title, image) in zip(line, _panels(one).items(), strict=True):
             shown, step = reduced(image)
@@ -45,7 +49,17 @@ def draw(figure: Figure, maps: Sequence[Map], where: Where) -> None:
             if step > 1:
                 axes.set_xlabel(f"means of {step} x {step} pixels", fontsize=7)
         _mark(line[0], where)
-        figure.colorbar(drawn, ax=list(line), label=one.unit, shrink=0.85, pad=0.02)
+        figure.colorbar(drawn, ax=line, label=one.unit, shrink=0.85, pad=0.02)
+    for line in lines[len(maps) :]:
+        line[0].set_axis_off()
+
+
+def _shape(maps: Sequence[Map]) -> tuple[int, int]:
+    """Return lines and columns of panels."""
+    panels = len(_panels(maps[0]))
+    if panels > 1:
+        return len(maps), panels
+    return ceil(len(maps) / 2), min(len(maps), 2)
 
 
 def reduced(image: Array) -> tuple[Array, int]:

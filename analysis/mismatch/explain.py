@@ -1,0 +1,59 @@
+"""Which effect explains which mismatch: by what each changes in the numbers that are off."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.mismatch.finding import Mismatch
+from analysis.mismatch.locate import FAMILY
+from analysis.mismatch.state import State
+
+Array = NDArray[np.float64]
+_LEFT = 0.4  # of a departure may be left where it is called explained
+
+
+def explained(
+    base: State, final: State, changes: Mapping[str, Array]
+) -> dict[str, tuple[str | None, float]]:
+    """Return the effect that explains each statistic of the base mismatches, and z afterwards.
+
+    Parameters
+    ----------
+    base, final
+        The re-calibrated base model and the final one.
+    changes
+        By effect: what it changes in the numbers, in standard deviations of the base null.
+    """
+    found: dict[str, tuple[str | None, float]] = {}
+    matrix = base.null.contrasts.matrix
+    both = {
+        kind: np.concatenate([change, matrix @ change / base.null.contrast_sd])
+        for kind, change in changes.items()
+    }
+    after = {key: z for key, z in zip(final.null.keys, final.departures, strict=True)}
+    for mismatch in base.mismatches:
+        which = [
+            i
+            for i, key in enumerate(base.null.keys)
+            if key.statistic == mismatch.statistic and base.chances[i] < FAMILY
+        ]
+        z = base.departures[which]
+        left = max((abs(after.get(base.null.keys[i], 0.0)) for i in which), default=0.0)
+        still = any(m.statistic == mismatch.statistic for m in final.mismatches)
+        score = {
+            kind: float((np.clip(change[which] / z, -1, 2) * np.abs(z)).sum() / np.abs(z).sum())
+            for kind, change in both.items()
+        }
+        best = max(score, key=lambda kind: score[kind], default=None)
+        top = float(np.abs(z).max())
+        clear = best is not None and score[best] > 0 and (not still or left < _LEFT * top)
+        found[mismatch.statistic] = (best if clear else None, left)
+    return found
+
+
+def because(
+    mismatches: Sequence[Mismatch], kind: str
+) -> tuple[str, ...]:
+    """Return the statistics that an effect explains."""
+    return tuple(m.statistic for m in mismatches if m.explained_by == kind)

@@ -1,0 +1,2 @@
+class Auc: value=.5
+def auc_of(*a,**k): return None

@@ -1,0 +1,125 @@
+"""The proof: how much better the final model predicts the locked frames than the base model."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.mismatch.finding import Change, Gain
+from analysis.mismatch.prove.classifier import Auc, auc_of
+from analysis.mismatch.prove.gain import heldout_gain
+from analysis.mismatch.prove.held import Held, hold
+from analysis.mismatch.prove.likelihood import (
+    Loglik,
+    frame_loglik,
+    likelihood_model,
+    mean_per_pixel,
+)
+from analysis.mismatch.prove.virtual import Signals
+from dsis.camera import Camera
+from dsis.recording import Recording
+
+Array = NDArray[np.float64]
+Numbers = Mapping[str, Sequence[int]]
+
+
+@dataclass(frozen=True)
+class ProofNumbers:
+    """What the locked frames say of two models.
+
+    Attributes
+    ----------
+    loglik_before, loglik_after
+        Log-likelihood of each locked frame, nats: by exposure, (frame,).
+    gain
+        After less before, per frame.
+    loglik_per_pixel
+        Means per pixel and frame, nats.
+    auc
+        Of the classifier that tells locked frames from simulated ones; None: too few patches.
+    auc_before, auc_after
+        The same with their intervals.
+    left_out
+        Exposures that were not used: clipped.
+    window
+        Rows and columns that were used; the whole sensor unless it is large.
+    """
+
+    loglik_before: Mapping[str, Array]
+    loglik_after: Mapping[str, Array]
+    gain: Gain
+    loglik_per_pixel: Change
+    auc: Change | None
+    auc_before: Auc | None
+    auc_after: Auc | None
+    left_out: tuple[str, ...]
+    window: tuple[int, int]
+
+
+def prove(
+    recording: Recording,
+    training: Numbers,
+    locked: Numbers,
+    before: Camera,
+    after: Camera,
+    signals: Signals,
+    *,
+    seed: int,
+    jobs: int = 1,
+) -> ProofNumbers:
+    """Compare two camera models on the locked frames of a recording.
+
+    Parameters
+    ----------
+    recording
+        The recording.
+    training, locked
+        Numbers of frames by exposure, from 0.
+    before, after
+        Base model, re-calibrated, and final model.
+    signals
+        Clean signal of each flat and dark, DN above black, by rows 0, 1 and columns 0, 1: (2, 2).
+    seed
+        Fixes every number.
+    jobs
+        Not used: a proof takes seconds.
+    """
+    del jobs
+    held = hold(recording, training, locked)
+    return prove_held(held, before, after, signals, seed=seed)
+
+
+def prove_held(
+    held: Held, before: Camera, after: Camera, signals: Signals, *, seed: int
+) -> ProofNumbers:
+    """Compare two camera models on frames that were read before; see `prove`."""
+    one, two = (loglik_of(held, camera, signals, seed=seed) for camera in (before, after))
+    aucs = [auc_of(held, camera, signals, seed=seed) for camera in (before, after)]
+    change = None
+    if aucs[0] is not None and aucs[1] is not None:
+        change = Change(aucs[0].value, aucs[1].value)
+    return ProofNumbers(
+        one.per_frame,
+        two.per_frame,
+        heldout_gain(one, two, seed=seed),
+        Change(mean_per_pixel(one, held), mean_per_pixel(two, held)),
+        change,
+        aucs[0],
+        aucs[1],
+        held.left_out,
+        held.shape,
+    )
+
+
+def loglik_of(held: Held, camera: Camera, signals: Signals, *, seed: int) -> Loglik:
+    """Return the log-likelihood of the locked frames under a camera."""
+    return frame_loglik(likelihood_model(camera, held, signals, seed))
+
+
+def gain_of(
+    held: Held, with_: Camera, without: Camera, signals: Signals, *, seed: int
+) -> Gain:
+    """Return what one camera model gains over another on the locked frames."""
+    one = loglik_of(held, without, signals, seed=seed)
+    return heldout_gain(one, loglik_of(held, with_, signals, seed=seed), seed=seed)

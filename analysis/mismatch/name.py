@@ -228,14 +228,16 @@ def resolved(predictor: Predictor, state: State, without: Array) -> float:
     """
     null = state.null
     known = null.known & np.isfinite(without)
-    change = np.where(known, (null.mean - without) / null.sd, 0.0)
-    touched = known & (np.abs(change) > _CLEAR)
-    if not touched.any():
+    single = np.where(known, (null.mean - without) / null.sd, 0.0)
+    sums = null.contrasts.matrix
+    change = np.concatenate([single, sums @ single / null.contrast_sd])
+    forms = np.concatenate([predictor.forms, np.full(len(sums), float(np.median(predictor.forms)))])
+    after = null.departures(state.vector)
+    clear = np.abs(change) > _CLEAR
+    if not clear.any():
         return 0.0
-    values = state.vector.values[touched]
-    before = np.abs(values - without[touched]) / null.sd[touched]
-    after = np.abs(values - null.mean[touched]) / null.sd[touched]
-    allowed = _CLEAR + 2 * predictor.forms[touched] * np.abs(change[touched])
-    left = np.maximum(after - allowed, 0.0).sum()
-    total = np.maximum(np.maximum(before, np.abs(change[touched])) - _CLEAR, 0.0).sum()
+    before = np.abs(after + change)[clear]
+    allowed = _CLEAR + 2 * forms[clear] * np.abs(change[clear])
+    left = np.maximum(np.abs(after[clear]) - allowed, 0.0).sum()
+    total = np.maximum(np.maximum(before, np.abs(change[clear])) - _CLEAR, 0.0).sum()
     return float(1 - left / total) if total > 0 else 0.0

@@ -5,6 +5,7 @@ have in common cancels. The likelihood has heavy tails, and allows every predict
 its own: no effect of the vocabulary is exactly what a sensor does.
 """
 
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -15,6 +16,7 @@ from analysis.mismatch.bank.key import Key
 from analysis.mismatch.model import Model, simulate
 from analysis.mismatch.null import Null
 from analysis.mismatch.observe import Layout, Observation
+from analysis.mismatch.touches import touched
 from analysis.mismatch.vector import Vector
 from dsis.camera import Camera
 
@@ -82,9 +84,20 @@ class Predictor:
         self.base = self._numbers(reference.camera)
 
     def mean(self, camera: Camera) -> Array:
-        """Return the mean of every number under a camera; nan where it is unknown."""
-        change = self._numbers(camera) - self.base
-        return self.reference.null.mean + np.nanmean(_quiet(change), axis=0)
+        """Return the mean of every number under a camera; nan where it is unknown.
+
+        Numbers that the effects in which the cameras differ cannot change stay as they are, and a
+        change counts as far as the replicates agree on it: their noise would otherwise be fitted.
+        """
+        mine, theirs = Counter(camera.effect), Counter(self.reference.camera.effect)
+        different = list(((mine - theirs) + (theirs - mine)).keys())
+        may = touched(self.reference.vector.keys, different)
+        change = np.where(may, self._numbers(camera) - self.base, 0.0)
+        mean = change.mean(0)
+        noise = change.var(0, ddof=1) / len(change) if len(change) > 1 else 0.0 * mean
+        with np.errstate(invalid="ignore", divide="ignore"):
+            kept = np.where(mean == 0, 0.0, mean**2 / (mean**2 + noise))
+        return np.asarray(self.reference.null.mean + mean * kept)
 
     def _numbers(self, camera: Camera) -> Array:
         key = camera.model_dump_json()
@@ -121,9 +134,3 @@ class Predictor:
         own = rest[known] / sd[known]
         spread = np.log(sd[known] / self.reference.null.sd[known])
         return float(-((_NU + 1) / 2 * np.log1p(own**2 / _NU) + spread).sum())
-
-
-def _quiet(values: Array) -> Array:
-    """Return values with at least one finite entry a column, so that a mean of nans does not warn."""
-    dead = ~np.isfinite(values).any(0)
-    return np.where(dead, 0.0, values)

@@ -1,0 +1,48 @@
+"""Which numbers of the bank an effect may change: those that follow from the measures it declares."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.mismatch.bank.key import Key
+from dsis.effects import Effect
+
+_LINES = frozenset({"row_variance", "column_variance", "frame_variance"})
+_FIXED = frozenset(
+    {
+        "fixed_pixel_variance",
+        "fixed_row_variance",
+        "fixed_column_variance",
+        "fixed_smooth_variance",
+    }
+)
+_CORRELATIONS = frozenset(
+    {"correlation_0_1", "correlation_1_0", "correlation_1_1", "correlation_0_2", "correlation_2_0"}
+)
+# A mean over frames keeps 1/T of the lines' and frames' own noise.
+_FOLLOWS = {
+    "kurtosis_within_pixels": frozenset({"kurtosis"}),
+    "one_off_outliers": frozenset({"variance_spread", "kurtosis"}),
+    "variance_persistence": frozenset({"variance_spread"}),
+    "outlying_pixels": frozenset({"fixed_pixel_variance"}),
+    "line_correlation": _CORRELATIONS | _LINES,
+    "column_spectrum_peak": frozenset({"column_variance"}),
+    "row_spectrum_peak": frozenset({"row_spectrum_peak", "row_variance"}),
+    "half_seam": _FIXED | _LINES,
+    "parity": _FIXED | _LINES,
+    "channel_ratio": frozenset({"level"}),
+    "level": frozenset({"level", "frame_variance"}),
+    "fixed_row_variance": frozenset({"fixed_row_variance", "row_variance"}),
+    "fixed_column_variance": frozenset({"fixed_column_variance", "column_variance"}),
+    "fixed_smooth_variance": frozenset({"fixed_smooth_variance"}) | _LINES,
+    "skewness": frozenset({"skewness"}),
+}
+
+
+def touched(keys: Sequence[Key], effects: Sequence[Effect]) -> NDArray[np.bool_]:
+    """Return which numbers some of the effects may change."""
+    declared = frozenset(name for effect in effects for name in effect.measures)
+    names = {key.statistic for key in keys}
+    may = {name for name in names if declared & _FOLLOWS.get(name, frozenset({name}))}
+    return np.array([key.statistic in may for key in keys], bool)

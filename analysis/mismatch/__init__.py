@@ -1,6 +1,6 @@
 """Mismatch: where simulation and recording differ, what physics was left out, and the proof.
 
-Public: `find_mismatch` gives a `Finding`; `write_finding` writes mismatch.json, the report, camera.toml.
+Public: `find_mismatch` gives a `Finding`; `analysis.mismatch.files.write_finding` writes it.
 """
 
 from analysis.mismatch.diagnose import VOCABULARY, find_mismatch

@@ -31,7 +31,7 @@ def explained(
         kind: np.concatenate([change, matrix @ change / base.null.contrast_sd])
         for kind, change in changes.items()
     }
-    after = {key: z for key, z in zip(final.null.keys, final.departures, strict=True)}
+    after = dict(zip(final.null.keys, final.departures, strict=True))
     for mismatch in base.mismatches:
         which = [
             i
@@ -52,8 +52,6 @@ def explained(
     return found
 
 
-def because(
-    mismatches: Sequence[Mismatch], kind: str
-) -> tuple[str, ...]:
+def because(mismatches: Sequence[Mismatch], kind: str) -> tuple[str, ...]:
     """Return the statistics that an effect explains."""
     return tuple(m.statistic for m in mismatches if m.explained_by == kind)

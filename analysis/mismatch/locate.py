@@ -1,4 +1,4 @@
-"""Which departures are real, and where they are: family-wise control, floors, one entry a statistic."""
+"""Which departures are real, and where: family-wise control, floors, one entry a statistic."""
 
 from collections.abc import Sequence
 
@@ -52,13 +52,17 @@ def tested(null: Null, seen: Vector) -> tuple[Array, Array]:
     # Sums over exposures and channels, where an effect shows best, share most of the error rate.
     summed = np.array([not key.exposure and key.scope == "contrast" for key in null.keys])
     weights = np.where(
-        summed, _SUMS / max((known & summed).sum(), 1), (1 - _SUMS) / max((known & ~summed).sum(), 1)
+        summed,
+        _SUMS / max((known & summed).sum(), 1),
+        (1 - _SUMS) / max((known & ~summed).sum(), 1),
     )
     chances[known] = adjusted(null.chances(z[known]), weights[known])
     return z, chances
 
 
-def located(layout: Layout, seen: Observation, null: Null, z: Array, chances: Array) -> tuple[Mismatch, ...]:
+def located(
+    layout: Layout, seen: Observation, null: Null, z: Array, chances: Array
+) -> tuple[Mismatch, ...]:
     """Return one mismatch a statistic, the largest departure first."""
     groups: dict[str, list[int]] = {}
     for i in np.flatnonzero(chances < FAMILY):
@@ -150,5 +154,3 @@ def _pixels(
 
     y, x = sites(layout.cfa)[channel]
     return tuple((int(r) * step + y, int(c) * step + x) for r, c in zip(rows, columns, strict=True))
-
-

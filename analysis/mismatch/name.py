@@ -1,14 +1,15 @@
 """Which physics explains the mismatches: add the best effect, fit all again, look again."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.mismatch.candidates import CANDIDATES, Proposal
-from analysis.mismatch.polish import Polished, polish, with_effects
+from analysis.mismatch.candidates import Proposal
+from analysis.mismatch.polish import polish, with_effects
 from analysis.mismatch.predict import Predictor
+from analysis.mismatch.rank import ranked
 from analysis.mismatch.segments import second_path
 from analysis.mismatch.state import Setting, State
 from dsis.camera import Camera
@@ -17,9 +18,7 @@ from dsis.effects import Effect
 Array = NDArray[np.float64]
 Step = Callable[[], None]
 LEAST_GAIN = 5.0  # of log-likelihood, for an effect to be taken in
-_TIE = 3.0
 _MOST_EFFECTS = 5
-_POLISHED = 5  # kinds that are fitted in a round, after all were tried as proposed
 _CLEAR = 3.0  # departures below are chance
 _RESOLVED = 0.7  # share of what an effect touches that it must explain
 
@@ -77,7 +76,7 @@ class Search:
         """Return a state's camera without one of the effects named."""
         if named.proposal is None:
             return state.camera.model_copy(update={"noise": self.base.camera.noise})
-        return _without(state.camera, [_own(named)], self.camera)
+        return _without(state.camera, [named.proposal.effect], self.camera)
 
     def drop(self, state: State, named: Named, why: str) -> State:
         """Return the state without an effect, which is refused from now on."""
@@ -101,70 +100,46 @@ class Search:
 
     def _best(self, state: State) -> tuple[Named, Camera] | None:
         """Return the effect that explains most, and the camera with it."""
-        predictor = state.predictor()
-        before = predictor.loglik(state.null.mean)
+        left = self.vocabulary - {n.kind for n in self.named} - set(self.refused)
+        fitted = ranked(state, left, self.step)
         off = {m.statistic for m in state.mismatches}
-        taken = {n.kind for n in self.named}
-        tried: list[tuple[float, str, Proposal]] = []
-        clues = state.clues()
-        for kind in sorted(self.vocabulary - taken - set(self.refused)):
-            candidate = CANDIDATES.get(kind)
-            if candidate is None or not off & set(candidate.calls):
-                continue
-            own = []
-            for proposal in candidate.propose(clues):
-                built = with_effects(state.camera, [proposal.effect])
-                if built is not None:
-                    own.append((predictor.loglik(predictor.mean(built)), kind, proposal))
-            if own:
-                tried.append(max(own, key=lambda one: one[0]))
-            self.step()
-        tried.sort(key=lambda one: -one[0])
-        fitted: list[tuple[float, str, Proposal, Polished]] = []
-        for _, kind, proposal in tried[:_POLISHED]:
-            polished = polish(predictor, state.camera, [proposal])
-            if polished is not None:
-                free = len(proposal.free)
-                fitted.append((polished.loglik - before - free, kind, proposal, polished))
-            self.step()
-        fitted.sort(key=lambda one: -one[0])
-        path = None
-        if "dual_gain" in self.vocabulary - taken - set(self.refused) and "pixel_variance" in off:
-            path = second_path(state)
-        if path is not None and path.gain > max([LEAST_GAIN, *(f[0] for f in fitted)]):
-            rivals = tuple((f[1], path.gain - f[0]) for f in fitted[:3])
+        path = second_path(state) if "dual_gain" in left and "pixel_variance" in off else None
+        most = fitted[0].gain if fitted else 0.0
+        if path is not None and path.gain > max(LEAST_GAIN, most):
+            rivals = tuple((one.kind, path.gain - one.gain) for one in fitted[:3])
             error = {"switch_dn": path.error_dn}
-            named = Named("dual_gain", None, error, path.gain, rivals, path.switch_dn)
-            return named, path.camera
-        if not fitted or fitted[0][0] < LEAST_GAIN:
+            return (
+                Named("dual_gain", None, error, path.gain, rivals, path.switch_dn),
+                path.camera,
+            )
+        camera = with_effects(state.camera, fitted[0].polished.effects) if fitted else None
+        if camera is None or most < LEAST_GAIN:
             return None
-        gain, kind, proposal, polished = fitted[0]
-        rivals = tuple((f[1], gain - f[0]) for f in fitted[1:4])
+        best = fitted[0]
+        rivals = tuple((one.kind, best.gain - one.gain) for one in fitted[1:4])
         if path is not None:
-            rivals = (*rivals, ("dual_gain", gain - path.gain))
-        effect = Proposal(polished.effects[0], proposal.free, proposal.signed)
-        camera = with_effects(state.camera, [effect.effect])
-        assert camera is not None
-        return Named(kind, effect, polished.errors[0], gain, rivals), camera
+            rivals = (*rivals, ("dual_gain", best.gain - path.gain))
+        effect = Proposal(best.polished.effects[0], best.proposal.free, best.proposal.signed)
+        return Named(best.kind, effect, best.polished.errors[0], best.gain, rivals), camera
 
     def _polished(self, state: State) -> State:
         """Fit the parameters of all effects together, and judge the result once more."""
-        mine = [n for n in self.named if n.proposal is not None]
+        mine = [(n, n.proposal) for n in self.named if n.proposal is not None]
         if not mine:
             return state
-        bare = _without(state.camera, [_own(n) for n in mine], self.camera)
+        bare = _without(state.camera, [p.effect for _, p in mine], self.camera)
         predictor = state.predictor(2 * self.setting.replicates)
-        polished = polish(predictor, bare, [p for n in mine if (p := n.proposal)], rounds=2)
+        polished = polish(predictor, bare, [p for _, p in mine], rounds=2)
         if polished is None:
             return state
         scale = (1 + 1 / (2 * self.setting.replicates)) ** 0.5
         fitted = iter(zip(polished.effects, polished.errors, strict=True))
         self.named = [
-            n if n.proposal is None else _renewed(n, *next(fitted), scale) for n in self.named
+            n if n.proposal is None else _renewed(n, n.proposal, *next(fitted), scale)
+            for n in self.named
         ]
         camera = with_effects(bare, polished.effects)
-        assert camera is not None
-        return State.of(self.setting, camera, self.step)
+        return state if camera is None else State.of(self.setting, camera, self.step)
 
     def _pruned(self, state: State) -> State:
         """Drop effects that the others make needless, and those that leave what they touch."""
@@ -197,16 +172,14 @@ def _bent(base: State, final: State) -> Array:
     return np.where(own, base.vector.values - final.vector.values, 0.0)
 
 
-def _own(named: Named) -> Effect:
-    assert named.proposal is not None
-    return named.proposal.effect
-
-
-def _renewed(named: Named, effect: Effect, errors: dict[str, float], scale: float) -> Named:
-    assert named.proposal is not None
-    proposal = Proposal(effect, named.proposal.free, named.proposal.signed)
-    scaled = {name: error * scale for name, error in errors.items()}
-    return Named(named.kind, proposal, scaled, named.gain, named.rivals)
+def _renewed(
+    named: Named, proposal: Proposal, effect: Effect, errors: dict[str, float], scale: float
+) -> Named:
+    return replace(
+        named,
+        proposal=Proposal(effect, proposal.free, proposal.signed),
+        errors={name: error * scale for name, error in errors.items()},
+    )
 
 
 def _without(camera: Camera, effects: Sequence[Effect], given: Camera) -> Camera:

@@ -16,6 +16,9 @@ from dsis.effects import Effect
 Array = NDArray[np.float64]
 _STEP = 0.12  # of the logarithm, for the derivative
 _LARGEST = 1.2  # step of a logarithm
+_SMALL = 0.05  # gain of log-likelihood below which another round is in vain
+Free = tuple[int, str, bool]
+"""Number of an effect, name of its parameter, whether it may be negative."""
 _NU = 6.0
 
 
@@ -56,8 +59,7 @@ def polish(
         for i, proposal in enumerate(start)
         for name in proposal.free
     ]
-    effects: tuple[Effect, ...] | None = tuple(p.effect for p in start)
-    assert effects is not None
+    effects = tuple(p.effect for p in start)
     built = with_effects(camera, effects)
     if built is None:
         return None
@@ -65,48 +67,72 @@ def polish(
     best = predictor.loglik(mean)
     errors: Array = np.full(len(free), np.inf)
     for _ in range(rounds if free else 0):
-        jacobian = []
-        for i, name, signed in free:
-            moved = _moved(effects, i, name, signed, _STEP)
-            shifted = None if moved is None else with_effects(camera, moved[0])
-            if moved is None or shifted is None:
-                jacobian.append(np.zeros_like(mean))
-                continue
-            jacobian.append((predictor.mean(shifted) - mean) / moved[1])
-        j = np.stack(jacobian, 1)
-        rest, sd, known = predictor.weights(mean)
-        known &= np.isfinite(j).all(1)
-        r, s = rest[known], sd[known]
-        w = (_NU + 1) / _NU / (1 + (r / s) ** 2 / _NU) / s**2
-        normal = (j[known] * w[:, None]).T @ j[known]
-        size = np.sqrt(np.maximum(np.diag(normal), 1e-12))
-        scaled = normal / np.outer(size, size)
-        solve = np.linalg.pinv(scaled + 1e-6 * np.eye(len(free)), rcond=1e-8) / np.outer(size, size)
-        step = solve @ (j[known].T @ (w * r))
-        errors = np.sqrt(np.diag(solve))
-        found = False
-        for shrink in (1.0, 0.4, 0.15):
-            own: tuple[Effect, ...] | None = effects
-            for (i, name, signed), delta in zip(free, step * shrink, strict=True):
-                limited = delta if signed else float(np.clip(delta, -_LARGEST, _LARGEST))
-                changed = None if own is None else _moved(own, i, name, signed, limited, as_is=True)
-                own = None if changed is None else changed[0]
-            built = None if own is None else with_effects(camera, own)
-            if own is None or built is None:
-                continue
-            trial = predictor.mean(built)
-            value = predictor.loglik(trial)
-            if value > best:
-                small = value - best < 0.05
-                effects, best, mean, found = own, value, trial, True
-                break
-        if not found or small:
+        step, errors = _newton(predictor, camera, effects, free, mean)
+        better = _along(predictor, camera, effects, free, step, best)
+        if better is None:
+            break
+        gained = better[2] - best
+        effects, mean, best = better
+        if gained < _SMALL:
             break
     by_effect: tuple[dict[str, float], ...] = tuple({} for _ in start)
     for (i, name, signed), error in zip(free, errors, strict=True):
         scale = 1.0 if signed else abs(float(getattr(effects[i], name)))
         by_effect[i][name] = float(error * scale)
     return Polished(effects, best, mean, by_effect)
+
+
+def _newton(
+    predictor: Predictor,
+    camera: Camera,
+    effects: tuple[Effect, ...],
+    free: Sequence[Free],
+    mean: Array,
+) -> tuple[Array, Array]:
+    """Return the Gauss-Newton step of the free parameters and their standard errors."""
+    columns = []
+    for i, name, signed in free:
+        moved = _moved(effects, i, name, signed, _STEP)
+        shifted = None if moved is None else with_effects(camera, moved[0])
+        if moved is None or shifted is None:
+            columns.append(np.zeros_like(mean))
+        else:
+            columns.append((predictor.mean(shifted) - mean) / moved[1])
+    j = np.stack(columns, 1)
+    rest, sd, known = predictor.weights(mean)
+    known &= np.isfinite(j).all(1)
+    r, s = rest[known], sd[known]
+    w = (_NU + 1) / _NU / (1 + (r / s) ** 2 / _NU) / s**2
+    normal = (j[known] * w[:, None]).T @ j[known]
+    size = np.sqrt(np.maximum(np.diag(normal), 1e-12))
+    scaled = normal / np.outer(size, size)
+    solve = np.linalg.pinv(scaled + 1e-6 * np.eye(len(free)), rcond=1e-8) / np.outer(size, size)
+    return solve @ (j[known].T @ (w * r)), np.sqrt(np.diag(solve))
+
+
+def _along(
+    predictor: Predictor,
+    camera: Camera,
+    effects: tuple[Effect, ...],
+    free: Sequence[Free],
+    step: Array,
+    best: float,
+) -> tuple[tuple[Effect, ...], Array, float] | None:
+    """Return effects, numbers and likelihood after the longest of three steps that gains."""
+    for shrink in (1.0, 0.4, 0.15):
+        own: tuple[Effect, ...] | None = effects
+        for (i, name, signed), delta in zip(free, step * shrink, strict=True):
+            limited = delta if signed else float(np.clip(delta, -_LARGEST, _LARGEST))
+            changed = None if own is None else _moved(own, i, name, signed, limited, as_is=True)
+            own = None if changed is None else changed[0]
+        built = None if own is None else with_effects(camera, own)
+        if own is None or built is None:
+            continue
+        mean = predictor.mean(built)
+        value = predictor.loglik(mean)
+        if value > best:
+            return own, mean, value
+    return None
 
 
 def _moved(

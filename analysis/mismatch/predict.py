@@ -1,8 +1,8 @@
 """Numbers that a camera model predicts for a recording, and how likely the recorded ones then are.
 
 Cameras are compared on the same few simulated recordings: draws are counted, so what two cameras
-have in common cancels. The likelihood has heavy tails, and allows every predicted change an error of
-its own: no effect of the vocabulary is exactly what a sensor does.
+have in common cancels. The likelihood has heavy tails, and allows every predicted change an error
+of its own: no effect of the vocabulary is exactly what a sensor does.
 """
 
 from collections import Counter

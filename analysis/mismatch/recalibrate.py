@@ -1,7 +1,9 @@
-"""The base model's numbers again, from the training frames; and whether the camera model's differ."""
+"""The base model's numbers, fitted again; and whether the camera model's differ from them."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
+from itertools import pairwise
 from math import hypot, isfinite, sqrt
 
 import numpy as np
@@ -120,7 +122,12 @@ def sites(cfa: Cfa) -> dict[str, tuple[int, int]]:
             if name == "G":
                 name += "r" if 0 in colours[y] else "b"
             found[name, (y, x)] = (y, x)
-    return {name: place for name in ("R", "Gr", "Gb", "B") for (n, _), place in found.items() if n == name}
+    return {
+        name: place
+        for name in ("R", "Gr", "Gb", "B")
+        for (n, _), place in found.items()
+        if n == name
+    }
 
 
 def calibrate(
@@ -133,9 +140,7 @@ def calibrate(
     jobs: int,
 ) -> Calibrated:
     """Return the base model with its numbers fitted to an observation."""
-    switches = tuple(
-        s.upper_dn for s in camera.noise.segment if s.upper_dn is not None
-    )
+    switches = tuple(s.upper_dn for s in camera.noise.segment if s.upper_dn is not None)
     left_out = frozenset([interpolated] if interpolated else [])
     start = camera.black_level - layout.black_dn
     slopes = [s.slope for s in camera.noise.segment]
@@ -151,11 +156,9 @@ def calibrate(
         recorded = _sum(undone, effects)
         fit = fitted(recorded, switches)
         if len(switches) == 1:
-            switches = _moved(seen.levels, left_out, switches, fit, lambda s: fitted(recorded, s))
+            switches = _moved(seen.levels, left_out, switches, fit, partial(fitted, recorded))
             fit = fitted(recorded, switches)
-        model = Model(
-            with_numbers(camera, fit, switches, layout.black_dn), signals_of(layout, fit)
-        )
+        model = Model(with_numbers(camera, fit, switches, layout.black_dn), signals_of(layout, fit))
         effects = _effects(model, layout, seed, jobs)
     offsets = _sum(_rounding(model, layout, fit), effects)
     return Calibrated(model, fit, fitted(offsets, switches), offsets, switches, left_out)
@@ -223,9 +226,7 @@ def _rounding(model: Model, layout: Layout, fit: BaseFit) -> Offsets:
             signal = float(model.signals[e.name][y, x])
             line = float(fit.line_dn2(np.array([signal]))[0])
             mean = layout.black_dn + fit.black_dn[channel] + signal
-            level[e.name, channel], variance[e.name, channel] = rounded(
-                mean, line, layout.white_dn
-            )
+            level[e.name, channel], variance[e.name, channel] = rounded(mean, line, layout.white_dn)
     return Offsets(level, variance)
 
 
@@ -282,11 +283,7 @@ def _moved(
             total += level.dof / 2 * float(np.log(level.variance_dn2 / expected)) ** 2
         return total
 
-    gaps = [
-        sqrt(max(a, b / 100) * b)
-        for a, b in zip(signals, signals[1:], strict=False)
-        if b > 1.02 * a and b > 1.0
-    ]
+    gaps = [sqrt(max(a, b / 100) * b) for a, b in pairwise(signals) if b > 1.02 * a and b > 1.0]
     here = deviance(switches[0])
     best = min(gaps, key=deviance, default=switches[0])
     return (best,) if deviance(best) < here - _SWITCH_DEVIANCE else switches
@@ -360,5 +357,3 @@ def _contradicted(
         if own != recorded:
             found.append(ParameterError("noise.switch_dn", own, recorded, abs(recorded - own) / 4))
     return tuple(found)
-
-

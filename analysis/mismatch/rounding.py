@@ -1,4 +1,4 @@
-"""Mean and variance of a rounded and clipped Gaussian, exactly: Sheppard's 1/12 fails below 0.5 DN."""
+"""Mean and variance of a rounded, clipped Gaussian: Sheppard's 1/12 fails below 0.5 DN."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,7 +38,7 @@ def unrounded(mean_dn: float, variance_dn2: float, white_dn: float) -> tuple[flo
     The inverse of `rounded`, by Newton's steps on both. Where all samples have one code nothing can
     be told: the variance comes back as recorded, and the derivative as infinite.
     """
-    if variance_dn2 > 4 * _WIDE**2 and variance_dn2 ** 0.5 * _REACH < mean_dn:
+    if variance_dn2 > 4 * _WIDE**2 and variance_dn2**0.5 * _REACH < mean_dn:
         return mean_dn, variance_dn2 - 1 / 12, 1.0
     if variance_dn2 <= 1e-4:
         return mean_dn, variance_dn2, np.inf

@@ -1,6 +1,7 @@
 """A second read-out path that the camera model does not have: dual gain."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 from math import sqrt
 
 import numpy as np
@@ -43,7 +44,7 @@ def second_path(state: State) -> Path | None:
     ]
     before = _loglik((state.vector.values[which] - state.null.mean[which]) / state.null.sd[which])
     best: Path | None = None
-    for low, high in zip(means[1:-2], means[2:-1], strict=False):
+    for low, high in pairwise(means[1:-1]):
         switch = sqrt(max(low, high / 50) * high)
         try:
             fit = fit_base(

@@ -56,7 +56,7 @@ class Split:
             for place, exposure in enumerate(sorted(few, key=_brightness)):
                 whole = (0, 1, 0, 2)[place % 4]
                 parts[whole][exposure.name] = tuple(range(len(exposure.frames)))
-        return cls(*parts, _spared(recording))
+        return cls(parts[0], parts[1], parts[2], _spared(recording))
 
 
 def _blocks(frames: int) -> tuple[tuple[int, ...], ...]:
@@ -67,8 +67,10 @@ def _blocks(frames: int) -> tuple[tuple[int, ...], ...]:
 
 def _brightness(exposure: RecordedExposure) -> tuple[float, float, str]:
     light = exposure.light
-    return (exposure.exposure_time_s if light is None else light), exposure.exposure_time_s, (
-        exposure.name
+    return (
+        (exposure.exposure_time_s if light is None else light),
+        exposure.exposure_time_s,
+        (exposure.name),
     )
 
 

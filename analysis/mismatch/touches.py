@@ -1,4 +1,4 @@
-"""Which numbers of the bank an effect may change: those that follow from the measures it declares."""
+"""Which numbers of the bank an effect may change: those that follow from its measures."""
 
 from collections.abc import Sequence
 

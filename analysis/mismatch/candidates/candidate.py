@@ -1,4 +1,4 @@
-"""What an effect needs to be diagnosed: which statistics call for it, and parameters to start from."""
+"""What an effect needs to be diagnosed: statistics that call for it, parameters to start from."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from analysis.mismatch.candidates.candidate import Candidate, Proposal, proposals
-from analysis.mismatch.clues import Clues
+from analysis.mismatch.clues import Clues, alike
 
 _ALONG_ROWS, _ALONG_COLUMNS = "correlation_0_1", "correlation_1_0"
 _NEAR = (_ALONG_ROWS, _ALONG_COLUMNS, "line_correlation", "pixel_variance")
@@ -17,9 +17,7 @@ def _crosstalk(clues: Clues) -> Sequence[Proposal]:
     found: list[Proposal] = []
     for along, rho in (("both", (across + down) / 2), ("rows", across), ("columns", down)):
         if rho > 0:
-            found += proposals(
-                "crosstalk", ["fraction"], fraction=min(rho / 2, 0.15), along=along
-            )
+            found += proposals("crosstalk", ["fraction"], fraction=min(rho / 2, 0.15), along=along)
     return found
 
 
@@ -36,7 +34,7 @@ def _brighter_fatter(clues: Clues) -> Sequence[Proposal]:
 def _filtering(clues: Clues) -> Sequence[Proposal]:
     mono = clues.layout.channels == ("MONO",)
     names = (_ALONG_ROWS, _ALONG_COLUMNS) if mono else ("correlation_0_2", "correlation_2_0")
-    rho = float(np.mean([clues.amplitude(name, lambda place: 1.0)[0] for name in names]))
+    rho = float(np.mean([clues.amplitude(name, alike)[0] for name in names]))
     if rho <= 0:
         return []
     return proposals("spatial_filtering", ["fraction"], fraction=min(rho / 2, 0.15))
@@ -50,8 +48,8 @@ def _memory(clues: Clues) -> Sequence[Proposal]:
         if not clues.null.known[i]:
             continue
         if key.statistic == "line_correlation":
-            axis, lag = key.detail.split(" ")
-            departures.setdefault((axis, int(lag) * step), []).append(
+            axis, number = key.detail.split(" ")
+            departures.setdefault((axis, int(number) * step), []).append(
                 float(clues.vector.values[i] - clues.null.mean[i])
             )
         elif step == 2 and key.statistic in (_ALONG_ROWS, _ALONG_COLUMNS) and key.exposure:

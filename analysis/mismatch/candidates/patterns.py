@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.candidates.candidate import Candidate, Proposal, proposals
-from analysis.mismatch.clues import Clues
+from analysis.mismatch.clues import Clues, alike
 from analysis.mismatch.observe import Place
 
 Array = NDArray[np.float64]
@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 
 def _constant(kind: str, statistic: str) -> Candidate:
     def propose(clues: Clues) -> Sequence[Proposal]:
-        variance, _ = clues.amplitude(statistic, lambda place: 1.0)
+        variance, _ = clues.amplitude(statistic, alike)
         return proposals(kind, ["sigma_dn"], sigma_dn=sqrt(variance)) if variance > 0 else []
 
     return Candidate(kind, (statistic,), propose)
@@ -69,7 +69,7 @@ def _step(clues: Clues, regions: str) -> float:
     """Return the relative step of the gain between two regions."""
     steps = []
     if len(clues.layout.channels) > 1 and regions.startswith("even_odd"):
-        ratio, _ = clues.amplitude("channel_ratio", lambda place: 1.0)
+        ratio, _ = clues.amplitude("channel_ratio", alike)
         green = clues.layout.cfa.value.index("G")
         first_is_odd = green == 1
         if regions == "even_odd_rows":
@@ -83,16 +83,17 @@ def _step(clues: Clues, regions: str) -> float:
             step = along[1::2].mean() - along[0::2].mean()
         else:
             near = max(size // 16, 2)
-            step = along[size // 2 : size // 2 + near].mean() - along[
-                size // 2 - near : size // 2
-            ].mean()
+            step = (
+                along[size // 2 : size // 2 + near].mean()
+                - along[size // 2 - near : size // 2].mean()
+            )
         steps.append(float(step) / clues.scale("gain", channel))
         del n, m
     return float(np.mean(steps)) if steps else 0.0
 
 
 def _imbalance(clues: Clues) -> Sequence[Proposal]:
-    ratio, error = clues.amplitude("channel_ratio", lambda place: 1.0)
+    ratio, error = clues.amplitude("channel_ratio", alike)
     if len(clues.layout.channels) == 1 or abs(ratio) < 2 * error:
         return []
     return proposals(
@@ -107,7 +108,9 @@ def _hot(clues: Clues) -> Sequence[Proposal]:
     clear = values > 5 * noise
     if clear.sum() < 2:
         return []
-    excess = float((values[clear] - 5 * noise).mean())  # exponential: the same mean beyond any start
+    excess = float(
+        (values[clear] - 5 * noise).mean()
+    )  # exponential: the same mean beyond any start
     fraction = float(clear.mean()) * float(np.exp(min(5 * noise / excess, 3.0)))
     return proposals(
         "hot_pixels",
@@ -170,4 +173,3 @@ CANDIDATES = (
     Candidate("hot_pixels", ("outlying_pixels", "one_off_outliers", "fixed_pixel_variance"), _hot),
     Candidate("amp_glow", ("fixed_smooth_variance",), _glow),
 )
-

@@ -95,7 +95,9 @@ CANDIDATES = (
     Candidate(
         "heavy_tailed_read_noise", ("kurtosis", "kurtosis_within_pixels", "variance_spread"), _tails
     ),
-    Candidate("read_noise_spread", ("variance_spread", "variance_persistence", "kurtosis"), _spread),
+    Candidate(
+        "read_noise_spread", ("variance_spread", "variance_persistence", "kurtosis"), _spread
+    ),
     Candidate(
         "rts",
         ("variance_spread", "variance_persistence", "kurtosis", "one_off_outliers",

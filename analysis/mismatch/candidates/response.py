@@ -57,7 +57,8 @@ def _gain_mismatch(clues: Clues) -> Sequence[Proposal]:
     ends = [s.upper_dn for s in clues.camera.noise.segment if s.upper_dn is not None]
     if not ends:
         return []
-    below, above = [], []
+    below: list[float] = []
+    above: list[float] = []
     for place, (value, _) in clues.excess("level").items():
         s = clues.signal(place)
         if s > 0:

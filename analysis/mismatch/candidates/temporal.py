@@ -5,19 +5,19 @@ from math import sqrt
 
 from analysis.mismatch.bank.coherent import Peak
 from analysis.mismatch.candidates.candidate import Candidate, Proposal, proposals
-from analysis.mismatch.clues import Clues
+from analysis.mismatch.clues import Clues, alike
 
 
 def _lines(kind: str, statistic: str) -> Candidate:
     def propose(clues: Clues) -> Sequence[Proposal]:
-        variance, _ = clues.amplitude(statistic, lambda place: 1.0)
+        variance, _ = clues.amplitude(statistic, alike)
         return proposals(kind, ["sigma_dn"], sigma_dn=sqrt(variance)) if variance > 0 else []
 
     return Candidate(kind, (statistic,), propose)
 
 
 def _drift(clues: Clues) -> Sequence[Proposal]:
-    variance, _ = clues.amplitude("frame_variance", lambda place: 1.0)
+    variance, _ = clues.amplitude("frame_variance", alike)
     if variance <= 0:
         return []
     return proposals("black_level_drift", ["sigma_dn"], sigma_dn=sqrt(variance))
@@ -56,8 +56,8 @@ def _line_flicker(clues: Clues) -> Sequence[Proposal]:
 
 
 def _pink(clues: Clues) -> Sequence[Proposal]:
-    variance, _ = clues.amplitude("row_variance", lambda place: 1.0)
-    frame, _ = clues.amplitude("frame_variance", lambda place: 1.0)
+    variance, _ = clues.amplitude("row_variance", alike)
+    frame, _ = clues.amplitude("frame_variance", alike)
     guess = max(variance * 4, frame * 8, 0.0)
     return proposals("pink_noise", ["sigma_dn"], sigma_dn=sqrt(guess)) if guess > 0 else []
 
@@ -101,8 +101,10 @@ def frequencies(clues: Clues) -> list[tuple[float, float, float]]:
             for ay in (0.0, 0.5):
                 fx, fy = peak.fx / 2 + ax, peak.fy / 2 + ay
                 found.append(((fx + 0.5) % 1 - 0.5, (fy + 0.5) % 1 - 0.5, amplitude))
-    if len(clues.layout.channels) > 1:  # what is constant in each plane: stripes and checkerboards of the mosaic
-        frame, _ = clues.amplitude("frame_variance", lambda place: 1.0)
+    if (
+        len(clues.layout.channels) > 1
+    ):  # what is constant in each plane: stripes and checkerboards of the mosaic
+        frame, _ = clues.amplitude("frame_variance", alike)
         if frame > 0:
             found += [(0.5, 0.0, 2 * sqrt(frame)), (0.0, 0.5, 2 * sqrt(frame)),
                       (0.5, 0.5, 2 * sqrt(frame))]  # fmt: skip

@@ -1,0 +1,105 @@
+"""The null of a diagnosis: rounding undone, family-wise control, frames split without loss."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.stats import norm
+from statsmodels.stats.multitest import multipletests
+
+from analysis.mismatch.bank.scalars import gumbel_score, ratio_root
+from analysis.mismatch.null import adjusted
+from analysis.mismatch.rounding import rounded, unrounded
+from analysis.mismatch.split import LEAST_FRAMES, Split
+from dsis.cfa import Cfa
+from dsis.recording import RecordedExposure, Recording, Sensor
+
+# notes/camera.md, section 3: smallest and largest variance of a rounded Gaussian as its mean moves.
+PUBLISHED = {0.2: (0.0124, 0.2500), 0.3: (0.0956, 0.2517), 0.4: (0.2118, 0.2748),
+             0.5: (0.3254, 0.3413), 0.7: (0.5732, 0.5735)}  # fmt: skip
+
+
+@pytest.mark.parametrize("sigma", PUBLISHED)
+def test_rounding_has_the_published_range_of_variances(sigma: float) -> None:
+    means = 100 + np.linspace(0, 1, 201)
+    found = [sigma**2 + rounded(float(mean), sigma**2, 4095)[1] for mean in means]
+    assert min(found) == pytest.approx(PUBLISHED[sigma][0], abs=6e-5)
+    assert max(found) == pytest.approx(PUBLISHED[sigma][1], abs=6e-5)
+
+
+def test_wide_noise_adds_sheppard_s_twelfth() -> None:
+    assert rounded(500.3, 9.0, 4095) == (0.0, 1 / 12)
+    shift, added = rounded(500.3, 0.9, 4095)  # summed exactly, not by the formula
+    assert shift == pytest.approx(0, abs=1e-7)
+    assert added == pytest.approx(1 / 12, abs=1e-6)
+
+
+@given(
+    mean=st.floats(60, 61),
+    sigma=st.floats(0.3, 3.0),
+)
+def test_rounding_is_undone(mean: float, sigma: float) -> None:
+    shift, added = rounded(mean, sigma**2, 4095)
+    back, variance, stretch = unrounded(mean + shift, sigma**2 + added, 4095)
+    assert back == pytest.approx(mean, abs=1e-6)
+    assert variance == pytest.approx(sigma**2, rel=1e-5)
+    assert stretch > 0
+
+
+def test_clipping_at_zero_takes_variance_away() -> None:
+    shift, added = rounded(0.0, 4.0, 4095)
+    draws = np.clip(np.rint(np.random.default_rng(1).normal(0, 2, 400_000)), 0, 4095)
+    assert shift == pytest.approx(draws.mean(), abs=5 * 2 / 400_000**0.5)
+    assert 4 + added == pytest.approx(draws.var(), rel=5 * (3 / 400_000) ** 0.5)
+
+
+@given(st.lists(st.floats(1e-9, 1), min_size=1, max_size=30))
+def test_equal_weights_are_holm_s_procedure(chances: list[float]) -> None:
+    found = adjusted(np.array(chances), np.full(len(chances), 1 / len(chances)))
+    np.testing.assert_allclose(found, multipletests(chances, method="holm")[1], rtol=1e-9)
+
+
+def test_cube_roots_of_mean_squares_are_near_normal() -> None:
+    dof = 20
+    draws = np.random.default_rng(2).chisquare(dof, 100_000) / dof
+    value = np.cbrt(draws)
+    _, sd = ratio_root(1.0, dof)
+    z = (value - (1 - 2 / (9 * dof))) / sd
+    assert abs(z.mean()) < 5 / 100_000**0.5
+    assert z.std() == pytest.approx(1, abs=0.01)
+    assert abs(float((z**3).mean())) < 0.03  # chi-squared itself: 0.63
+
+
+@pytest.mark.parametrize("chance", [0.5, 1e-3, 1e-6])
+def test_a_gumbel_score_is_the_normal_deviate_of_its_chance(chance: float) -> None:
+    scaled = -np.log(-np.log1p(-chance))
+    assert gumbel_score(float(scaled)) == pytest.approx(norm.isf(chance), abs=1e-6)
+
+
+def _recording(frames: list[int]) -> Recording:
+    exposures = tuple(
+        RecordedExposure(
+            f"e{i}", "flat", 0.01 * (i + 1), float(i + 1),
+            tuple(Path(str(k)) for k in range(count)),
+        )
+        for i, count in enumerate(frames)
+    )  # fmt: skip
+    sensor = Sensor(name="s", cfa=Cfa.MONO, black_level=0, white_level=4095, bit_depth=12)
+    return Recording(sensor, exposures, 8, 8, Path())
+
+
+@given(st.lists(st.integers(1, 120), min_size=1, max_size=12))
+def test_every_frame_is_in_one_part(frames: list[int]) -> None:
+    recording = _recording(frames)
+    split = Split.of(recording)
+    for exposure in recording.exposures:
+        parts = [part.get(exposure.name, ()) for part in (split.train, split.select, split.locked)]
+        assert sorted(sum(parts, ())) == list(range(len(exposure.frames)))
+        if len(exposure.frames) >= LEAST_FRAMES:
+            share = len(parts[2]) / len(exposure.frames)
+            assert 1 / 7 <= share <= 0.35  # locked frames run through the whole exposure
+            assert parts[2][0] < len(exposure.frames) / 2 + 1
+        else:
+            assert sum(bool(part) for part in parts) == 1

@@ -4,14 +4,21 @@
 
 `--peer` is the Python of an environment that holds `emva1288` (GPL-3, 1.0.2; it needs numpy < 2):
 it runs there as a program of its own and hands back JSON. Times are the best of three, of reading
-plus computing, and of computing alone from frames that are held in memory.
+plus computing (figures alone, and the whole fit with segments, maps and distribution), and of
+computing alone from frames that are held in memory. The package has one thread; ours has `--jobs`.
+Beneath stand the bounds: what unpacking these files takes by itself, by zlib and by isal, and what
+the package's own loader (Pillow) takes.
 """
 
 import argparse
+import importlib
+import importlib.util
 import json
 import subprocess
 import time
-from collections.abc import Iterator
+import zlib
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +27,7 @@ import numpy as np
 from analysis.photon_transfer import fit_camera
 from analysis.photon_transfer.emva1288 import figures_of_merit
 from analysis.photon_transfer.statistics import expose_statistics
-from dsis.recording import read_recording
+from dsis.recording import png, read_recording
 
 ROUNDS = 3
 TOLERANCE = 0.01
@@ -82,8 +89,16 @@ def best(reader):
         times.append(time.perf_counter() - begun)
     return found, min(times)
 found, reading = best(load)
+begun = time.perf_counter()
+parsed = ParseEmvaDescriptorFile(file, loglevel=logging.ERROR).images
+names_of_files = {name for kinds in parsed.values() for times in kinds.values()
+                  for lights in times.values() for name in lights}
+for name in names_of_files:
+    load(name)
+loading = time.perf_counter() - begun
 remembered_found, computing = best(remembered)
-print(json.dumps({"figures": found, "reading": reading, "computing": computing}))
+print(json.dumps({"figures": found, "reading": reading, "computing": computing,
+                  "loading": loading}))
 """
 
 
@@ -99,8 +114,12 @@ class Held:
         return iter(self._frames[exposure.name])
 
 
-def figures(recording: Any) -> dict[tuple[str, str], float | None]:
-    levels = [s for e in recording.exposures for s in expose_statistics(recording, e)]
+def figures(recording: Any, jobs: int = 1) -> dict[tuple[str, str], float | None]:
+    by_length = sorted(recording.exposures, key=lambda e: -len(e.frames))
+    with ThreadPoolExecutor(jobs) as pool:
+        parts = pool.map(lambda e: (e.name, expose_statistics(recording, e)), by_length)
+    found = dict(parts)
+    levels = [s for e in recording.exposures for s in found[e.name]]
     return {(q.name, q.unit): q.value for q in figures_of_merit(levels)}
 
 
@@ -116,6 +135,7 @@ def best(work: Any) -> tuple[Any, float]:
 def main() -> None:
     parser = argparse.ArgumentParser(description="EMVA 1288's figures beside the emva1288 package")
     parser.add_argument("descriptor", type=Path)
+    parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--peer", required=True, help="Python that has emva1288")
     options = parser.parse_args()
     arguments = [str(options.descriptor), ",".join(COMPARED.values()), str(ROUNDS)]
@@ -127,8 +147,10 @@ def main() -> None:
     held = Held(recording)
     figures(held)  # compiles
     ours, computing = best(lambda: figures(held))
-    _, reading = best(lambda: figures(read_recording(options.descriptor)))
-    _, whole = best(lambda: fit_camera(held))
+    jobs = options.jobs
+    _, reading = best(lambda: figures(read_recording(options.descriptor), jobs))
+    fit_camera(recording, threads=jobs)  # compiles
+    _, whole = best(lambda: fit_camera(read_recording(options.descriptor), threads=jobs))
     print(f"{'quantity':22}{'dsis':>14}{'emva1288':>14}{'difference':>12}")
     for key, name in COMPARED.items():
         value, theirs = ours[key], peer["figures"][name]
@@ -141,8 +163,29 @@ def main() -> None:
     print(f"{'computing, s':22}{computing:14.4f}{peer['computing']:14.4f}"
           f"{peer['computing'] / computing:10.1f} x")  # fmt: skip
     print(f"{'reading + computing, s':22}{reading:14.3f}{peer['reading']:14.3f}"
-          f"{peer['reading'] / reading:10.1f} x")  # fmt: skip
-    print(f"the whole fit with segments, black level, distribution: {whole:.3f} s of computing")
+          f"{peer['reading'] / reading:10.1f} x  ({jobs} threads)")  # fmt: skip
+    print(f"{'reading + whole fit, s':22}{whole:14.3f}{peer['reading']:14.3f}"
+          f"{peer['reading'] / whole:10.1f} x  ({jobs} threads)")  # fmt: skip
+    print(f"the package's loader alone (Pillow): {peer['loading']:.3f} s")
+    bounds(recording, jobs)
+
+
+def bounds(recording: Any, jobs: int) -> None:
+    """Print what unpacking the files takes, nothing else."""
+    files = [path for e in recording.exposures for path in e.frames]
+    contents = [png.chunks(path.read_bytes()) for path in files]
+    packed = [content[1] for content in contents if content is not None]
+    ways: dict[str, Callable[[bytes], bytes]] = {"zlib": zlib.decompress}
+    if importlib.util.find_spec("isal"):
+        ways["isal"] = importlib.import_module("isal.isal_zlib").decompress
+    for name, unpack in ways.items():
+        times = []
+        for threads in (1, jobs):
+            with ThreadPoolExecutor(threads) as pool:
+                _, took = best(lambda: list(pool.map(unpack, packed)))  # noqa: B023 - called here
+            times.append(took)
+        print(f"unpacking {len(packed)} files, {name}: {times[0]:.3f} s, "
+              f"{jobs} threads {times[1]:.3f} s")  # fmt: skip
 
 
 if __name__ == "__main__":

@@ -2,16 +2,20 @@
 
 import argparse
 import errno
+import math
 import os
 import shutil
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 from dsis import __version__
 from dsis.errors import DsisError, InputError
+
+if TYPE_CHECKING:
+    from dsis.session.player import Player
 
 DEMO_SPEC = "demo.toml"
 DEMO_OBSERVERS = 18
@@ -113,20 +117,33 @@ def stimuli(options: argparse.Namespace) -> None:
 
 
 def session(options: argparse.Namespace) -> None:
-    """Run a session with people or robots, or say how far it is."""
+    """Run a session with people or robots, plan it, or say how far it is."""
     from dsis import session as sessions
+    from dsis.manifest import read_manifest
 
     folder: Path = options.stimuli_dir
     seed = 1 if options.seed is None else options.seed
+    setup = None
+    if options.setup is not None:
+        setup = sessions.read_setup(options.setup, read_manifest(folder).session.scale)
     if options.status:
         print(sessions.status(folder))
+    elif options.plan:
+        print(sessions.plan_panel(folder, options.observer, seed=seed, setup=setup))
+    elif options.sheets is not None:
+        people = sessions.write_sheets(folder, options.sheets)
+        print(f"score sheets and plans of {people} observers in {options.sheets}")
+    elif options.typed is not None:
+        stored, blank = sessions.read_typed_votes(folder, options.typed)
+        print(f"{stored} votes stored, {blank} left blank")
+    elif options.forget is not None:
+        sessions.forget(folder, options.forget)
+        print(f"personal data of {options.forget} erased; the votes stay")
     elif options.robots is not None:
-        sessions.run_robots(
-            folder, options.robots, seed=1 if options.seed is None else options.seed
-        )
+        sessions.run_robots(folder, options.robots, seed=seed, setup=setup)
         print(f"{options.robots} SIMULATED observers voted; export: dsis votes {folder} -o DIR")
     elif options.observer is None:
-        fact = "give --observer ID, --robots N or --status"
+        fact = "give --observer ID, --plan, --robots N, --sheets DIR, --typed FILE or --status"
         raise InputError.of(fact, "", "")
     else:
         sessions.serve(
@@ -136,25 +153,57 @@ def session(options: argparse.Namespace) -> None:
             open_browser=not options.no_browser,
             resume=options.resume,
             seed=seed,
+            setup=setup,
+            player=_player(options, folder),
         )
+
+
+def _player(options: argparse.Namespace, folder: Path) -> "Player | None":
+    """Return the program that shows the clips; None: the page does."""
+    if options.player == "page":
+        return None
+    from dsis.manifest import read_manifest
+    from dsis.session.mpv import MpvPlayer
+
+    return MpvPlayer(read_manifest(folder), screen=options.screen, output=options.video_output)
 
 
 def votes(options: argparse.Namespace) -> None:
     """Export the recorded votes."""
     from dsis.session import export_votes
 
-    export_votes(options.stimuli_dir, options.out)
+    export_votes(options.stimuli_dir, options.out, personal=options.personal)
     print(f"votes in {options.out / 'votes.csv'}; report: dsis report {options.out / 'votes.csv'}")
 
 
 def report(options: argparse.Namespace) -> None:
     """Write the MOS report."""
+    from analysis.rejection import read_accepted
     from analysis.report import write_report
 
-    out = options.out or options.votes.with_name(options.votes.stem + "-report")
-    write_report(options.votes, out, tuple(options.scale) if options.scale else None)
+    first: Path = options.votes[0]
+    out = options.out or first.with_name(f"{first.stem}-report")
+    accepted = [] if options.accept is None else read_accepted(options.accept)
+    write_report(
+        options.votes,
+        out,
+        tuple(options.scale) if options.scale else None,
+        rejected=[*options.reject, *accepted],
+        threshold=options.threshold,
+        passes=options.passes,
+    )
     print(_mos_table(out / "mos.csv"))
     print(f"report in {out / 'report.html'}")
+
+
+def plan(options: argparse.Namespace) -> None:
+    """Say how many observers a test needs, or what power a pilot promises."""
+    from analysis.planning.command import describe_plan, write_power
+
+    if options.pilot is None:
+        print(describe_plan(options))
+    else:
+        print(write_power(options))
 
 
 def camera_fit(options: argparse.Namespace) -> None:
@@ -193,6 +242,29 @@ def camera_simulate(options: argparse.Namespace) -> None:
     print(f"{frames} frames in {len(recording.exposures)} exposures, simulated, in {options.out}")
 
 
+def mismatch(options: argparse.Namespace) -> None:
+    """Say where recordings differ from a camera model, and what physics it leaves out."""
+    from analysis.mismatch.folders import diagnose_recordings
+    from analysis.mismatch.report.summary import comparison, summary
+
+    with _progress("mismatch") as progress:
+        found = diagnose_recordings(
+            options.camera,
+            options.recordings,
+            options.out,
+            seed=options.seed or 0,
+            jobs=options.jobs,
+            without=options.without,
+            progress=progress,
+        )
+    for one in found:
+        print(f"# {one.name}\n\n{summary(one.finding)}")
+    if len(found) > 1:
+        print(comparison({one.name: one.finding for one in found}))
+    for one in found:
+        print(f"report in {one.folder / 'report.html'}, model in {one.folder / 'camera.toml'}")
+
+
 @contextmanager
 def _progress(what: str) -> Iterator[Callable[[int, int, str], None]]:
     """Show a bar on a terminal once the work has taken two seconds."""
@@ -224,6 +296,21 @@ def _whole(low: int, high: int = 2**63 - 1) -> Callable[[str], int]:
 
 Add = Callable[..., argparse.ArgumentParser]
 Commands: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"  # noqa: SLF001 - argparse has no public name for it
+
+
+def _number(low: float = -math.inf) -> Callable[[str], float]:
+    def number(text: str) -> float:
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if not math.isfinite(value) or value < low:
+            bound = "" if low == -math.inf else f" from {low:g}"
+            message = f"is {text!r}, must be a number{bound}"
+            raise argparse.ArgumentTypeError(message)
+        return value
+
+    return number
 
 
 def _adder(
@@ -274,7 +361,9 @@ def _parser() -> argparse.ArgumentParser:
     _add_session(add)
     _add_votes(add)
     _add_report(add)
+    _add_plan(add)
     _add_camera(commands)
+    _add_mismatch(add)
     return parser
 
 
@@ -319,9 +408,25 @@ def _add_session(add: Add) -> None:
     )
     sub.add_argument("stimuli_dir", type=Path, metavar="STIMULI_DIR")
     sub.add_argument("--observer", metavar="ID", help="pseudonym of the person who votes")
-    sub.add_argument("--robots", type=_whole(1), metavar="N", help="simulated observers instead")
-    sub.add_argument("--resume", action="store_true", help="go on with an interrupted session")
-    sub.add_argument("--status", action="store_true", help="how far it is; never scores")
+    what = sub.add_mutually_exclusive_group()
+    what.add_argument("--robots", type=_whole(1), metavar="N", help="simulated observers instead")
+    what.add_argument("--resume", action="store_true", help="go on with an interrupted session")
+    what.add_argument("--status", action="store_true", help="how far it is; never scores")
+    plan = "draw, check and store the orders of the panel (or of --observer ID) and show them"
+    what.add_argument("--plan", action="store_true", help=plan)
+    setup = "the laboratory's set-up: consent, hidden references, display"
+    sub.add_argument("--setup", type=Path, metavar="FILE.toml", help=setup)
+    player = "what shows the clips (default: the page)"
+    sub.add_argument("--player", choices=("page", "mpv"), default="page", help=player)
+    sub.add_argument("--screen", type=_whole(0), metavar="N", help="screen for mpv, from 0")
+    output = "mpv's video output (default: gpu; x11 where there is no GPU)"
+    sub.add_argument("--video-output", choices=("gpu", "x11"), default="gpu", help=output)
+    sheets = "printable score sheets and plans, for a player of your own"
+    what.add_argument("--sheets", type=Path, metavar="DIR", help=sheets)
+    typed = "votes typed in from score sheets: observer, presentation, vote"
+    what.add_argument("--typed", type=Path, metavar="FILE.csv", help=typed)
+    forget = "erase the personal data of an observer"
+    what.add_argument("--forget", metavar="ID", help=forget)
     port = "port on 127.0.0.1 (default: a free one)"
     sub.add_argument("--port", type=_whole(0), default=0, help=port)
     sub.add_argument("--no-browser", action="store_true", help="print the address only")
@@ -337,6 +442,8 @@ def _add_votes(add: Add) -> None:
     )
     sub.add_argument("stimuli_dir", type=Path, metavar="STIMULI_DIR")
     sub.add_argument("-o", "--out", type=Path, required=True, metavar="DIR")
+    personal = "with people.csv: age groups, screening; never without this word"
+    sub.add_argument("--personal", action="store_true", help=personal)
 
 
 def _add_report(add: Add) -> None:
@@ -346,10 +453,56 @@ def _add_report(add: Add) -> None:
         "Write the MOS report of a table of votes.",
         "report votes/votes.csv --out report",
     )
-    sub.add_argument("votes", type=Path, metavar="VOTES.csv")
+    files = "votes.csv, wide CSV, sureal's .json or a stimuli folder; several: laboratories"
+    sub.add_argument("votes", type=Path, nargs="+", metavar="VOTES.csv", help=files)
     sub.add_argument("--out", type=Path, metavar="DIR", help="default: VOTES-report")
+    _add_scale(sub)
+    reject = "observers to leave out: your decision, never the report's"
+    sub.add_argument("--reject", nargs="+", default=[], metavar="OBSERVER", help=reject)
+    accept = "an earlier report's rejections.csv, with accept set to true where you agree"
+    sub.add_argument("--accept", type=Path, metavar="FILE", help=accept)
+    threshold = "standard deviations beyond which votes are removed (default: 2)"
+    sub.add_argument("--threshold", type=_number(1.0), default=2.0, metavar="SD", help=threshold)
+    passes = "how often they are (default: 1)"
+    sub.add_argument("--passes", type=_whole(1, 100), default=1, metavar="N", help=passes)
+
+
+def _add_scale(sub: argparse.ArgumentParser) -> None:
     ends = "ends of the scale, worst first; default: datapackage.json"
-    sub.add_argument("--scale", nargs=2, type=int, metavar=("LOW", "HIGH"), help=ends)
+    sub.add_argument("--scale", nargs=2, type=_number(), metavar=("LOW", "HIGH"), help=ends)
+
+
+def _add_plan(add: Add) -> None:
+    sub = add(
+        "plan",
+        plan,
+        "Say how many observers a test needs, from a difference of MOS or from a pilot's votes.",
+        "plan --difference 0.5 --sd 1 --comparisons 12",
+    )
+    difference = "of two mean opinion scores that shall be shown, grades"
+    sub.add_argument("--difference", type=_number(), metavar="GRADES", help=difference)
+    sd = "of an observer's difference of two votes (of votes, with --groups), grades"
+    sub.add_argument("--sd", type=_number(), metavar="GRADES", help=sd)
+    comparisons = "how many differences are tested (default: 1)"
+    sub.add_argument("--comparisons", type=_whole(1), default=1, metavar="N", help=comparisons)
+    correction = "for several comparisons (default: bonferroni)"
+    sub.add_argument(
+        "--correction", choices=("bonferroni", "holm"), default="bonferroni", help=correction
+    )
+    groups = "two groups of observers, one for each score, instead of one that judges both"
+    sub.add_argument("--groups", action="store_true", help=groups)
+    power = "chance to show the difference (default: 0.8)"
+    sub.add_argument("--power", type=_number(), default=0.8, metavar="P", help=power)
+    alpha = "chance to show one that is not there (default: 0.05)"
+    sub.add_argument("--alpha", type=_number(), default=0.05, metavar="P", help=alpha)
+    pilot = "votes of a pilot: power curves, simulated with the observers fitted to it"
+    sub.add_argument("--pilot", type=Path, metavar="VOTES.csv", help=pilot)
+    _add_scale(sub)
+    sizes = "numbers of observers to try with a pilot"
+    sub.add_argument("--observers", type=_whole(2, 10_000), nargs="+", metavar="N", help=sizes)
+    out = "folder for the table and the figure of a pilot (default: PILOT-plan)"
+    sub.add_argument("--out", type=Path, metavar="DIR", help=out)
+    _add_seed(sub, "default: 1")
 
 
 def _add_camera(commands: Commands) -> None:
@@ -386,6 +539,26 @@ def _add_camera(commands: Commands) -> None:
     sub.add_argument("-o", "--out", type=Path, required=True, metavar="DIR")
     same = "fixed patterns from the maps.npz beside camera.toml instead of a new sensor's"
     sub.add_argument("--same-sensor", action="store_true", help=same)
+    _add_jobs(sub)
+    _add_seed(sub, "default: 0")
+
+
+def _add_mismatch(add: Add) -> None:
+    sub = add(
+        "mismatch",
+        mismatch,
+        "Say where recordings differ from a camera model, and what physics it leaves out.",
+        "mismatch camera.toml recording -o diagnosis",
+    )
+    sub.add_argument("camera", type=Path, metavar="camera.toml")
+    recordings = "folder with recording.toml, or an EMVA 1288 descriptor file; one or several"
+    sub.add_argument("recordings", type=Path, nargs="+", metavar="RECORDING", help=recordings)
+    out = "mismatch.json, report.html, camera.toml; of several recordings: a folder for each"
+    sub.add_argument("-o", "--out", type=Path, required=True, metavar="DIR", help=out)
+    without = "effects that must not be named; may be given several times"
+    sub.add_argument(
+        "--without", nargs="+", action="extend", default=[], metavar="EFFECT", help=without
+    )
     _add_jobs(sub)
     _add_seed(sub, "default: 0")
 

@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import OpenImageIO as oiio  # noqa: N813 - the name that its own examples use
@@ -69,9 +70,7 @@ def natural_order(path: Path) -> list[tuple[int, int, str]]:
 
 def info(path: Path) -> ImageInfo:
     """Return what the header of an image says; raise `InputError` where it is no image."""
-    opened = oiio.ImageInput.open(str(path))
-    if opened is None:
-        raise InputError.of(path, "", f"is no readable image: {oiio.geterror().strip()}")
+    opened = _opened(path)
     spec = opened.spec()
     opened.close()
     floating = spec.format.basetype in (oiio.HALF, oiio.FLOAT, oiio.DOUBLE)
@@ -84,15 +83,9 @@ def read(path: Path) -> NDArray[np.float32]:
     Grey images fill all three channels, alpha is dropped. Raises `InputError` where the file is
     damaged or holds values that are not finite.
     """
-    opened = oiio.ImageInput.open(str(path))
-    if opened is None:
-        raise InputError.of(path, "", f"is no readable image: {oiio.geterror().strip()}")
-    pixels = opened.read_image(format=oiio.FLOAT)
-    error = opened.geterror().strip()
-    opened.close()
-    if pixels is None or error:
-        raise InputError.of(path, "", f"is damaged: {error or 'no pixels'}")
-    image = np.asarray(pixels, np.float32)
+    opened = _opened(path)
+    pixels = _whole(path, opened, oiio.FLOAT)
+    image = pixels.astype(np.float32, copy=False)
     image = image[:, :, :3] if image.shape[2] >= 3 else np.repeat(image[:, :, :1], 3, axis=2)
     if not np.isfinite(image).all():
         raise InputError.of(path, "", "holds values that are not finite (NaN or infinite)")
@@ -148,14 +141,7 @@ def read_codes(path: Path) -> NDArray[np.unsignedinteger]:
         opened.close()
         fact = f"holds {spec.nchannels} channels of type {kind}, must hold one of unsigned codes"
         raise InputError.of(path, "", fact)
-    pixels = opened.read_image(format=spec.format)
-    error = opened.geterror().strip()
-    opened.close()
-    if pixels is None or error:
-        # The libraries of the formats complain once a strip: the first line says it.
-        reason = error.splitlines() or ["no pixels"]
-        raise InputError.of(path, "", f"is damaged: {reason[0].strip()}")
-    stored: NDArray[np.unsignedinteger] = np.asarray(pixels)[:, :, 0]
+    stored: NDArray[np.unsignedinteger] = _whole(path, opened, spec.format)[:, :, 0]
     if path.suffix.lower() in (".pgm", ".pnm"):
         return _unstretched(stored, _netpbm_maximum(path))
     container = 8 * stored.itemsize
@@ -166,9 +152,26 @@ def read_codes(path: Path) -> NDArray[np.unsignedinteger]:
 def _opened(path: Path) -> oiio.ImageInput:
     opened = oiio.ImageInput.open(str(path))
     if opened is None:
-        reason = oiio.geterror().strip().splitlines() or ["unknown"]
-        raise InputError.of(path, "", f"is no readable image: {reason[0]}")
+        reason = _first_line(oiio.geterror()) or "unknown"
+        raise InputError.of(path, "", f"is no readable image: {reason}")
     return opened
+
+
+def _whole(
+    path: Path, opened: oiio.ImageInput, form: oiio.TypeDesc | oiio.BASETYPE
+) -> NDArray[Any]:
+    """Return the pixels of an opened file and close it; raise `InputError` where it is damaged."""
+    pixels = opened.read_image(format=form)
+    error = opened.geterror()
+    opened.close()
+    if pixels is None or error.strip():
+        raise InputError.of(path, "", f"is damaged: {_first_line(error) or 'no pixels'}")
+    return np.asarray(pixels)
+
+
+def _first_line(complaint: str) -> str:
+    """Return the first line: the libraries of the formats complain once a strip."""
+    return next((line.strip() for line in complaint.splitlines() if line.strip()), "")
 
 
 def _netpbm_maximum(path: Path) -> int:

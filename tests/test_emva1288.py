@@ -73,10 +73,12 @@ def test_the_shipped_camera_is_that_fit(ccd: Fit) -> None:
 def test_fit_simulate_fit_gives_the_same_effects(
     ccd: Fit, shared_data: Path, tmp_path: Path
 ) -> None:
-    """A new sensor of the same statistics: dark current, DSNU and PRNU come back."""
+    """A new sensor of the same statistics: dark current and the pattern's parts come back."""
     like = read_recording(shared_data / "emva1288_ccd12" / "EMVA1288_Data.txt")
     again = fit_camera(simulate_like(ccd.camera, like, tmp_path / "made"))
-    assert {effect.kind for effect in ccd.effects} == {"dark_current", "dsnu", "prnu"}
+    assert {effect.kind for effect in ccd.effects} == {
+        "dark_current", "dsnu", "row_fpn", "column_fpn", "prnu",
+    }  # fmt: skip
     for first, second in zip(ccd.effects, again.effects, strict=True):
         assert first.kind == second.kind
         error = np.hypot(first.standard_error, second.standard_error)

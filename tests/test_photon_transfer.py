@@ -48,6 +48,10 @@ class Exposure:
     light: float | None
     stack: np.ndarray
 
+    @property
+    def frames(self) -> np.ndarray:
+        return self.stack
+
 
 @dataclass(frozen=True)
 class Recording:
@@ -79,6 +83,7 @@ def record(
     gains: tuple[tuple[float, float], tuple[float, float]] = ((0.6, 1.0), (1.0, 0.7)),
     time_per_dn: float = 1e-5,
     dark_dn_per_s: float = 0.0,
+    sensor_seed: int = 99,
 ) -> Recording:
     """Return a recording of uniform flats; level 0 is a dark. Colours differ by `gains`."""
     grid = PixelGrid(*size, made.cfa)
@@ -92,7 +97,7 @@ def record(
             np.float32
         )
         draw = Draw(seed, (f"{number}",))
-        codes = [made.expose(clean, draw, Draw(99), t, grid) for t in range(frames)]
+        codes = [made.expose(clean, draw, Draw(sensor_seed), t, grid) for t in range(frames)]
         stack = (np.stack(codes) + made.black_level).astype(np.uint16)
         kind = "flat" if level else "dark"
         exposures.append(Exposure(f"{kind}-{number:02}", kind, seconds, level or None, stack))
@@ -169,12 +174,28 @@ def test_rounding_is_undone(mean: float, sd: float) -> None:
         assert found.variance_dn2 == pytest.approx(sd**2, abs=1e-4)
 
 
+def patterned(made: Camera) -> Camera:
+    """Return the camera with a fixed pattern of pixels, columns and gains."""
+    effects = (("dsnu", "sigma_dn", 5.0), ("prnu", "sigma_percent", 1.0),
+               ("column_fpn", "sigma_dn", 3.0))  # fmt: skip
+    links = tuple(registry()[kind].model_validate({key: value}) for kind, key, value in effects)
+    return made.model_copy(update={"effect": links})
+
+
 def misses(fit: Fit, made: Camera) -> dict[str, float]:
-    """Return how far each parameter is off, in its own standard errors."""
+    """Return how far each parameter is off, in its own standard errors; nan where not found."""
     found = {"black": (fit.black_dn - made.black_level) / (fit.black_se_dn or np.nan)}
     for k, (line, true) in enumerate(zip(fit.segments.lines, made.noise.segment, strict=True)):
         found[f"slope {k}"] = (line.slope_dn - true.slope) / line.slope_se_dn
         found[f"intercept {k}"] = (line.intercept_dn2 - true.intercept) / line.intercept_se_dn2
+    fitted = {effect.kind: effect for effect in fit.effects}
+    for true_effect in made.effect:
+        kind, found_effect = true_effect.kind, fitted.get(true_effect.kind)
+        if found_effect is None:
+            found[kind] = np.nan
+            continue
+        true_value = getattr(true_effect, found_effect.parameter)
+        found[kind] = (found_effect.value - true_value) / found_effect.standard_error
     return found
 
 

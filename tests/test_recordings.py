@@ -16,6 +16,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
+from dsis import imagefile
 from dsis.cfa import Cfa
 from dsis.errors import InputError
 from dsis.imagefile import codes_info, read_codes
@@ -528,6 +529,23 @@ class TestBroken:
         with pytest.raises(InputError, match=r"b\.tif") as refused:
             stream()
         assert "damaged" in str(refused.value) or "no readable image" in str(refused.value)
+        assert len(str(refused.value).splitlines()) == 1
+
+    @pytest.mark.parametrize("share", [0.02, 0.3, 0.9])
+    def test_a_truncated_picture_is_refused_in_one_line(self, tmp_path: Path, share: float) -> None:
+        """As source of a test's content; the TIFF library complains of every strip by itself."""
+        path = tmp_path / "picture.tif"
+        noise = np.random.default_rng(1).uniform(size=(200, 300, 3)).astype(np.float32)
+        imagefile.write(path, noise, "tiff16")
+        whole = path.read_bytes()
+        path.write_bytes(whole[: int(share * len(whole))])
+
+        def use() -> None:
+            imagefile.info(path)
+            imagefile.read(path)
+
+        with pytest.raises(InputError, match=r"picture\.tif") as refused:
+            use()
         assert len(str(refused.value).splitlines()) == 1
 
     def test_a_code_above_the_white_level(self, tmp_path: Path) -> None:

@@ -6,10 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.photon_transfer.black import DarkLine
-from analysis.photon_transfer.quantity import Quantity
+from analysis.photon_transfer.parts import P_SEEN, Component
+from analysis.photon_transfer.patterns import FixedPatterns
 from dsis.effects import Effect, registry
 
-LEAST_Z = 3.0  # standard errors from which a variance or a growth is taken for real
+LEAST_Z = 3.0  # standard errors from which a growth is taken for real
 
 
 @dataclass(frozen=True)
@@ -36,29 +37,34 @@ class FittedEffect:
 
 
 def effects_of(
-    darks: Mapping[str, DarkLine | None], figures: Sequence[Sequence[Quantity]], step_dn: int
+    current: FittedEffect | None, patterns: FixedPatterns, step_dn: int
 ) -> tuple[FittedEffect, ...]:
-    """Return dark current, DSNU, PRNU and coarse codes as far as they are certain.
+    """Return dark current, fixed patterns by their parts and coarse codes, as far as certain.
 
     Parameters
     ----------
-    darks
-        The dark line of each channel; dark currents are pooled by their errors.
-    figures
-        EMVA 1288's figures of each channel; non-uniformities are pooled as mean squares.
+    current
+        The dark current, see `pooled_current`.
+    patterns
+        Of darks and of gains; the channels' variances are pooled.
     step_dn
         Greatest common step of the codes, DN.
     """
+    dark, gain = list(patterns.dark.values()), list(patterns.gain.values())
     found = [
-        _dark_current(darks),
-        _pattern("dsnu", "sigma_dn", ("DSNU1288", "DN"), figures),
-        _pattern("prnu", "sigma_percent", ("PRNU1288", "%"), figures),
+        current,
+        _part("dsnu", "sigma_dn", [p.pixel for p in dark]),
+        _part("row_fpn", "sigma_dn", [p.row for p in dark], shared=True),
+        _part("column_fpn", "sigma_dn", [p.column for p in dark], shared=True),
+        _part("prnu", "sigma_percent", [p.pixel for p in gain], scale=100.0),
+        _shading(patterns.falloff),
         FittedEffect("quantisation", "step_dn", float(step_dn), 0.0) if step_dn > 1 else None,
     ]
     return tuple(effect for effect in found if effect is not None)
 
 
-def _dark_current(darks: Mapping[str, DarkLine | None]) -> FittedEffect | None:
+def pooled_current(darks: Mapping[str, DarkLine | None]) -> FittedEffect | None:
+    """Return the channels' dark current, pooled by their errors; None where it is not certain."""
     known = [
         (dark.current_dn_per_s, dark.current_se_dn_per_s)
         for dark in darks.values()
@@ -74,18 +80,33 @@ def _dark_current(darks: Mapping[str, DarkLine | None]) -> FittedEffect | None:
     return FittedEffect("dark_current", "dn_per_s", mean, mean_se)
 
 
-def _pattern(
-    kind: str, parameter: str, figure: tuple[str, str], figures: Sequence[Sequence[Quantity]]
+def _part(
+    kind: str,
+    parameter: str,
+    channels: Sequence[Component],
+    *,
+    scale: float = 1.0,
+    shared: bool = False,
 ) -> FittedEffect | None:
-    found = [q for channel in figures for q in channel if (q.name, q.unit) == figure]
-    known = [(q.value, q.standard_error) for q in found if q.value and q.standard_error]
-    if not known:
+    """Return the pooled standard deviation; None where noise and finer parts explain it.
+
+    `shared`: two channels each have the lines in common, so half of them count for the error.
+    """
+    if not channels or min(c.p for c in channels) * len(channels) > P_SEEN:
         return None
-    value, error = np.array(known, float).T
-    # A channel without a value has a variance that noise explains: it counts as 0.
-    square = float((value**2).sum()) / len(found)
-    square_se = float(np.sqrt(((2 * value * error) ** 2).sum())) / len(found)
-    if square < LEAST_Z * square_se:
+    variance = float(np.mean([c.variance for c in channels]))
+    independent = len(channels) / 2 if shared and len(channels) > 1 else len(channels)
+    mean_square = np.mean([c.standard_error**2 for c in channels])
+    error = float(np.sqrt(mean_square / independent))
+    if variance <= 0:
         return None
-    root = float(np.sqrt(square))
-    return FittedEffect(kind, parameter, root, square_se / (2 * root))
+    # The root of an unbiased variance is too small by its variance / 8: few lines make it seen.
+    relative = error / variance
+    sd = float(np.sqrt(variance)) * (1 + relative**2 / 8)
+    return FittedEffect(kind, parameter, scale * sd, scale * sd * relative / 2)
+
+
+def _shading(falloff: tuple[float, float] | None) -> FittedEffect | None:
+    if falloff is None:
+        return None
+    return FittedEffect("shading", "falloff_percent", 100 * falloff[0], 100 * falloff[1])

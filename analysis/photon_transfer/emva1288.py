@@ -16,12 +16,12 @@ from analysis.photon_transfer.black import dark_line
 from analysis.photon_transfer.quantity import Quantity
 from analysis.photon_transfer.rounding import SHEPPARD_DN2
 from analysis.photon_transfer.statistics import LevelStatistics
+from dsis.recording.hygiene import CLIPPED_SHARE
 
 Floats = NDArray[np.float64]
 
 SENSITIVITY_END = 0.7  # of saturation: gain and responsivity
 LINEARITY_RANGE = (0.05, 0.95)  # of saturation: linearity error
-CLIPPED_SHARE = 1e-4  # a level with more samples at the white level is clipped
 LEAST_STACK = 4  # frames from which a fixed pattern is worth stating
 
 

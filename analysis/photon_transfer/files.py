@@ -69,7 +69,8 @@ def camera_text(fit: Fit, origin: str = "") -> str:
     )
     if fit.black_se_dn is not None:
         comments.append(
-            f"black_level = {fit.black_dn:.6g} +- {fit.black_se_dn:.2g} DN, of this sensor"
+            f"black_level = {fit.black_dn:.6g} +- {fit.black_se_dn:.2g} DN; of this one sensor "
+            f"+- {fit.black_noise_se_dn:.2g} DN"
         )
     for number, switch in enumerate(fit.segments.switches):
         comments.append(
@@ -107,7 +108,9 @@ def fit_values(fit: Fit) -> dict[str, Any]:
     """Return every number of a fit as plain values, as JSON holds them; nan becomes null."""
     values = asdict(replace(fit, maps=None))  # the maps have a file of their own
     del values["maps"]
-    values["black_level_is"] = "of this sensor: black_se_dn is temporal noise alone"
+    values["black_level_is"] = (
+        "of all such sensors: black_se_dn holds the fixed pattern; black_noise_se_dn does not"
+    )
     values["segments"]["error_of_intervals"] = "standard errors; switches: 95 % intervals"
     plain: dict[str, Any] = {"schema": SCHEMA, **_plain(values)}
     return plain
@@ -129,7 +132,9 @@ def _plain(value: Any) -> Any:
 
 def summary(fit: Fit) -> str:
     """Return the fit as Markdown: model, quantities, channels, remarks."""
-    black = "nominal" if fit.black_se_dn is None else f"{fit.black_se_dn:.2g}"
+    black = "nominal"
+    if fit.black_se_dn is not None:
+        black = f"standard error {fit.black_se_dn:.2g}, of this sensor {fit.black_noise_se_dn:.2g}"
     lines = [f"# {fit.name}", "", "| segment | from DN | slope DN | intercept DN^2 |"]
     lines.append("|---|---|---|---|")
     starts = ["0"] + [f"{s.low_dn:.5g} .. {s.high_dn:.5g}" for s in fit.segments.switches]
@@ -139,7 +144,7 @@ def summary(fit: Fit) -> str:
             f"| {number} | {start} | {slope} | "
             f"{line.intercept_dn2:.5g} +- {line.intercept_se_dn2:.2g} |"
         )
-    lines += ["", f"Black level {fit.black_dn:.6g} DN (of this sensor; standard error {black}). "]
+    lines += ["", f"Black level {fit.black_dn:.6g} DN ({black}). "]
     misfit = f"{fit.segments.deviance:.4g} / {fit.segments.dof}"
     lines[-1] += f"Misfit: deviance / dof = {misfit}."
     if math.isfinite(fit.homogeneity_p):

@@ -12,12 +12,11 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
-from analysis.photon_transfer.beyond import FittedEffect, effects_of
+from analysis.photon_transfer.beyond import FittedEffect, effects_of, pooled_current
 from analysis.photon_transfer.black import DarkLine
 from analysis.photon_transfer.distribution import Distribution, noise_distribution
 from analysis.photon_transfer.emva1288 import figures_of_merit
 from analysis.photon_transfer.levels import (
-    CLIPPED_SHARE,
     FittedLevel,
     dark_of,
     leave_out,
@@ -29,22 +28,23 @@ from analysis.photon_transfer.levels import (
 from analysis.photon_transfer.lines import Line, Points
 from analysis.photon_transfer.model_figures import model_figures
 from analysis.photon_transfer.patterns import PatternSums
+from analysis.photon_transfer.pedestal import black_level
 from analysis.photon_transfer.quantity import Quantity
 from analysis.photon_transfer.recorded import Recorded, channel_names
 from analysis.photon_transfer.remarks import (
     CONVERTER,
-    DIFFERENT_P,
     SATURATED,
     UNREACHED,
     remark_on_fit,
     remarks_on_clipped_darks,
+    remarks_on_patterns,
 )
 from analysis.photon_transfer.segments import SegmentFit, fit_segments, lines_between
 from analysis.photon_transfer.statistics import LevelStatistics, expose_statistics
-from analysis.photon_transfer.watch import Watch
 from dsis.camera import BaseNoise, Camera, Segment
 from dsis.cfa import Cfa
 from dsis.errors import InputError
+from dsis.recording.hygiene import CLIPPED_SHARE, Inspection
 from dsis.simulate.maps import SensorMaps
 
 Progress = Callable[[int, int, str], None]
@@ -78,8 +78,12 @@ class Fit:
     name, cfa, white_level, bit_depth
         The sensor's.
     black_dn, black_se_dn
-        Black level over all channels, of this sensor: the error is temporal noise alone (another
-        sensor's fixed pattern has another mean), None where darks are missing (nominal level).
+        Black level of such sensors, over all channels. The error is that of temporal noise and of
+        this one sensor's fixed pattern, whose mean is part of what was measured; None where darks
+        are missing (nominal level).
+    black_noise_se_dn
+        The part of it that is temporal noise: the error of this sensor's own black level, which is
+        what slopes and intercepts depend on, for flats hold the same pattern.
     segments
         Slopes (DN), intercepts (DN^2, rounding's 1/12 taken off) and switches (DN above black).
     levels
@@ -98,9 +102,11 @@ class Fit:
     distribution
         Noise at one level, for the figure; None where there is no usable flat.
     effects
-        Dark current, DSNU, PRNU and coarse codes where they are certain: part of the camera.
+        Dark current, fixed patterns by their parts, shading and coarse codes where they are
+        certain: part of the camera.
     maps
-        Offset and gain of every pixel; None with fewer than four darks or flats of use.
+        Offset and gain of every pixel, best linear estimates; None with fewer than four darks or
+        flats of use.
     remarks
         What limits these numbers, in sentences.
     """
@@ -111,6 +117,7 @@ class Fit:
     bit_depth: int
     black_dn: float
     black_se_dn: float | None
+    black_noise_se_dn: float | None
     segments: SegmentFit
     levels: tuple[FittedLevel, ...]
     channels: dict[str, ChannelFit]
@@ -165,7 +172,7 @@ def fit_camera(
     progress: Progress | None = None,
     distribution_of: str | None = None,
 ) -> Fit:
-    """Return the camera model of a recording, in one pass over its frames.
+    """Return the camera model of a recording, in one pass over its frames (see `_measured`).
 
     Parameters
     ----------
@@ -186,18 +193,20 @@ def fit_camera(
         Where no camera can be fitted: why each exposure is of no use.
     """
     remarks: list[str] = []
-    watch, patterns = Watch(recording.sensor.white_level), PatternSums()
-    measured = _measure(recording, watch, patterns, threads, progress)
-    step = watch.step_dn()
-    remarks += _remarks_on_frames(recording, watch, step)
+    measured, inspection, sums = _measured(recording, threads, progress)
+    step = inspection.step_dn()
+    remarks += _remarks_on_frames(recording, inspection, step)
     names = list(dict.fromkeys(np.ravel(channel_names(recording.sensor.cfa)).tolist()))
     darks = {name: dark_of(measured, name, step) for name in names}
-    black, black_se = _black(recording, darks, remarks)
     levels = levels_of(measured, darks, recording.sensor.black_level, step)
     saturation = saturation_of(levels)
     levels = leave_out(levels, saturation, remarks)
+    sums.without(recording, {v.statistics.exposure for v in levels if v.left_out})
+    current = pooled_current(darks)
+    patterns = sums.patterns(recording, levels, 0.0 if current is None else current.value)
+    black = black_level(recording.sensor.black_level, darks, patterns.dark, remarks)
     points = points_of(levels)
-    found = _fit(recording, levels, points, segments, black_se or 0.0)
+    found = _fit(recording, levels, points, segments, black.noise_se_dn or 0.0)
     levels = [with_residual(level, found) for level in levels]
     lines = {}
     for name in names:
@@ -205,7 +214,7 @@ def fit_camera(
         lines[name] = lines_between(own, found.switches)
     alike = _homogeneity(found, lines, points.scattered(found.scatter))
     used = [level for level in levels if not level.left_out and level.statistics.kind == "flat"]
-    full, full_means = _full_well(recording, levels, saturation, black)
+    full, full_means = _full_well(inspection.white_level, levels, saturation, black.level_dn)
     channels = {
         name: ChannelFit(
             darks[name],
@@ -216,16 +225,15 @@ def fit_camera(
     }
     remarks += remarks_on_clipped_darks(measured, recording.sensor.black_level)
     remark_on_fit(found, alike, darks, levels, remarks, full_well_means=full_means)
-    effects = effects_of(darks, [c.figures for c in channels.values()], step)
-    current = sum(e.value for e in effects if e.kind == "dark_current")
-    patterns.without(recording, {v.statistics.exposure for v in levels if v.left_out})
+    remarks += remarks_on_patterns(patterns)
     return Fit(
         name=recording.sensor.name,
         cfa=recording.sensor.cfa,
         white_level=float(recording.sensor.white_level),
         bit_depth=recording.sensor.bit_depth,
-        black_dn=black,
-        black_se_dn=black_se,
+        black_dn=black.level_dn,
+        black_se_dn=black.se_dn,
+        black_noise_se_dn=black.noise_se_dn,
         segments=found,
         levels=tuple(levels),
         channels=channels,
@@ -236,38 +244,49 @@ def fit_camera(
         full_well_means=full_means,
         quantities=model_figures(found, full, full_means),
         distribution=noise_distribution(recording, _chosen(distribution_of, used, recording)),
-        effects=effects,
-        maps=patterns.maps(recording, levels, current),
+        effects=effects_of(current, patterns, step),
+        maps=patterns.maps,
         remarks=tuple(dict.fromkeys(remarks)),
     )
 
 
 def _full_well(
-    recording: Recorded, levels: Sequence[FittedLevel], saturation: float | None, black: float
+    white: float, levels: Sequence[FittedLevel], saturation: float | None, black: float
 ) -> tuple[float, str]:
     """Return the largest signal, DN above black, and what it is."""
     if saturation is not None:
         return saturation, SATURATED
     flats = [level for level in levels if level.statistics.kind == "flat"]
     if any(level.statistics.clipped_high > CLIPPED_SHARE for level in flats):
-        return recording.sensor.white_level - black, CONVERTER
+        return white - black, CONVERTER
     return max(level.x_dn for level in flats if not level.left_out), UNREACHED
 
 
-def _measure(
-    recording: Recorded,
-    watch: Watch,
-    patterns: PatternSums,
-    threads: int,
-    progress: Progress | None,
-) -> list[LevelStatistics]:
-    """Return the statistics of darks and flats, in the recording's order."""
+def _measured(
+    recording: Recorded, threads: int, progress: Progress | None
+) -> tuple[list[LevelStatistics], Inspection, PatternSums]:
+    """Return what one pass over darks and flats shows.
+
+    Codes in steps may not reach the white level: where the last step ends below it, a second pass
+    counts as clipped what is at the last step.
+    """
+    white = float(recording.sensor.white_level)
+    measured, inspection, sums = _pass(recording, white, threads, progress)
+    short = white % inspection.step_dn()
+    return _pass(recording, white - short, threads, None) if short else (measured, inspection, sums)
+
+
+def _pass(
+    recording: Recorded, white: float, threads: int, progress: Progress | None
+) -> tuple[list[LevelStatistics], Inspection, PatternSums]:
+    """Return the statistics of darks and flats, in the recording's order, and what was seen."""
     exposures = [e for e in recording.exposures if str(e.kind) in ("dark", "flat")]
+    inspection, sums = Inspection(white), PatternSums()
     done, lock = 0, Lock()
 
     def measure(exposure: Any) -> list[LevelStatistics]:
         nonlocal done
-        part = expose_statistics(recording, exposure, watch, patterns)
+        part = expose_statistics(recording, exposure, inspection, sums)
         with lock:
             done += 1
             if progress is not None:
@@ -275,15 +294,19 @@ def _measure(
         return part
 
     with ThreadPoolExecutor(max(threads, 1)) as pool:
-        parts = list(pool.map(measure, exposures))
-    copied = watch.copied()
-    return [replace(s, copied_frames=s.exposure in copied) for part in parts for s in part]
+        # The longest first: no thread is left with a long one while others have nothing to do.
+        order = sorted(range(len(exposures)), key=lambda i: -len(exposures[i].frames))
+        running = {i: pool.submit(measure, exposures[i]) for i in order}
+        parts = [running[i].result() for i in range(len(exposures))]
+    copied = inspection.copied_exposures()
+    measured = [replace(s, copied_frames=s.exposure in copied) for part in parts for s in part]
+    return measured, inspection, sums
 
 
-def _remarks_on_frames(recording: Recorded, watch: Watch, step_dn: int) -> list[str]:
+def _remarks_on_frames(recording: Recorded, inspection: Inspection, step_dn: int) -> list[str]:
     """Return what the frames show of themselves: copies, clipping, odd codes, scenes."""
     # Levels at the white level are named where they are left out.
-    found = [r for r in watch.remarks(recording.exposures) if "at the white level" not in r]
+    found = [r for r in inspection.remarks(recording.exposures) if "at the white level" not in r]
     scenes = sum(str(e.kind) not in ("dark", "flat") for e in recording.exposures)
     if scenes:
         found.append(f"{scenes} exposure(s) of kind scene are not used.")
@@ -293,31 +316,6 @@ def _remarks_on_frames(recording: Recorded, watch: Watch, step_dn: int) -> list[
             "the camera model has the effect quantisation."
         )
     return found
-
-
-def _black(
-    recording: Recorded, darks: dict[str, DarkLine | None], remarks: list[str]
-) -> tuple[float, float | None]:
-    """Return the black level over all channels and its error, scaled where channels differ."""
-    known = [dark for dark in darks.values() if dark is not None]
-    if not known:
-        remarks.append(
-            f"No usable darks: the black level is the nominal {recording.sensor.black_level:g} DN, "
-            "unchecked; an error of it moves every intercept by slope times the error."
-        )
-        return recording.sensor.black_level, None
-    value = np.array([dark.black_dn for dark in known])
-    weight = 1 / np.array([dark.black_se_dn for dark in known]) ** 2
-    mean = float((weight * value).sum() / weight.sum())
-    error = float(1 / np.sqrt(weight.sum()))
-    misfit = float((weight * (value - mean) ** 2).sum())
-    if len(known) > 1 and stats.chi2.sf(misfit, len(known) - 1) < DIFFERENT_P:
-        error *= float(np.sqrt(misfit / (len(known) - 1)))
-        remarks.append(
-            f"The channels' black levels differ by up to {np.ptp(value):.3g} DN, more than chance: "
-            "each channel's own is used for its levels, the model has their mean."
-        )
-    return mean, error
 
 
 def _fit(

@@ -8,11 +8,11 @@ from scipy import stats
 
 from analysis.photon_transfer.black import DarkLine, dark_line
 from analysis.photon_transfer.lines import Points
-from analysis.photon_transfer.rounding import unrounded
+from analysis.photon_transfer.rounding import as_coded, unrounded
 from analysis.photon_transfer.segments import SegmentFit
 from analysis.photon_transfer.statistics import LevelStatistics
+from dsis.recording.hygiene import CLIPPED_SHARE
 
-CLIPPED_SHARE = 1e-4  # a level with more clipped samples is left out
 COLLAPSE = 0.5  # variance below this share of its maximum, for good: the charge is full
 WANDER_P = 1e-3  # frame means that wander more than chance does so often do wander
 
@@ -90,9 +90,8 @@ def levels_of(
     levels = []
     for s in measured:
         dark, why = darks[s.channel], useless(s)
-        plain = unrounded(
-            s.level_dn, s.level_se_dn, s.variance_dn2, s.variance_se_dn2, s.fixed_dn2, step_dn
-        )
+        numbers = (s.level_dn, s.level_se_dn, s.variance_dn2, s.variance_se_dn2)
+        plain = as_coded(*numbers) if why else unrounded(*numbers, s.fixed_dn2, step_dn)
         if not why and not plain.recovered:
             why = "its noise is too small beside one code to be recovered from rounding"
         x = plain.level_dn - (dark.black_dn if dark else nominal_dn)

@@ -120,13 +120,13 @@ def _solve(points: Points, design: Floats) -> tuple[Floats, Floats, Floats]:
     fitted, relative = np.maximum(v, floor), points.relative_se
     size = np.maximum(np.abs(design).max(0), 1e-30)
     unit = design / size
+    ridge = 1e-13 * np.eye(size.size)  # nearly collinear bends stay solvable
     for _ in range(_ITERATIONS):
         weight = 1 / (fitted * relative)
         whitened = unit * weight[:, None]
         norm = np.sqrt((whitened**2).sum(0))
         whitened /= norm
-        gram = whitened.T @ whitened
-        gram[np.diag_indices_from(gram)] += 1e-13  # nearly collinear bends stay solvable
+        gram = whitened.T @ whitened + ridge
         parameters = np.linalg.solve(gram, whitened.T @ (v * weight)) / norm / size
         before, fitted = fitted, np.maximum(design @ parameters, floor)
         relative = np.hypot(points.relative_se, parameters[0] * points.x_se_dn / fitted)

@@ -1,6 +1,6 @@
 """What photon transfer needs of a recording: structural types, so that it runs without files."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Sequence, Sized
 from typing import Any, Protocol
 
 import numpy as np
@@ -35,6 +35,8 @@ class RecordedExposure(Protocol):
     def exposure_time_s(self) -> float: ...  # noqa: D102
     @property
     def light(self) -> float | None: ...  # noqa: D102
+    @property
+    def frames(self) -> Sized: ...  # noqa: D102
 
 
 class Recorded(Protocol):

@@ -6,9 +6,13 @@ import numpy as np
 from scipy import stats
 
 from analysis.photon_transfer.black import DarkLine
-from analysis.photon_transfer.levels import CLIPPED_SHARE, WANDER_P, FittedLevel
+from analysis.photon_transfer.levels import WANDER_P, FittedLevel
+from analysis.photon_transfer.parts import P_SEEN
+from analysis.photon_transfer.patterns import LEAST_GAIN, FixedPatterns
+from analysis.photon_transfer.projections import OUTLIER_SD
 from analysis.photon_transfer.segments import SegmentFit
 from analysis.photon_transfer.statistics import LevelStatistics
+from dsis.recording.hygiene import CLIPPED_SHARE
 
 SATURATED = "saturation over the highest slope"
 CONVERTER = "the converter clips first: lower limit of the full well"
@@ -77,6 +81,41 @@ def remarks_on_clipped_darks(measured: Sequence[LevelStatistics], nominal_dn: fl
                 f"{nominal_dn:g} DN is wrong{current}, and every intercept with it."
             )
     return remarks
+
+
+def remarks_on_patterns(patterns: FixedPatterns) -> list[str]:
+    """Return what the model, or its maps, do not have of the fixed pattern."""
+    found = []
+    if patterns.dead:
+        found.append(
+            f"{patterns.dead} pixel(s) have less than {LEAST_GAIN:g} of the mean gain: the maps "
+            f"have {LEAST_GAIN:g} for them."
+        )
+    for by, name in ((patterns.dark, "offset"), (patterns.gain, "gain")):
+        outliers = sum(p.outliers for p in by.values())
+        if outliers:
+            found.append(
+                f"{outliers} pixel(s) are more than {OUTLIER_SD:g} standard deviations off in "
+                f"{name}: maps hold them as measured, the model's "
+                f"{'dsnu' if name == 'offset' else 'prnu'} leaves them out."
+            )
+    for channel, pattern in patterns.gain.items():
+        parts = [("row", pattern.row), ("column", pattern.column)]
+        if patterns.falloff is None:
+            parts.append(("place, smoothly", pattern.smooth))
+        found += [
+            f"{channel}: gain differs by {name}, {100 * np.sqrt(part.variance):.2g} %; the maps "
+            "hold it, no effect of the model does."
+            for name, part in parts
+            if part.p < P_SEEN and part.variance > 0
+        ]
+    found += [
+        f"{channel}: the dark level differs by place, smoothly, {np.sqrt(p.smooth.variance):.2g} "
+        "DN; the maps hold it, no effect of the model does."
+        for channel, p in patterns.dark.items()
+        if p.smooth.p < P_SEEN and p.smooth.variance > 0
+    ]
+    return found
 
 
 def _remarks_on_lines(levels: Sequence[FittedLevel]) -> list[str]:

@@ -41,6 +41,14 @@ def rounded_moments(mean_dn: float, sd_dn: float, fixed_dn2: float = 0.0) -> tup
     return mean_dn + bias, float(sd_dn**2 + SHEPPARD_DN2 + wave.sum() - bias**2)
 
 
+def as_coded(
+    level_dn: float, level_se_dn: float, variance_dn2: float, variance_se_dn2: float
+) -> Unrounded:
+    """Return level and variance of codes with Sheppard's 1/12 taken off, whatever they are."""
+    plain = variance_dn2 - SHEPPARD_DN2
+    return Unrounded(level_dn, level_se_dn, plain, variance_se_dn2, recovered=True)
+
+
 def unrounded(
     level_dn: float,
     level_se_dn: float,
@@ -74,7 +82,7 @@ def unrounded(
         )
     plain = variance_dn2 - SHEPPARD_DN2
     if not variance_dn2 <= _SMOOTH_DN2:  # one frame's nan too
-        return Unrounded(level_dn, level_se_dn, plain, variance_se_dn2, recovered=True)
+        return as_coded(level_dn, level_se_dn, variance_dn2, variance_se_dn2)
 
     def miss(at: np.ndarray) -> list[float]:
         mean, variance = rounded_moments(float(at[0]), float(at[1]), fixed_dn2)

@@ -25,9 +25,8 @@ from analysis.photon_transfer.sums import (
     begin,
     square_total,
 )
-from dsis.recording.hygiene import Inspection
+from dsis.recording.hygiene import CLIPPED_SHARE, Inspection
 
-CLIPPED_SHARE = 1e-4  # beyond, mean and variance are biased
 LINES_P = 1e-3  # rows or columns that vary more than chance does so often have their own noise
 
 
@@ -108,20 +107,21 @@ class LevelStatistics:
 def expose_statistics(
     recording: Recorded,
     exposure: Any,
-    watch: Inspection | None = None,
+    inspection: Inspection | None = None,
     patterns: Patterns | None = None,
 ) -> list[LevelStatistics]:
     """Return the statistics of each CFA channel of one exposure; empty where it has no frames.
 
-    `watch` sees every frame in passing; `patterns` is given the sum of the frames where none is
-    repeated and no more than `CLIPPED_SHARE` of the samples are clipped.
+    `inspection` sees every frame in passing, and says which code is white; `patterns` is given the
+    sum of the frames where none is repeated and no more than `CLIPPED_SHARE` of the samples are
+    clipped.
     """
-    white = int(recording.sensor.white_level)
+    white = int(inspection.white_level if inspection else recording.sensor.white_level)
     sums: Sums | None = None
     previous: NDArray[np.uint16] | None = None
     for count, frame in enumerate(recording.frames(exposure)):
-        if watch is not None:
-            watch.look(str(exposure.name), count, frame)
+        if inspection is not None:
+            inspection.look(str(exposure.name), count, frame)
         if sums is None:
             sums = begin(frame)
         row, column = (

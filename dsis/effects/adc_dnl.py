@@ -33,7 +33,7 @@ class AdcDnl(Effect):
     rank: ClassVar[int] = 50
     reference: ClassVar[str] = "IEEE Std 1241-2010, Terminology and test methods for ADCs"
     measures: ClassVar[frozenset[str]] = frozenset(
-        {"level", "pixel_variance", "skewness", "kurtosis", "code_spacing", "code_imbalance"}
+        {"level", "pixel_variance", "skewness", "kurtosis", "code_imbalance"}
     )
     confounders: ClassVar[str] = (
         "Light texture moves every level differently; quantisation leaves codes out altogether."
@@ -50,9 +50,14 @@ class AdcDnl(Effect):
         return out
 
     def contributions(self, point: OperatingPoint) -> Mapping[str, float]:
-        """State nothing: everything depends on which codes the noise covers."""
-        del point
-        return {}
+        """Return the imbalance of codes where the noise covers a block of them.
+
+        Their mean square is 1 + rms^2 for widths of mean 1, the share of it that varies rms^2. All
+        else depends on which codes the noise covers.
+        """
+        if point.variance_dn2 < (BLOCK_CODES / 4) ** 2:
+            return {}
+        return {"code_imbalance": self.rms_lsb / (1 + self.rms_lsb**2) ** 0.5}
 
 
 @lru_cache(maxsize=8)

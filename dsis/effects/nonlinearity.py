@@ -24,9 +24,7 @@ class Nonlinearity(Effect):
     stage: ClassVar[Stage] = Stage.CHARGE
     rank: ClassVar[int] = 90
     reference: ClassVar[str] = "EMVA Standard 1288, release 3.1, section 6 (linearity)"
-    measures: ClassVar[frozenset[str]] = frozenset(
-        {"level", "pixel_variance", "skewness", "kurtosis"}
-    )
+    measures: ClassVar[frozenset[str]] = frozenset({"level", "pixel_variance"})
     confounders: ClassVar[str] = (
         "Drift of the light looks alike where the light was not measured; dual_gain changes the "
         "variance without the mean; brighter_fatter leaves the mean straight."

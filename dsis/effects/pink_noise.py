@@ -38,7 +38,6 @@ class PinkNoise(Effect):
             "correlation_1_0",
             "correlation_1_1",
             "correlation_0_2",
-            "correlation_2_0",
             "spectral_peak",
             "row_spectrum_peak",
         }

@@ -26,7 +26,7 @@ class PoissonShotNoise(Effect):
     stage: ClassVar[Stage] = Stage.CHARGE
     rank: ClassVar[int] = -100
     reference: ClassVar[str] = "Janesick, Photon Transfer, SPIE Press, 2007"
-    measures: ClassVar[frozenset[str]] = frozenset({"skewness", "kurtosis", "variance_spread"})
+    measures: ClassVar[frozenset[str]] = frozenset({"skewness", "kurtosis"})
     confounders: ClassVar[str] = (
         "Its skew goes with the signal's root; impulse and clipping skew darks as well."
     )

@@ -29,12 +29,9 @@ class TapMismatch(Effect):
             "pixel_variance",
             "variance_spread",
             "kurtosis",
-            "fixed_pixel_variance",
             "fixed_row_variance",
             "fixed_column_variance",
             "fixed_smooth_variance",
-            "fixed_correlation_0_1",
-            "fixed_correlation_1_0",
         }
     )
     confounders: ClassVar[str] = (

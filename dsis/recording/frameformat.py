@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from dsis.errors import InputError
 from dsis.imagefile import codes_info, read_codes
 from dsis.recording.cameraraw import RAW_SUFFIXES, raw_frame, raw_header
+from dsis.recording.png import plain_codes
 
 _UNSIGNED = {"uint8": 8, "uint16": 16, "uint": 32, "uint32": 32, "uint64": 64}
 _ALLOWED = "must hold unsigned whole codes (uint8 or uint16)"
@@ -66,7 +67,8 @@ def read_frame(path: Path) -> NDArray[np.unsignedinteger]:
         return np.array(stored)
     if suffix in RAW_SUFFIXES:
         return raw_frame(path)
-    return read_codes(path)
+    plain = plain_codes(path) if suffix == ".png" else None
+    return read_codes(path) if plain is None else plain
 
 
 def _header(path: Path, shape: tuple[int, ...], pixel_type: str) -> FrameHeader:

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import ConfigDict
 
 from dsis.camera import Camera
-from dsis.effects import Effect, Exposure, Image, Stage
+from dsis.effects import Effect, Exposure, Image, Stage, registry
 from dsis.errors import Fault, InputError
 from dsis.grid import PixelGrid
 
@@ -33,7 +33,8 @@ class SensorMaps:
         Response of each pixel relative to the mean of its colour: photo-response non-uniformity
         with shading and taps; mean 1 over each colour.
     dsnu_noise_dn, prnu_noise
-        Temporal noise left in the maps, standard deviation of a pixel; 0 where it is not known.
+        By how much the maps miss the sensor's pattern, standard deviation of a pixel; 0 where it is
+        not known. Maps are best linear estimates, so the sensor has this much more variance.
     """
 
     dsnu_dn: Image
@@ -144,12 +145,19 @@ class GainMap(Effect):
 
 
 def with_maps(camera: Camera, maps: SensorMaps, grid: PixelGrid) -> Camera:
-    """Return the camera with measured patterns in the place of the drawn ones."""
+    """Return the camera with measured patterns in the place of the drawn ones.
+
+    What the maps miss is drawn anew, white: the pattern as a whole then has the sensor's variance.
+    """
     if maps.dsnu_dn.shape != grid.shape:
         found, wanted = (" x ".join(map(str, s)) for s in (maps.dsnu_dn.shape, grid.shape))
         raise InputError.of(MAPS, "", f"is of {found} pixels, must be of {wanted} (rows x columns)")
     kept = tuple(effect for effect in camera.effect if effect.kind not in REPLACED)
-    links = (GainMap(gains=maps.prnu_gain), OffsetMap(offsets_dn=maps.dsnu_dn))
+    links: list[Effect] = [GainMap(gains=maps.prnu_gain), OffsetMap(offsets_dn=maps.dsnu_dn)]
+    if maps.prnu_noise:
+        links.append(registry()["prnu"].model_validate({"sigma_percent": 100 * maps.prnu_noise}))
+    if maps.dsnu_noise_dn:
+        links.append(registry()["dsnu"].model_validate({"sigma_dn": maps.dsnu_noise_dn}))
     return camera.model_copy(update={"effect": (*kept, *links)})
 
 

@@ -1,4 +1,4 @@
-"""Figures: the only file that imports matplotlib.
+"""Figures of scores, and what figures of votes share: style, colours, marks, how they are saved.
 
 A figure carries no date, and its inner names do not depend on chance: same numbers, same bytes.
 """
@@ -80,13 +80,21 @@ def draw_mos(scores: pd.DataFrame, scale: Scale, simulated_share: float, path: P
     """
     with mpl.rc_context(STYLE):
         draw = _draw_conditions if has_conditions(scores) else _draw_list
-        figure = draw(scores, scale)
-        _mark_simulated(figure, simulated_share)
-        title = " ".join(["Mean opinion scores", simulated_mark(simulated_share)]).strip()
-        svg = {"Date": None, "Creator": "dsis", "Title": title}
-        figure.savefig(path.with_suffix(".svg"), metadata=svg)
-        png = {"Software": "dsis", "Title": title}
-        figure.savefig(path.with_suffix(".png"), dpi=200, metadata=png)
+        save(draw(scores, scale), "Mean opinion scores", simulated_share, path)
+
+
+def save(figure: Figure, title: str, simulated_share: float, path: Path) -> None:
+    """Write a figure as `.svg` and `.png` (200 dots per inch), marked where votes are simulated.
+
+    To be called, as everything that draws, inside `matplotlib.rc_context(STYLE)`.
+    """
+    _mark_simulated(figure, simulated_share)
+    title = " ".join([title, simulated_mark(simulated_share)]).strip()
+    svg = {"Date": None, "Creator": "dsis", "Title": title}
+    figure.savefig(path.with_suffix(".svg"), metadata=svg)
+    figure.set_layout_engine("none")  # it is laid out; once is enough
+    png = {"Software": "dsis", "Title": title}
+    figure.savefig(path.with_suffix(".png"), dpi=200, metadata=png)
 
 
 def has_conditions(scores: pd.DataFrame) -> bool:
@@ -95,6 +103,12 @@ def has_conditions(scores: pd.DataFrame) -> bool:
     named = (tests["noise"] != "").all() and (tests["demosaic"] != "").all()
     cells = tests[["content", "noise", "demosaic", "level"]].fillna({"level": 0.0})
     return bool(named and len(tests) > 0 and not cells.duplicated().any())
+
+
+def condition_name(word: str) -> str:
+    """Return noise, demosaicking, or a difference `a - b` of two, as people call them."""
+    parts = [(NOISES | DEMOSAICKERS).get(part, part) for part in word.split(" - ")]
+    return " \u2212 ".join(parts)
 
 
 def simulated_mark(share: float) -> str:
@@ -273,12 +287,13 @@ def _scale_axis(axes: Axes, scale: Scale) -> None:
     """Y axis over the whole scale, with the words at its ends."""
     margin = 0.06 * (scale.high - scale.low)
     axes.set_ylim(scale.low - margin, scale.high + margin)
-    ticks = _ticks(scale)
+    ticks = scale_ticks(scale)
     axes.set_yticks(ticks, [_tick_label(tick, scale) for tick in ticks])
     axes.set_ylabel("MOS")
 
 
-def _ticks(scale: Scale) -> list[float]:
+def scale_ticks(scale: Scale) -> list[float]:
+    """Return the grades to mark on an axis: all of up to thirteen, else five."""
     ends = (float(scale.low), float(scale.high))
     whole = all(end.is_integer() for end in ends) and ends[1] - ends[0] <= 12
     count = int(scale.high - scale.low) + 1 if whole else 5
@@ -360,13 +375,13 @@ def _draw_column(axes: Axes, scores: pd.DataFrame, rows: int, scale: Scale, *, n
         axes.errorbar(some["mos"], y[here], xerr=bars, fmt=mark, color=colour, ms=4, lw=1.0)
         axes.plot(some["mos_trimmed"], y[here] + 0.25, mark, ms=3, mfc="white", mec=colour, mew=0.8)
     if named:
-        axes.set_yticks(y, [_short(name) for name in scores["stimulus"]], fontsize=7)
+        axes.set_yticks(y, [short_name(name) for name in scores["stimulus"]], fontsize=7)
     else:
         axes.set_yticks([])
         axes.set_ylabel(f"{len(scores)} stimuli, by MOS")
     axes.tick_params(axis="y", length=0)
     axes.set_ylim(rows - 0.4, -0.6)
-    ticks = _ticks(scale)
+    ticks = scale_ticks(scale)
     axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
     axes.tick_params(axis="x", top=True, labeltop=True)
     axes.set_xlim(scale.low - 0.3, scale.high + 0.3)
@@ -375,7 +390,8 @@ def _draw_column(axes: Axes, scores: pd.DataFrame, rows: int, scale: Scale, *, n
     axes.set_axisbelow(True)
 
 
-def _short(name: str) -> str:
+def short_name(name: str) -> str:
+    """Return a name that fits an axis, its middle left out."""
     if len(name) <= NAME_LENGTH:
         return name
     half = NAME_LENGTH // 2

@@ -1,22 +1,18 @@
 """Observer models: what a vote says about the sequence, and what about the observer."""
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import chdtri
 
+from analysis.projection import project
 from analysis.screening import BT500, Bt500Rule, judge, moments
 from analysis.votes import Indexed, index_votes
 
 Z95 = 1.95996
 """Normal quantile of a 95 % interval, to the digits that published results were made with."""
-
-ROUNDS_MAX = 1000
-CONVERGED = 1e-8  # change of the scores, root of the sum of squares, grades
-_FLOOR = 1e-8  # added to each observer's variance, grades^2: nobody's weight is infinite
 
 
 @dataclass(frozen=True)
@@ -81,7 +77,7 @@ class MaximumLikelihood:
     rounds
         Rounds of the alternating projection.
     converged
-        False: it was stopped after `ROUNDS_MAX`.
+        False: it was stopped after `analysis.projection.ROUNDS_MAX`.
     """
 
     scores: pd.DataFrame
@@ -98,41 +94,26 @@ def p910(votes: pd.DataFrame) -> MaximumLikelihood:
     as there are votes; a score's from the spread of the residuals on that stimulus. Population sd
     throughout, as in the programs whose results are published.
     """
-    scored = index_votes(votes)
-    score, bias, spread, rounds, converged = _project(scored)
-    residual = scored.vote - score[scored.stimulus] - bias[scored.observer]
-    around = moments(scored.stimulus, residual, 0)
-    se = around.sd / np.sqrt(around.n)
-    centred = score + bias.mean()
-    scores = scored.stimuli[["stimulus"]].assign(
-        score=centred, se=se, ci_low=centred - Z95 * se, ci_high=centred + Z95 * se
+    return fit_p910(index_votes(votes))
+
+
+def fit_p910(scored: Indexed) -> MaximumLikelihood:
+    """Fit as `p910` does, votes that are indexed already."""
+    found = project(scored.stimulus, scored.observer, scored.vote, len(scored.observers))
+    se = np.sqrt(found.variance / found.n)
+    shift = found.bias.mean()
+    score = found.score + shift
+    scores = pd.DataFrame(
+        {
+            "stimulus": scored.stimuli["stimulus"],
+            "score": score,
+            "se": se,
+            "ci_low": score - Z95 * se,
+            "ci_high": score + Z95 * se,
+        }
     )
-    observers = _observers(scored, bias - bias.mean(), spread)
-    return MaximumLikelihood(scores, observers, rounds, converged)
-
-
-class _Projection(NamedTuple):
-    score: NDArray[np.float64]  # (stimulus,)
-    bias: NDArray[np.float64]  # (observer,)
-    spread: NDArray[np.float64]  # (observer,): the one that weighted `score`
-    rounds: int
-    converged: bool
-
-
-def _project(scored: Indexed) -> _Projection:
-    score = moments(scored.stimulus, scored.vote, 1).mean
-    bias = _mean_per_observer(scored, scored.vote - score[scored.stimulus])
-    for rounds in range(1, ROUNDS_MAX + 1):
-        before = score
-        residual = scored.vote - score[scored.stimulus] - bias[scored.observer]
-        spread = moments(scored.observer, residual, 0).sd
-        weight = (1 / (spread**2 + _FLOOR))[scored.observer]
-        unbiased = scored.vote - bias[scored.observer]
-        score = scored.per_stimulus(weight * unbiased) / scored.per_stimulus(weight)
-        bias = _mean_per_observer(scored, scored.vote - score[scored.stimulus])
-        if np.linalg.norm(score - before) < CONVERGED:
-            return _Projection(score, bias, spread, rounds, converged=True)
-    return _Projection(score, bias, spread, ROUNDS_MAX, converged=False)
+    observers = _observers(scored, found.bias - shift, found.inconsistency)
+    return MaximumLikelihood(scores, observers, found.rounds, found.converged)
 
 
 def _mean_per_observer(scored: Indexed, values: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -144,12 +125,16 @@ def _observers(
 ) -> pd.DataFrame:
     n = np.bincount(scored.observer)
     half = Z95 * spread / np.sqrt(n)
-    return scored.observers[["lab", "observer"]].assign(
-        n=n,
-        bias=bias,
-        bias_ci_low=bias - half,
-        bias_ci_high=bias + half,
-        inconsistency=spread,
-        inconsistency_ci_low=spread * np.sqrt(n / chi2.ppf(0.975, n)),
-        inconsistency_ci_high=spread * np.sqrt(n / chi2.ppf(0.025, n)),
+    return pd.DataFrame(
+        {
+            "lab": scored.observers["lab"],
+            "observer": scored.observers["observer"],
+            "n": n,
+            "bias": bias,
+            "bias_ci_low": bias - half,
+            "bias_ci_high": bias + half,
+            "inconsistency": spread,
+            "inconsistency_ci_low": spread * np.sqrt(n / chdtri(n, 0.025)),
+            "inconsistency_ci_high": spread * np.sqrt(n / chdtri(n, 0.975)),
+        }
     )

@@ -2,11 +2,18 @@
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
-from scipy.stats import t
 
+from analysis.bootstrap import bootstrap_scores
+from analysis.intervals import binomial_interval, default_interval
 from analysis.models import p910, p913, scores_of
-from analysis.screening import moments, remove_outliers, screen_bt500, screen_correlation
+from analysis.scale import Scale
+from analysis.screening import (
+    THRESHOLD_SD,
+    moments,
+    remove_outliers,
+    screen_bt500,
+    screen_correlation,
+)
 from analysis.table import Column, Kind
 from analysis.votes import COLUMNS, CONDITION, index_votes
 
@@ -23,10 +30,10 @@ MOS_COLUMNS = (
     Column("n", Kind.WHOLE, "vote", "votes scored: valid, on test sequences"),
     _score("mos", "mean of all scored votes"),
     _score("sd", "sample standard deviation of all scored votes"),
-    _score("ci_low", "lower end of the 95 % interval of mos, Student t, n - 1"),
+    _score("ci_low", "lower end of the 95 % interval of mos, Student t, n - 1 (see ci_method)"),
     _score("ci_high", "upper end of the same"),
     Column(
-        "n_removed", Kind.WHOLE, "vote", "votes further than 2 sd from mos, removed in one pass"
+        "n_removed", Kind.WHOLE, "vote", "votes removed: further than 2 sd from mos, in one pass"
     ),
     _score("mos_trimmed", "mean of the votes kept"),
     _score("sd_trimmed", "sample standard deviation of the votes kept"),
@@ -39,6 +46,13 @@ MOS_COLUMNS = (
     _score("p910_ci_high", "upper end of the same"),
     _SIMULATED,
     Column("kind", Kind.TEXT, "", "test, or reference: a hidden reference"),
+    Column("ci_method", Kind.TEXT, "", "of ci_low: t; binomial where all agree; none"),
+    _score("ci_binomial_low", "lower end of the 95 % interval by Clopper-Pearson, conservative"),
+    _score("ci_binomial_high", "upper end of the same; never leaves the scale"),
+    _score("ci_boot_low", "lower end, bootstrap over observers of the mean of all votes"),
+    _score("ci_boot_high", "upper end of the same"),
+    _score("ci_boot_trimmed_low", "lower end, of mos_trimmed: the removal inside each resample"),
+    _score("ci_boot_trimmed_high", "upper end of the same"),
 )
 OBSERVER_COLUMNS = (
     _VOTE["observer"],
@@ -55,44 +69,57 @@ OBSERVER_COLUMNS = (
 )
 
 
-def mos(votes: pd.DataFrame) -> pd.DataFrame:
+def mos(votes: pd.DataFrame, scale: Scale | None = None) -> pd.DataFrame:
     """Return the mean opinion score of each stimulus with its 95 % interval.
 
     mos +- t(0.975, n - 1) sd / sqrt(n), sd with n - 1; over valid votes of kind test or reference.
-    The interval may leave the scale; it is nan for a single vote and has no width where all agree.
+    The interval may leave the scale. Where all votes agree, or there is a single one, it is
+    Clopper-Pearson's if the scale is given; else it has no width, or is nan.
 
     Parameters
     ----------
     votes
         Table of votes (`analysis.read_votes`).
+    scale
+        Of the test.
 
     Returns
     -------
     DataFrame
-        `stimulus, content, noise, demosaic, level, n, mos, sd, ci_low, ci_high`, sorted by content,
-        level, noise and demosaicking.
+        `stimulus, content, noise, demosaic, level, n, mos, sd, ci_low, ci_high, ci_method` (t,
+        binomial or none), sorted by content, level, noise and demosaicking.
     """
     scored = index_votes(votes)
     n, mean, sd = moments(scored.stimulus, scored.vote, 1)
-    half = _half_width(n, sd)
+    interval, method = default_interval(n, mean, sd, scale)
     return scored.stimuli[["stimulus", *CONDITION]].assign(
-        n=n, mos=mean, sd=sd, ci_low=mean - half, ci_high=mean + half
+        n=n, mos=mean, sd=sd, ci_low=interval.low, ci_high=interval.high, ci_method=method
     )
 
 
-def _half_width(n: NDArray[np.int64], sd: NDArray[np.float64]) -> NDArray[np.float64]:
-    quantile = t.ppf(0.975, np.maximum(n - 1, 1))
-    return np.asarray(quantile * sd / np.sqrt(n), dtype=np.float64)
+def score_table(
+    votes: pd.DataFrame,
+    scale: Scale | None = None,
+    *,
+    threshold: float = THRESHOLD_SD,
+    passes: int = 1,
+) -> pd.DataFrame:
+    """Return one row a stimulus with all scores: the table `mos.csv`, columns `MOS_COLUMNS`.
 
-
-def score_table(votes: pd.DataFrame) -> pd.DataFrame:
-    """Return one row a stimulus with all scores: the table `mos.csv`, columns `MOS_COLUMNS`."""
+    Parameters
+    ----------
+    votes, scale
+        As for `mos`; without a scale there are no binomial intervals.
+    threshold, passes
+        Of the removal of votes, as for `analysis.remove_outliers`.
+    """
     scored = index_votes(votes)
-    trimmed = mos(remove_outliers(votes).kept)
+    raw = mos(votes, scale)
+    trimmed = mos(remove_outliers(votes, threshold, passes=passes).kept)
     rejected = screen_bt500(votes)["rejected"].to_numpy(dtype=np.bool_)
     likelihood = p910(votes).scores
-    table = mos(votes).assign(
-        n_removed=lambda raw: raw["n"] - trimmed["n"],
+    table = raw.assign(
+        n_removed=raw["n"] - trimmed["n"],
         mos_trimmed=trimmed["mos"],
         sd_trimmed=trimmed["sd"],
         ci_trimmed_low=trimmed["ci_low"],
@@ -104,7 +131,17 @@ def score_table(votes: pd.DataFrame) -> pd.DataFrame:
         p910_ci_high=likelihood["ci_high"],
         simulated=scored.stimuli["simulated"],
         kind=scored.stimuli["kind"],
+        ci_binomial_low=np.nan,
+        ci_binomial_high=np.nan,
     )
+    if scale is not None:
+        binomial = binomial_interval(table["n"], table["mos"], scale)
+        table = table.assign(ci_binomial_low=binomial.low, ci_binomial_high=binomial.high)
+    for name, limit in (("ci_boot", None), ("ci_boot_trimmed", threshold)):
+        drawn = bootstrap_scores(votes, threshold=limit, passes=passes)
+        table = table.assign(
+            **{f"{name}_low": drawn["boot_low"], f"{name}_high": drawn["boot_high"]}
+        )
     return table[[column.name for column in MOS_COLUMNS]]
 
 

@@ -13,9 +13,12 @@ from scipy.stats import rankdata
 
 from analysis.table import Column, Kind
 from analysis.votes import COLUMNS, Indexed, index_votes
+from analysis.votes import scored as scored_rows
+from dsis.errors import InputError
 
 # A vote exactly on a limit would fall on either side by rounding: it counts as lying on it.
 TIE = 1e-9
+THRESHOLD_SD = 2.0  # of the paper's removal of votes
 
 _VOTE = {column.name: column for column in COLUMNS}
 REMOVED_COLUMNS = (
@@ -40,11 +43,13 @@ class Removal(NamedTuple):
     removed: pd.DataFrame
 
 
-def remove_outliers(votes: pd.DataFrame, threshold: float = 2.0, ddof: int = 1) -> Removal:
+def remove_outliers(
+    votes: pd.DataFrame, threshold: float = THRESHOLD_SD, ddof: int = 1, passes: int = 1
+) -> Removal:
     """Remove the votes that lie further than `threshold` sd from the mean of their stimulus.
 
-    One pass over the scored votes: |u - mean| > threshold sd, strictly (Seybold et al. 2014). With
-    the sample sd no |z| exceeds (n - 1) / sqrt(n), so at n <= 5 nothing can be removed at 2 sd.
+    |u - mean| > threshold sd, strictly (Seybold et al. 2014), over the scored votes. With the
+    sample sd no |z| exceeds (n - 1) / sqrt(n), so at n <= 5 nothing can be removed at 2 sd.
     Intervals from the votes kept are too short: show them beside those from all votes.
 
     Parameters
@@ -52,10 +57,27 @@ def remove_outliers(votes: pd.DataFrame, threshold: float = 2.0, ddof: int = 1) 
     votes
         Table of votes; rows that are not scored are in neither part of the result.
     threshold
-        In standard deviations.
+        In standard deviations, at least 1.
     ddof
         1: sample standard deviation; 0: population.
+    passes
+        How often at most; each pass has the mean and sd of what the one before has kept. The paper
+        names none: one.
     """
+    if passes < 1 or not threshold >= 1:  # from 1 on, no stimulus loses all votes
+        fact = f"are {threshold:g} and {passes}, must both be at least 1"
+        raise InputError.of("threshold, passes", "", fact)
+    kept, found = scored_rows(votes), []
+    for _ in range(passes):
+        kept, removed = _remove_once(kept, threshold, ddof)
+        found.append(removed)
+        if removed.empty or kept.empty:
+            break
+    removed = pd.concat(found).sort_index() if len(found) > 1 else found[0]
+    return Removal(kept, removed)
+
+
+def _remove_once(votes: pd.DataFrame, threshold: float, ddof: int) -> Removal:
     scored = index_votes(votes)
     n, mean, sd = moments(scored.stimulus, scored.vote, ddof)
     at = scored.stimulus

@@ -54,6 +54,7 @@ COLUMNS = (
     Column("dropped_frames", Kind.WHOLE, "frame", "frames that missed their refresh", least=0),
     Column("simulated", Kind.FLAG, "", "true: the vote of a simulated observer", default=False),
 )
+_DTYPES = {column.name: pd.Series(dtype=DTYPES[column.kind]).dtype for column in COLUMNS}
 CONDITION = ("content", "noise", "demosaic", "level")
 
 
@@ -77,6 +78,8 @@ def complete(votes: pd.DataFrame) -> pd.DataFrame:
         if column.name not in whole:
             whole[column.name] = column.default
         values = whole[column.name]
+        if values.dtype == _DTYPES[column.name] and not values.hasnans:
+            continue  # as it shall be
         if column.default is not None:
             values = values.where(values.notna(), column.default)
         elif column.filled and values.isna().any():
@@ -177,34 +180,47 @@ def index_votes(votes: pd.DataFrame) -> Indexed:
     table = scored(votes)
     if table.empty:
         raise InputError.of(TABLE, "", "hold no valid vote on a test sequence")
-    order = ["content", "hidden", "level", "noise", "mosaicked", "demosaic", "stimulus"]
-    stimuli = _groups(table, ["stimulus"], [*CONDITION, "kind"])
+    stimulus, stimuli = _group(table, ["stimulus"], [*CONDITION, "kind"])
     stimuli["hidden"] = stimuli["kind"] == "reference"
     stimuli["mosaicked"] = stimuli["demosaic"] != "none"
-    stimuli = stimuli.sort_values(order, key=_natural, ignore_index=True)
-    observers = _groups(table, ["lab", "observer"], [])
-    observers = observers.sort_values(["lab", "observer"], key=_natural, ignore_index=True)
+    order = ["content", "hidden", "level", "noise", "mosaicked", "demosaic", "stimulus"]
+    stimulus, stimuli = _sorted(stimulus, stimuli, order)
+    observer, observers = _sorted(*_group(table, ["lab", "observer"], []), ["lab", "observer"])
+    repetition = pd.factorize(table["repetition"])[0]
+    pairs = stimulus * (int(repetition.max()) + 1) + repetition
     return Indexed(
         table,
         table["vote"].to_numpy(dtype=np.float64),
-        _places(table, stimuli, ["stimulus"]),
-        _places(table, observers, ["lab", "observer"]),
-        np.asarray(table.groupby(["stimulus", "repetition"]).ngroup(), dtype=np.intp),
+        stimulus,
+        observer,
+        np.unique(pairs, return_inverse=True)[1].reshape(-1).astype(np.intp),
         stimuli.drop(columns=["hidden", "mosaicked"]),
         observers,
     )
 
 
-def _groups(table: pd.DataFrame, key: list[str], first: list[str]) -> pd.DataFrame:
-    """Return one row per `key`: the first of each of `first`, and any of `simulated`."""
-    steps = dict.fromkeys(first, "first") | {"simulated": "any"}
-    return table.groupby(key).agg(steps).reset_index()
+def _group(
+    table: pd.DataFrame, key: list[str], first: list[str]
+) -> tuple[NDArray[np.intp], pd.DataFrame]:
+    """Return the group of each row, and per group: `key`, the first of `first`, any `simulated`."""
+    codes = np.zeros(len(table), dtype=np.intp)
+    for name in key:
+        mine = pd.factorize(table[name])[0]
+        codes = pd.factorize(codes * (int(mine.max()) + 1) + mine)[0]
+    leading = np.unique(codes, return_index=True)[1]
+    groups = table[[*key, *first]].iloc[leading].reset_index(drop=True)
+    robots = np.bincount(codes, table["simulated"].to_numpy(dtype=np.float64))
+    return codes, groups.assign(simulated=robots > 0)
 
 
-def _places(table: pd.DataFrame, groups: pd.DataFrame, key: list[str]) -> NDArray[np.intp]:
-    """Return the row of `groups` that each row of `table` belongs to."""
-    index = pd.MultiIndex.from_frame(groups[key])
-    return index.get_indexer(pd.MultiIndex.from_frame(table[key])).astype(np.intp)
+def _sorted(
+    codes: NDArray[np.intp], groups: pd.DataFrame, order: list[str]
+) -> tuple[NDArray[np.intp], pd.DataFrame]:
+    """Return groups and the codes of the rows in the natural order of `order`."""
+    groups = groups.sort_values(order, key=_natural)
+    place = np.empty(len(groups), dtype=np.intp)
+    place[groups.index] = np.arange(len(groups))
+    return place[codes], groups.reset_index(drop=True)
 
 
 def _natural(names: pd.Series) -> pd.Series:

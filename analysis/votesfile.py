@@ -1,17 +1,20 @@
-"""Reading and writing `votes.csv`."""
+"""Reading votes from any file that holds them, and writing `votes.csv`."""
 
 import csv
 import io
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
-from analysis.scale import describe_test
+from analysis.scale import Description, describe_test
+from analysis.storefile import exported, store_folder
+from analysis.surealfile import is_sureal, read_sureal
 from analysis.table import DTYPES, Column, Kind, to_csv
 from analysis.votes import COLUMNS, complete, contradictions
+from analysis.widefile import is_wide, lengthen
 from dsis.errors import Fault, InputError
 
 FAULTS_LISTED = 20
@@ -24,18 +27,22 @@ _Found = list[tuple[int, str, str]]  # row, column, what is wrong
 def read_votes(
     path: str | os.PathLike[str], scale: tuple[float, float] | None = None
 ) -> pd.DataFrame:
-    """Return the votes of a CSV file, with every column of `analysis.votes.COLUMNS`.
+    """Return the votes of a file, with every column of `analysis.votes.COLUMNS`.
 
-    The file is UTF-8, with or without byte order mark; cells are parted by commas, semicolons or
-    tabs (the latter two may have decimal commas). Blanks around a cell are no part of it; blank
-    lines are passed over; a blank vote is a vote not given. Columns not known are kept as text.
+    CSV is UTF-8, with or without byte order mark; cells are parted by commas, semicolons or tabs
+    (the latter two may have decimal commas). Blanks around a cell are no part of it; blank lines
+    are passed over; a blank vote is a vote not given. Columns not known are kept as text. A table
+    without the columns `observer` and `vote` is wide: one row a stimulus, one column an observer.
+    A `.json` is a dataset of sureal; a stimuli folder, or the `votes.sqlite` in it, is the store
+    of its session.
 
     Parameters
     ----------
     path
-        The file.
+        The file, or the stimuli folder.
     scale
-        Lowest and highest grade; None: as the `datapackage.json` beside the file says.
+        Lowest and highest grade; None: as the `datapackage.json` beside the file, or the store,
+        says.
 
     Returns
     -------
@@ -49,25 +56,67 @@ def read_votes(
         with the same (lab, observer, stimulus, repetition), a stimulus under two conditions: every
         row at once.
     """
-    file = Path(path)
+    return read_test(Path(path), scale)[0]
+
+
+def read_test(
+    file: Path, scale: tuple[float, float] | None = None
+) -> tuple[pd.DataFrame, Description]:
+    """Return the votes as `read_votes` does, and the scale and title of the test."""
+    folder = store_folder(file)
+    if folder is not None:
+        with exported(folder) as votes_csv:
+            test = describe_test(votes_csv, scale)
+            return _read_csv(votes_csv, test, file), test
     test = describe_test(file, scale)
+    if is_sureal(file):
+        votes = complete(read_sureal(file))
+        votes.index = pd.RangeIndex(1, len(votes) + 1, name="row")
+        _check(file, votes, test, [], where="vote")
+        return votes, test
+    return _read_csv(file, test), test
+
+
+def _read_csv(file: Path, test: Description, called: Path | None = None) -> pd.DataFrame:
+    """Read the table in `file`; faults are named as of `called`, where that is given."""
     delimiter, header, lines, rows = _cells(file)
+    wide = is_wide(header)
+    if wide:
+        header, lines, rows = lengthen(header, lines, rows)
     found: _Found = []
     columns: dict[str, pd.Series] = {}
-    for column, texts in zip(header, zip(*rows, strict=True), strict=True):
+    cells: Iterable[Sequence[str]] = zip(*rows, strict=True) if rows else [[]] * len(header)
+    observers = [row[-2] for row in rows] if wide else []
+    for column, texts in zip(header, cells, strict=True):
         known = next((c for c in COLUMNS if c.name == column), None)
         if known is None:
             columns[column] = pd.Series(texts, lines, dtype="str")
         else:
             values, faults = _parse_column(known, texts, decimal_comma=delimiter != ",")
             columns[column] = pd.Series(values, lines, dtype=DTYPES[known.kind])
-            found += [(lines[at], column, fact) for at, fact in faults]
+            found += [
+                (lines[at], observers[at] if wide and column == "vote" else column, fact)
+                for at, fact in faults
+            ]
     votes = complete(pd.DataFrame(columns, index=pd.Index(lines, name="row")))
-    sound = votes.drop(index=list({row for row, _, _ in found}))
-    found += contradictions(sound, test.scale.low, test.scale.high)
-    if found:
-        raise InputError(_faults(str(path), found))
+    if wide:  # a row of the file holds many votes: say whose is outside
+        low, high = test.scale.low, test.scale.high
+        outside = votes[(votes["vote"] < low) | (votes["vote"] > high)]
+        for row in outside.itertuples():
+            fact = f"is {row.vote:g}, must be from {low:g} to {high:g}"
+            found.append((int(str(row.Index)), str(row.observer), fact))
+    _check(called or file, votes, test, found)
     return votes
+
+
+def _check(
+    file: Path, votes: pd.DataFrame, test: Description, found: _Found, where: str = "row"
+) -> None:
+    """Raise `InputError` with what was `found`, and with what contradicts scale or other rows."""
+    sound = votes.drop(index=list({row for row, _, _ in found}))
+    found = [*found, *contradictions(sound, test.scale.low, test.scale.high)]
+    if found:
+        raise InputError(_faults(str(file), found, where))
 
 
 def write_votes(votes: pd.DataFrame, path: str | os.PathLike[str]) -> None:
@@ -112,7 +161,8 @@ def _delimiter(text: str) -> str:
     def hits(delimiter: str) -> int:
         return len(known & {cell.strip(' "') for cell in header.split(delimiter)})
 
-    return max(_DELIMITERS, key=hits)
+    # A wide table may have but one known column: then the delimiter that stands most often.
+    return max(_DELIMITERS, key=lambda delimiter: (hits(delimiter), header.count(delimiter)))
 
 
 def _check_shape(
@@ -122,7 +172,7 @@ def _check_shape(
     found: _Found = [
         (at, column.name, f"column is missing; found here: {known}")
         for column in COLUMNS
-        if column.required and column.name not in header
+        if column.required and column.name not in header and not is_wide(header)
     ]
     found += [
         (at, name or "header", f"stands {header.count(name)} times" if name else "has no name")
@@ -176,11 +226,11 @@ def _check_whole(value: float) -> None:
         raise ValueError(fact)
 
 
-def _faults(file: str, found: _Found) -> list[Fault]:
+def _faults(file: str, found: _Found, where: str = "row") -> list[Fault]:
     """Return the first faults by row, and how many more there are."""
     in_order = sorted(found)
     listed = [
-        Fault(file, f"row {row}, {column}" if column else f"row {row}", fact)
+        Fault(file, f"{where} {row}, {column}" if column else f"{where} {row}", fact)
         for row, column, fact in in_order[:FAULTS_LISTED]
     ]
     more = len(in_order) - len(listed)

@@ -165,7 +165,9 @@ def _player(options: argparse.Namespace, folder: Path) -> "Player | None":
     from dsis.manifest import read_manifest
     from dsis.session.mpv import MpvPlayer
 
-    return MpvPlayer(read_manifest(folder), screen=options.screen, output=options.video_output)
+    return MpvPlayer(
+        read_manifest(folder).sequence, screen=options.screen, output=options.video_output
+    )
 
 
 def votes(options: argparse.Namespace) -> None:

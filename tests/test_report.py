@@ -14,13 +14,15 @@ import pytest
 from matplotlib.image import imread
 
 import analysis
-from analysis.report import analyse
+from analysis.report import Options, analyse
+from analysis.report.tables import TABLES
 from analysis.scale import Description, Scale
 from dsis.errors import InputError
 from dsis.outdir import UNFINISHED
 
 PAPER = (1, 10)
-FILES = {"report.html", "mos.svg", "mos.png", "mos.csv", "observers.csv", "removed_votes.csv"}
+PICTURES = ("mos", "votes", "observers", "scale_use", "flagged", "contrasts")
+FILES = {"report.html", *TABLES, *(f"{name}.{end}" for name in PICTURES for end in ("svg", "png"))}
 MOS_HEADER = (
     "stimulus,content,noise,demosaic,level,n,mos,sd,ci_low,ci_high,"
     "n_removed,mos_trimmed,sd_trimmed,ci_trimmed_low,ci_trimmed_high,"
@@ -69,7 +71,7 @@ class Page(HTMLParser):
 
     def __init__(self, text):
         super().__init__()
-        self.open, self.captions, self.tables, self.remarks = [], [], 0, ""
+        self.open, self.captions, self.shown, self.remarks = [], [], 0, ""
         self.feed(text)
         self.close()
         assert self.open == []
@@ -77,7 +79,7 @@ class Page(HTMLParser):
     def handle_starttag(self, tag, attrs):
         if tag not in self.VOID:
             self.open.append((tag, dict(attrs).get("class", "")))
-        self.tables += tag == "table" and "id" in dict(attrs)
+        self.shown += tag == "figure" or (tag == "table" and "id" in dict(attrs))
         if tag in ("caption", "figcaption"):
             self.captions.append("")
 
@@ -110,7 +112,7 @@ def test_files_and_columns_of_the_contract(written):
     out, __ = written
     assert {file.name for file in out.iterdir()} == FILES
     assert not out.with_name("report.partial").exists()
-    assert (out / "mos.csv").read_text().startswith(MOS_HEADER + ",simulated,kind\n")
+    assert (out / "mos.csv").read_text().startswith(MOS_HEADER + ",simulated,kind,ci_method,")
     assert (out / "observers.csv").read_text().startswith(OBSERVERS_HEADER + ",simulated,lab\n")
     removed = pd.read_csv(out / "removed_votes.csv")
     assert {"observer", "stimulus", "vote", "z", "mean", "sd", "n"} <= set(removed.columns)
@@ -148,12 +150,14 @@ def test_page_is_well_formed_and_needs_no_network(written):
     out, __ = written
     text = page(out)
     parsed = Page(text)
-    assert parsed.tables == 4
-    assert len(parsed.captions) == 5
+    assert len(parsed.captions) == parsed.shown == 8 + len(PICTURES)  # tables and figures
+    numbers = re.findall(r"<b>((?:Table|Figure) [0-9]+)[.]", text)
+    assert len(set(numbers)) == len(numbers) == parsed.shown
     assert not re.search(r"https?:|//[a-z]|<script|<link|@import|url\(", text)
     assert all(source.startswith("data:") for source in re.findall(r'src="([^"]*)', text))
-    embedded = re.search(r"data:image/svg\+xml;base64,([^\"]*)", text)[1]
-    assert base64.b64decode(embedded) == (out / "mos.svg").read_bytes()
+    embedded = re.findall(r"data:image/svg\+xml;base64,([^\"]*)", text)
+    svgs = {(out / f"{name}.svg").read_bytes() for name in PICTURES}
+    assert {base64.b64decode(picture) for picture in embedded} == svgs
     assert "@media print" in text
 
 
@@ -208,7 +212,7 @@ def test_simulated_votes_are_marked_in_every_table_and_figure(tmp_path, share):
     out = report(tmp_path, votes.assign(simulated=robots))
     mark = MARK if share == 1 else f"50 % {MARK}"
     parsed = Page(page(out))
-    assert len(parsed.captions) == 5
+    assert len(parsed.captions) == parsed.shown
     assert all(f"{mark}." in caption for caption in parsed.captions)
     assert f'role="alert">{mark}.' in page(out)
     texts, strong, pale = marks_in_figure(out)
@@ -216,6 +220,8 @@ def test_simulated_votes_are_marked_in_every_table_and_figure(tmp_path, share):
     assert strong > 500
     assert pale > 5000
     assert mark.encode() in (out / "mos.png").read_bytes()  # among its properties
+    for name in PICTURES:
+        assert mark in (out / f"{name}.svg").read_text()
     for name in ("mos.csv", "observers.csv", "removed_votes.csv"):
         flags = pd.read_csv(out / name)["simulated"]
         assert flags.dtype == bool
@@ -246,7 +252,7 @@ TYPICAL = np.clip(
         (table([[5, 4, 5, 5, 1], *TYPICAL]), "cannot remove anything where there are 5 votes"),
         (table([[5, 5, 5, 5, 5, 5, 5, 1]] * 3), "removes 12.5 % of the votes, more than 10 %"),
         (table([[4] * 16, *TYPICAL]), "All votes are equal on s0"),
-        (table([[4], *TYPICAL]), "A single vote has no interval: s0"),
+        (table([[4], *TYPICAL]), "A single vote has no interval of Student's: s0"),
         (table([[5] * 15 + [4], *TYPICAL]), "The interval leaves the scale on s0"),
         (table([[4] * 16] * 2), "No correlation exists for o0"),
         (table(TYPICAL), ""),
@@ -318,7 +324,8 @@ def test_an_earlier_report_is_replaced_and_anything_else_refused(tmp_path):
     assert sorted(p.name for p in tmp_path.iterdir()) == ["report", "votes.csv"]
     with pytest.raises(InputError, match="row 2, vote"):
         report(tmp_path, votes.assign(vote=11))
-    assert {file.name for file in out.iterdir()} == FILES
+    flagged = {"flagged.svg", "flagged.png"}  # nobody is, where all agree
+    assert {file.name for file in out.iterdir()} == FILES - flagged
     (out / "notes.txt").write_text("mine")
     with pytest.raises(InputError, match=r"notes.txt"):
         report(tmp_path, votes)
@@ -334,6 +341,109 @@ def test_a_file_without_scored_votes_is_refused(tmp_path):
     with pytest.raises(InputError, match="no valid vote"):
         report(tmp_path, make_votes(observers=2).assign(kind="training"))
     assert not (tmp_path / "report").exists()
+
+
+def test_methods_say_what_was_done_and_no_more(written):
+    out, votes = written
+    text = page(out)
+    said = text[text.index('<section class="methods">') :]
+    assert (
+        "18 observers judged 10 sequences, 2 of them hidden references, on a scale from 1 to 10"
+        in said
+    )
+    assert f"{len(votes)} votes were scored, 18 per sequence" in said
+    removed = len(pd.read_csv(out / "removed_votes.csv"))
+    assert f"once: {removed} of 180 votes ({100 * removed / 180:.1f} %)" in said
+    for done in ("DMOS", "Contrasts", "Mixed models", "Screening"):
+        assert f"<h3>{done}</h3>" in said
+    for not_done in ("Order", "Test and retest"):
+        assert f"<h3>{not_done}</h3>" not in said
+    assert "left out by decision" not in said
+
+
+def test_other_rules_of_removal_are_said(tmp_path):
+    votes = make_votes(methods=("none",))
+    analysis.write_votes(votes, tmp_path / "votes.csv")
+    files = [tmp_path / "votes.csv"]
+    analysis.write_report(files, tmp_path / "report", PAPER, threshold=1.5, passes=2)
+    text = page(tmp_path / "report")
+    assert "Votes are removed beyond 1.5 sd, not the paper&#39;s 2." in text
+    assert "further than 1.5 sample standard deviations" in text
+    assert "in 2 passes" in text
+    removed = pd.read_csv(tmp_path / "report" / "removed_votes.csv")
+    kept, expected = analysis.remove_outliers(votes, 1.5, passes=2)
+    assert len(removed) == len(expected) == len(votes) - len(kept)
+    assert pd.read_csv(tmp_path / "report" / "mos.csv")["n_removed"].sum() == len(removed)
+
+
+def repeated_votes():
+    """Votes of a test with places, two repetitions and a drift of a grade in ten presentations."""
+    random = np.random.default_rng(2)
+    rows = []
+    for observer in range(16):
+        shown = [(s, r) for s in range(8) for r in (1, 2)]
+        order = random.permutation(len(shown))
+        for place, at in enumerate(order, 1):
+            stimulus, repetition = shown[at]
+            vote = np.clip(np.rint(2 + stimulus / 2 + place / 10 + random.normal(0, 0.8)), 1, 10)
+            rows.append((f"o{observer}", f"s{stimulus}", repetition, place, vote))
+    columns = ["observer", "stimulus", "repetition", "presentation", "vote"]
+    return pd.DataFrame(rows, columns=columns)
+
+
+def test_order_and_repetition_are_shown_where_they_are_known(tmp_path):
+    out = report(tmp_path, repeated_votes())
+    text = page(out)
+    assert "The order of presentations shows in the votes (drift)" in Page(text).remarks
+    assert (out / "order.svg").is_file()
+    assert "128 votes of 16 observers were cast twice on the same sequence" in text
+    assert "<h3>Test and retest</h3>" in text
+    assert pd.read_csv(out / "order.csv")["effect"].tolist() == ["drift", "fatigue", "contrast"]
+
+
+def test_votes_that_spread_too_much_are_flagged(shared_data):
+    votes = pd.read_csv(shared_data / "votes" / "nflx_public_last4outliers_votes.csv")
+    votes = votes.rename(columns={"subject": "observer"})
+    results = analyse(votes, Description(Scale(1, 5)), Options())
+    found = " ".join(results.remarks)
+    assert "SOS parameter a = 0.26, over 0.25" in found
+    assert "Screening proposes to reject s27, s28, s29, s30" in found
+
+
+def test_very_many_stimuli_are_drawn_without_names(tmp_path):
+    random = np.random.default_rng(1)
+    rows = [
+        (f"o{o}", f"s{s}", np.clip(np.rint(random.normal(3 + s / 60, 1.2)), 1, 10))
+        for s in range(200)
+        for o in range(6)
+    ]
+    votes = pd.DataFrame(rows, columns=["observer", "stimulus", "vote"])
+    out = report(tmp_path, votes)
+    assert "200 stimuli, by MOS" in (out / "votes.svg").read_text()
+    assert "<!-- s17 -->" not in (out / "votes.svg").read_text()
+
+
+def test_scripts_to_copy_run(tmp_path, capsys, monkeypatch):
+    from analysis.scripts import compare_conditions, merge_and_convert, mos_report
+
+    votes = make_votes()
+    files = []
+    for lab in ("a", "b"):
+        (tmp_path / lab).mkdir()
+        files.append(tmp_path / lab / "votes.csv")
+        analysis.write_votes(votes, files[-1])
+    monkeypatch.setattr(mos_report, "REJECTED", ["b/s3"])
+    mos_report.main(files, tmp_path / "report")
+    assert set(pd.read_csv(tmp_path / "report" / "mos.csv")["n"]) == {35}
+    merge_and_convert.main(files, tmp_path / "merged")
+    merged = analysis.read_votes(tmp_path / "merged" / "votes.csv", PAPER)
+    assert len(merged) == 2 * len(votes)
+    assert len(analysis.read_votes(tmp_path / "merged" / "sureal.json", PAPER)) == len(merged)
+    capsys.readouterr()
+    compare_conditions.main(files[0])
+    said = capsys.readouterr().out
+    assert "Demosaicking (bilinear) lowers the MOS by" in said
+    assert "superiority" in said
 
 
 def test_public_names_load():

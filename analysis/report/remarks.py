@@ -7,9 +7,14 @@ import numpy as np
 import pandas as pd
 
 from analysis.models import p910
+from analysis.rejection import Rejected
+from analysis.repeatability import Retest
 from analysis.scale import Scale
+from analysis.screening import THRESHOLD_SD
+from analysis.sos import SUSPICIOUS, SosFit
 from analysis.votes import SCORED_KINDS, complete, index_votes
 
+SIGNIFICANT = 0.05
 FEW_OBSERVERS = 15  # BT.500: fewer make an informal test
 MANY_REMOVED = 0.10
 FEW_SEQUENCES = 20  # below, the standard error of a correlation of 0.7 is over 0.11
@@ -17,6 +22,18 @@ NAMES_LISTED = 6
 # The 2-sigma rule: with the sample sd, |z| is at most (n - 1) / sqrt(n), below 2 up to n = 5.
 REMOVABLE_FROM = 6
 ALL_TOO_CONSISTENT = 1e-3  # inconsistency over the scale's width: the fit leans on one observer
+
+
+@dataclass(frozen=True)
+class Findings:
+    """What other parts of the analysis found and a reader must know."""
+
+    sos: SosFit
+    retest: Retest | None
+    order: pd.DataFrame
+    models: tuple[str, ...]
+    rejected: tuple[Rejected, ...]
+    threshold: float
 
 
 @dataclass(frozen=True)
@@ -79,13 +96,22 @@ def remarks(
     counts: Counts,
     scores: pd.DataFrame,
     observers: pd.DataFrame,
+    findings: Findings,
 ) -> Iterator[str]:
     """Yield the remarks of a report, one sentence or two each."""
     yield from _about_the_test(votes, scale, counts)
-    yield from _about_the_removal(counts, scores)
+    if findings.rejected:
+        gone = pd.Series([str(one) for one in findings.rejected])
+        yield (
+            f"Left out by decision: {_names(gone)}. Every number of this report is "
+            "without the votes of these observers."
+        )
+    yield from _about_the_removal(counts, scores, findings.threshold)
     yield from _about_intervals(scale, scores)
     yield from _about_the_screens(observers, counts)
     yield from _about_the_model(votes, scale)
+    yield from _about_quality(findings)
+    yield from findings.models
 
 
 def _about_the_test(votes: pd.DataFrame, scale: Scale, counts: Counts) -> Iterator[str]:
@@ -105,7 +131,8 @@ def _about_the_test(votes: pd.DataFrame, scale: Scale, counts: Counts) -> Iterat
     if len(scored.table["repetition"].unique()) > 1:
         yield (
             "Sequences were shown repeatedly to the same observers. Their votes are pooled, as if "
-            "independent: the intervals are too short."
+            "independent: Student's intervals are too short; the bootstrap over observers in "
+            "mos.csv is not."
         )
     labs = scored.observers["lab"].nunique()
     if labs > 1:
@@ -115,16 +142,18 @@ def _about_the_test(votes: pd.DataFrame, scale: Scale, counts: Counts) -> Iterat
         yield "Not all sequences have the same number of votes: see n."
 
 
-def _about_the_removal(counts: Counts, scores: pd.DataFrame) -> Iterator[str]:
+def _about_the_removal(counts: Counts, scores: pd.DataFrame, threshold: float) -> Iterator[str]:
     removed = int(scores["n_removed"].sum())
+    if threshold != THRESHOLD_SD:
+        yield f"Votes are removed beyond {threshold:g} sd, not the paper's {THRESHOLD_SD:g}."
     if removed > MANY_REMOVED * counts.scored:
         yield (
-            f"The 2\u03c3 rule removes {100 * removed / counts.scored:.1f} % of the votes, more "
-            f"than {100 * MANY_REMOVED:.0f} %: the votes are far from normal, or observers did not "
-            "agree on what to judge."
+            f"The {threshold:g}\u03c3 rule removes {100 * removed / counts.scored:.1f} % of the "
+            f"votes, more than {100 * MANY_REMOVED:.0f} %: the votes are far from normal, or "
+            "observers did not agree on what to judge."
         )
     small = scores[scores["n"] < REMOVABLE_FROM]
-    if len(small):
+    if len(small) and threshold == THRESHOLD_SD:
         yield (
             f"The 2\u03c3 rule cannot remove anything where there are {REMOVABLE_FROM - 1} votes "
             f"or fewer: {_names(small['stimulus'])}."
@@ -134,19 +163,22 @@ def _about_the_removal(counts: Counts, scores: pd.DataFrame) -> Iterator[str]:
 def _about_intervals(scale: Scale, scores: pd.DataFrame) -> Iterator[str]:
     single = scores[scores["n"] == 1]
     if len(single):
-        yield f"A single vote has no interval: {_names(single['stimulus'])}."
+        yield (
+            f"A single vote has no interval of Student's: {_names(single['stimulus'])}. The "
+            "binomial one stands there."
+        )
     agreed = scores[scores["sd"] == 0]
     if len(agreed):
         yield (
             f"All votes are equal on {_names(agreed['stimulus'])}: Student's interval has no width "
-            "there, which does not mean certainty; and BT.500's screening passes such a sequence "
-            "over."
+            "there, the binomial one stands in its place; and BT.500's screening passes such a "
+            "sequence over."
         )
     beyond = scores[(scores["ci_low"] < scale.low) | (scores["ci_high"] > scale.high)]
     if len(beyond):
         yield (
             f"The interval leaves the scale on {_names(beyond['stimulus'])}: near the ends of the "
-            "scale it is an approximation."
+            "scale it is an approximation; the binomial interval in mos.csv never does."
         )
 
 
@@ -183,6 +215,27 @@ def _about_the_model(votes: pd.DataFrame, scale: Scale) -> Iterator[str]:
         yield (
             f"The P.910 model finds no inconsistency in {_names(pd.Series(observer_name(rigid)))}: "
             "it then rests on these votes alone; do not use its scores."
+        )
+
+
+def _about_quality(findings: Findings) -> Iterator[str]:
+    if findings.sos.suspicious:
+        yield (
+            f"The votes spread unusually: SOS parameter a = {findings.sos.a:.2f}, over "
+            f"{SUSPICIOUS}. Look for observers who did something else, or files that were mixed up."
+        )
+    found = findings.order[findings.order["p_holm"] < SIGNIFICANT]
+    for row in found.itertuples():
+        yield (
+            f"The order of presentations shows in the votes ({row.effect}): {row.meaning}, "
+            f"{row.slope:+.2f} [{row.ci_low:+.2f}, {row.ci_high:+.2f}].".replace("-", "\u2212")
+        )
+    repeated = findings.retest
+    if repeated is not None and repeated.shift_ci[0] * repeated.shift_ci[1] > 0:
+        low, high = repeated.shift_ci
+        yield (
+            f"Second votes on the same sequence differ from first ones by {repeated.shift:+.2f} "
+            f"[{low:+.2f}, {high:+.2f}] on average.".replace("-", "\u2212")
         )
 
 

@@ -26,7 +26,7 @@ def shown_stimuli(votes_csv: Path) -> list[dict[str, object]]:
     Empty where there is no such file, or where its clips carry no figures (made elsewhere). Raises
     `InputError` where the file is there and cannot be used.
     """
-    path = votes_csv.with_name(STIMULI)
+    path = votes_csv.resolve().with_name(STIMULI)
     if not path.is_file():
         return []
     try:

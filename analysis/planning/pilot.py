@@ -1,0 +1,187 @@
+"""Power of a larger test, simulated with the observer model fitted to a pilot's votes."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from scipy.stats import t
+
+from analysis.holm import holm
+from analysis.inference.design import CELL, Contrast, list_contrasts
+from analysis.models import fit_p910
+from analysis.scale import Scale
+from analysis.table import Column, Kind
+from analysis.votes import Indexed, index_votes
+from dsis.errors import InputError
+
+RUNS = 1000
+OBSERVERS = (8, 12, 15, 18, 24, 30, 40)
+ALPHA = 0.05
+GENERIC = "every sequence"
+
+POWER_COLUMNS = (
+    Column("comparison", Kind.TEXT, "", "which stimuli"),
+    Column("observers", Kind.WHOLE, "observer", "size of the simulated test"),
+    Column("difference", Kind.NUMBER, "grade", "of the two scores in the simulation"),
+    Column("power", Kind.NUMBER, "", "share of simulated tests that show it: paired t, Holm"),
+    Column("power_se", Kind.NUMBER, "", "standard error of that share"),
+)
+
+
+def power_from_pilot(
+    votes: pd.DataFrame,
+    scale: Scale,
+    *,
+    observers: Sequence[int] = OBSERVERS,
+    difference: float | None = None,
+    runs: int = RUNS,
+    seed: int = 1,
+) -> pd.DataFrame:
+    """Return power curves: how often tests of so many observers show what the pilot found.
+
+    P.910 is fitted to the pilot. Simulated observers have the inconsistency of one drawn from the
+    panel and a normal bias with the panel's sd; their votes are score + bias + inconsistency X,
+    rounded to whole grades where the pilot's are, and kept on the scale. Each simulated test makes
+    all comparisons, paired t with Holm at 5 %.
+
+    Parameters
+    ----------
+    votes, scale
+        Of the pilot.
+    observers
+        Sizes to try, each at least 2.
+    difference
+        None: the pilot's own pairs of conditions with the differences found there (an optimistic
+        choice where the pilot is small: it takes what chance has added for true). Else: each
+        sequence against itself shifted down by so many grades, Holm over all, power averaged.
+    runs, seed
+        Simulated tests per size; what fixes them.
+
+    Returns
+    -------
+    DataFrame
+        Columns `POWER_COLUMNS`.
+
+    Raises
+    ------
+    InputError
+        Fewer than two observers in the pilot, a size below two, or no pairs of conditions and no
+        `difference`.
+    """
+    scored = index_votes(votes)
+    if len(scored.observers) < 2:
+        raise InputError.of("--pilot", "", "holds votes of one observer, must be at least two")
+    if min(observers) < 2:
+        raise InputError.of("--observers", "", f"is {min(observers)}, must be at least 2")
+    pairs = _own_pairs(scored) if difference is None else _shifted(scored, difference)
+    panel = _panel(scored, scale)
+    tables = [
+        _simulated(panel, pairs, size, runs, np.random.SeedSequence([seed, size]))
+        for size in sorted(set(observers))
+    ]
+    return pd.concat(tables, ignore_index=True)
+
+
+class _Panel(NamedTuple):
+    """The fitted observers and the scale."""
+
+    bias_sd: float
+    inconsistency: NDArray[np.float64]
+    scale: Scale
+    whole: bool
+
+
+class _Pairs(NamedTuple):
+    """Scores to compare: (pair,) each, and what to call them."""
+
+    names: list[str]
+    first: NDArray[np.float64]
+    second: NDArray[np.float64]
+    averaged: bool
+
+
+def _panel(scored: Indexed, scale: Scale) -> _Panel:
+    people = fit_p910(scored).observers
+    whole = bool((scored.vote == np.rint(scored.vote)).all())
+    bias, v = people["bias"].to_numpy(), people["inconsistency"].to_numpy()
+    # What a bias is uncertain by is no difference between people.
+    noise = float((v**2 / people["n"]).mean())
+    variance = max(float(bias.var(ddof=1)) - noise, 0.0)
+    return _Panel(float(np.sqrt(variance)), v.astype(np.float64), scale, whole)
+
+
+def _own_pairs(scored: Indexed) -> _Pairs:
+    cells = [c for c in list_contrasts(scored) if c.grain == CELL]
+    if not cells:
+        fact = "names no conditions to compare (noise, demosaic): give --difference"
+        raise InputError.of("--pilot", "", fact)
+    score = fit_p910(scored).scores["score"].to_numpy(dtype=np.float64)
+    plus = [cell.plus[0] for cell in cells]
+    minus = [cell.minus[0] for cell in cells]
+    return _Pairs([_called(cell) for cell in cells], score[plus], score[minus], averaged=False)
+
+
+def _called(cell: Contrast) -> str:
+    stops = f", {cell.level} stops" if cell.level not in ("", "0") else ""
+    return f"{cell.treatment}, {cell.content}, {cell.within}{stops}"
+
+
+def _shifted(scored: Indexed, difference: float) -> _Pairs:
+    score = fit_p910(scored).scores["score"].to_numpy(dtype=np.float64)
+    return _Pairs([GENERIC], score - abs(difference), score, averaged=True)
+
+
+def _simulated(
+    panel: _Panel, pairs: _Pairs, size: int, runs: int, seed: np.random.SeedSequence
+) -> pd.DataFrame:
+    """Return the power of each pair with `size` observers."""
+    random = np.random.Generator(np.random.PCG64(seed))
+    shown = np.empty((runs, len(pairs.first)), dtype=np.bool_)
+    found = np.empty((runs, len(pairs.first)))
+    for run in range(runs):
+        bias = random.normal(0.0, 1.0, size) * panel.bias_sd
+        v = panel.inconsistency[random.integers(len(panel.inconsistency), size=size)]
+        sides = [_votes(panel, score, bias, v, random) for score in (pairs.first, pairs.second)]
+        paired = sides[0] - sides[1]
+        found[run] = paired.mean(axis=1)
+        shown[run] = holm(_paired_p(paired)) <= ALPHA
+    if pairs.averaged:
+        shown_share, difference = shown.mean(axis=1, keepdims=True), found.mean()
+    else:
+        shown_share, difference = shown.astype(np.float64), found.mean(axis=0)
+    power = shown_share.mean(axis=0)
+    return pd.DataFrame(
+        {
+            "comparison": pairs.names,
+            "observers": size,
+            "difference": difference,
+            "power": power,
+            "power_se": shown_share.std(axis=0) / np.sqrt(runs),
+        }
+    )
+
+
+def _votes(
+    panel: _Panel,
+    score: NDArray[np.float64],
+    bias: NDArray[np.float64],
+    v: NDArray[np.float64],
+    random: np.random.Generator,
+) -> NDArray[np.float64]:
+    """Return votes, (stimulus, observer)."""
+    votes = score[:, None] + bias + v * random.standard_normal((len(score), len(v)))
+    if panel.whole:
+        votes = np.rint(votes)
+    return np.asarray(np.clip(votes, panel.scale.low, panel.scale.high), dtype=np.float64)
+
+
+def _paired_p(paired: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the p-values of paired t tests along observers; where all differ alike: 0 or 1."""
+    n = paired.shape[1]
+    mean, sd = paired.mean(axis=1), paired.std(axis=1, ddof=1)
+    flat = sd <= 1e-12
+    statistic = np.divide(np.abs(mean), sd / np.sqrt(n), out=np.zeros_like(mean), where=~flat)
+    p = 2 * t.sf(statistic, n - 1)
+    return np.asarray(np.where(flat, (mean == 0).astype(np.float64), p), dtype=np.float64)

@@ -1,0 +1,43 @@
+"""The tables of a report as CSV: which file has which columns."""
+
+import pandas as pd
+
+from analysis.hidden_reference import DMOS_COLUMNS
+from analysis.inference import CONTRAST_COLUMNS, EFFECT_COLUMNS
+from analysis.likelihood import MODEL_COLUMNS
+from analysis.order import ORDER_COLUMNS
+from analysis.rejection import PROPOSAL_COLUMNS
+from analysis.report.results import Results
+from analysis.scores import MOS_COLUMNS, OBSERVER_COLUMNS
+from analysis.screening import REMOVED_COLUMNS
+from analysis.screens import SCREEN_COLUMNS
+from analysis.table import Column
+
+TABLES: dict[str, tuple[Column, ...]] = {
+    "mos.csv": MOS_COLUMNS,
+    "observers.csv": OBSERVER_COLUMNS,
+    "removed_votes.csv": REMOVED_COLUMNS,
+    "dmos.csv": DMOS_COLUMNS,
+    "contrasts.csv": CONTRAST_COLUMNS,
+    "effects.csv": EFFECT_COLUMNS,
+    "models.csv": MODEL_COLUMNS,
+    "screens.csv": SCREEN_COLUMNS,
+    "rejections.csv": PROPOSAL_COLUMNS,
+    "order.csv": ORDER_COLUMNS,
+}
+
+
+def tables_of(results: Results) -> dict[str, pd.DataFrame]:
+    """Return the table of each file of `TABLES`."""
+    return {
+        "mos.csv": results.scores,
+        "observers.csv": results.observers,
+        "removed_votes.csv": results.removed,
+        "dmos.csv": results.dmos,
+        "contrasts.csv": results.contrasts,
+        "effects.csv": results.modelled.effects,
+        "models.csv": results.models,
+        "screens.csv": results.screens,
+        "rejections.csv": results.proposal,
+        "order.csv": results.order,
+    }

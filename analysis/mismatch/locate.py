@@ -150,7 +150,5 @@ def _pixels(
     step = 1 if channel == "MONO" else 2
     order = np.argsort(-np.abs(image - np.median(image)), axis=None)[:count]
     rows, columns = np.unravel_index(order, image.shape)
-    from analysis.mismatch.recalibrate import sites  # noqa: PLC0415
-
-    y, x = sites(layout.cfa)[channel]
+    y, x = layout.sites[channel]
     return tuple((int(r) * step + y, int(c) * step + x) for r, c in zip(rows, columns, strict=True))

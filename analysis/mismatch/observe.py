@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.bank.coherent import Peak, SpectrumSums, VarianceSums
+from analysis.mismatch.bank.common import common
 from analysis.mismatch.bank.maps import PatternSums, Regressors, parts
 from analysis.mismatch.bank.scalars import Number, scalars
-from dsis.cfa import Cfa
+from dsis.cfa import Cfa, pattern
 from dsis.measures import Accumulator, Measured
 
 Array = NDArray[np.float64]
@@ -75,6 +76,11 @@ class Layout:
         return ("MONO",) if self.cfa is Cfa.MONO else ("R", "Gr", "Gb", "B")
 
     @property
+    def sites(self) -> dict[str, tuple[int, int]]:
+        """First row and column of each channel."""
+        return sites(self.cfa)
+
+    @property
     def uniform(self) -> tuple[Taken, ...]:
         """Darks and flats."""
         return tuple(e for e in self.exposures if e.kind != "scene")
@@ -86,11 +92,23 @@ class Layout:
             names,
             {name: self.signal_dn[name, channel] for name in names},
             {e.name: e.exposure_time_s for e in self.uniform},
-            {
-                e.name: len(e.numbers) / self.variance_dn2[e.name, channel]
-                for e in self.uniform
-            },
+            {e.name: len(e.numbers) / self.variance_dn2[e.name, channel] for e in self.uniform},
         )
+
+
+def sites(cfa: Cfa) -> dict[str, tuple[int, int]]:
+    """Return the first row and column of each channel, in the order R, Gr, Gb, B."""
+    if cfa is Cfa.MONO:
+        return {"MONO": (0, 0)}
+    colours = pattern(cfa)
+    found = {}
+    for y in (0, 1):
+        for x in (0, 1):
+            name = "RGB"[colours[y, x]]
+            if name == "G":
+                name += "r" if 0 in colours[y] else "b"
+            found[name] = (y, x)
+    return {name: found[name] for name in ("R", "Gr", "Gb", "B")}
 
 
 @dataclass(frozen=True)
@@ -137,6 +155,8 @@ class Observation:
     images
         Kept on demand: maps of the fixed pattern (DN at the regressor's largest value, noise) by
         channel and name, and summed relative pixel variances under the name `variance`.
+    common
+        What the channels of a mosaic have in common, by exposure.
     """
 
     levels: Mapping[Place, Level]
@@ -145,13 +165,12 @@ class Observation:
     pooled: Mapping[str, Mapping[str, Number]]
     peaks: Mapping[tuple[str, str], Peak]
     images: Mapping[tuple[str, str], tuple[Array, float]] = field(default_factory=dict)
+    common: Mapping[str, Mapping[str, Number]] = field(default_factory=dict)
 
 
 def measure(layout: Layout, exposure: Taken, frames: Iterable[NDArray[np.generic]]) -> Measured:
     """Return the measures of one exposure's frames."""
-    sums = Accumulator(
-        layout.rows, layout.columns, layout.cfa, layout.black_dn, layout.white_dn
-    )
+    sums = Accumulator(layout.rows, layout.columns, layout.cfa, layout.black_dn, layout.white_dn)
     for frame in frames:
         sums.add(frame)
     return sums.result()
@@ -185,11 +204,15 @@ def observe(
     levels: dict[Place, Level] = {}
     found: dict[Place, Mapping[str, Number]] = {}
     sums: dict[str, _Channel] = {}
+    together: dict[str, Mapping[str, Number]] = {}
     for exposure in layout.uniform:
         measured = measure(layout, exposure, frames_of(exposure.name))
         if watch is not None:
             watch(exposure.name, measured)
         frames = len(exposure.numbers)
+        if len(measured.channels) > 1:
+            signals = {name: layout.signal_dn[exposure.name, name] for name in measured.channels}
+            together[exposure.name] = common(measured.channels, signals, frames, layout.sites)
         for name, channel in measured.channels.items():
             place = (exposure.name, name)
             shape = channel.mean_frame.shape
@@ -231,4 +254,4 @@ def observe(
         ):
             if peak is not None:
                 peaks[name, kind] = peak
-    return Observation(levels, found, maps, pooled, peaks, images)
+    return Observation(levels, found, maps, pooled, peaks, images, together)

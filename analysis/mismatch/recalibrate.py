@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from analysis.mismatch.basefit import BaseFit, Offsets, colour, fit_base
 from analysis.mismatch.finding import ParameterError
 from analysis.mismatch.model import Model, Sites, simulate
-from analysis.mismatch.observe import Layout, Level, Observation, Place, Taken
+from analysis.mismatch.observe import Layout, Level, Observation, Place, Taken, sites
 from analysis.mismatch.rounding import rounded, unrounded
 from dsis.camera import BaseNoise, Camera, Segment
-from dsis.cfa import Cfa, pattern
+from dsis.cfa import Cfa
 from dsis.recording import Recording
 
 _ROUNDS = 3
@@ -108,26 +108,6 @@ def layout_of(
         signal,
         variances,
     )
-
-
-def sites(cfa: Cfa) -> dict[str, tuple[int, int]]:
-    """Return the first row and column of each channel."""
-    if cfa is Cfa.MONO:
-        return {"MONO": (0, 0)}
-    colours = pattern(cfa)
-    found = {}
-    for y in (0, 1):
-        for x in (0, 1):
-            name = "RGB"[colours[y, x]]
-            if name == "G":
-                name += "r" if 0 in colours[y] else "b"
-            found[name, (y, x)] = (y, x)
-    return {
-        name: place
-        for name in ("R", "Gr", "Gb", "B")
-        for (n, _), place in found.items()
-        if n == name
-    }
 
 
 def calibrate(

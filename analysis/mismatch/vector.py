@@ -43,15 +43,16 @@ def vector(layout: Layout, seen: Observation, fit: BaseFit) -> Vector:
     for exposure in layout.uniform:
         for channel in layout.channels:
             place = (exposure.name, channel)
-            rows += [
-                (Key(name, "exposure", *place), seen.scalars[place][name]) for name in NAMES
-            ]
+            rows += [(Key(name, "exposure", *place), seen.scalars[place][name]) for name in NAMES]
             rows.append((Key("pixel_variance", "exposure", *place), _variance(place, seen, fit)))
             level = _level(layout, exposure.name, channel, seen, fit)
             rows.append((Key("level", "exposure", *place), level))
         if "Gr" in layout.channels and exposure.kind == "flat":
             rows.append((Key("channel_ratio", "exposure", exposure.name, "G"),
                          _ratio(exposure.name, seen, fit)))  # fmt: skip
+        for label, number in seen.common.get(exposure.name, {}).items():
+            statistic, detail = split_name(label)
+            rows.append((Key(statistic, MOSAIC, exposure.name, "", detail), number))
     for (channel, name), numbers in seen.maps.items():
         for label, number in numbers.items():
             statistic, detail = split_name(label)
@@ -127,6 +128,8 @@ def contrasts(layout: Layout, reference: Vector, known: NDArray[np.bool_]) -> Co
     """Return the contrasts over the numbers of single exposures that are known."""
     places: dict[tuple[str, str], list[int]] = {}
     for i, key in enumerate(reference.keys):
+        if key.scope == MOSAIC and known[i]:
+            places.setdefault((key.statistic, MOSAIC), []).append(i)
         if key.scope == "exposure" and known[i] and key.statistic not in OF_CODES:
             places.setdefault((key.statistic, ""), []).append(i)
             if key.statistic in _PAIRS:
@@ -140,7 +143,7 @@ def contrasts(layout: Layout, reference: Vector, known: NDArray[np.bool_]) -> Co
             continue
         kept: list[Array] = []
         for name, shape in SHAPES.items():
-            if channel == BOTH and name == "with the signal alone":
+            if channel in (BOTH, MOSAIC) and name == "with the signal alone":
                 continue
             if statistic in OF_MEAN_FRAMES and name == "with the signal alone":
                 continue
@@ -157,8 +160,9 @@ def contrasts(layout: Layout, reference: Vector, known: NDArray[np.bool_]) -> Co
             if any(abs(float(row @ other)) > 0.98 for other in kept):
                 continue
             kept.append(row)
-            own = "" if channel == BOTH else channel
-            keys.append(Key(statistic, "contrast", "", own, name))
+            joint = channel in (BOTH, MOSAIC)
+            detail = f"{name} {channel}" if joint else name
+            keys.append(Key(statistic, "contrast", "", "" if joint else channel, detail))
             rows.append(row)
     for (statistic, scope, detail), which in _over_channels(reference, known).items():
         row = np.zeros(len(reference.keys))
@@ -174,12 +178,13 @@ def _over_channels(
     """Return the numbers of sums over exposures, channels together; long lags stay single."""
     groups: dict[tuple[str, str, str], list[int]] = {}
     for i, key in enumerate(reference.keys):
-        if key.scope != "exposure" and known[i] and key.statistic != "line_correlation":
+        if not key.exposure and known[i] and key.statistic != "line_correlation":
             groups.setdefault((key.statistic, key.scope, key.detail), []).append(i)
     return groups
 
 
 BOTH = "along rows and columns"
+MOSAIC = "in all channels"
 _PAIRS = {
     "correlation_0_1": "correlation_0_1",
     "correlation_1_0": "correlation_0_1",

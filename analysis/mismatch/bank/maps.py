@@ -7,13 +7,16 @@ where the sensor has no pattern; what single exposures hide stands out of the su
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import sqrt
+from functools import lru_cache
+from math import log, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.bank.scalars import Number, ratio_root
+from dsis.compiled import kernel
 from dsis.measures.fixed_pattern import Smooth
+from dsis.measures.residuals import pixel_residuals
 
 Array = NDArray[np.float64]
 MAPS = ("offset", "gain", "time")
@@ -147,68 +150,90 @@ def parts(image: Array, noise: float) -> Parts:
     smooth = Smooth.of(n, m)
     unit = (image - image.mean()) / noise
     coefficients = smooth.coefficients(unit)
-    mixed = int(smooth.mixed.sum())
-    by_row, by_column = unit.mean(1), unit.mean(0)
-    pixels = unit - by_row[:, None] - by_column
-    pixels = pixels - smooth.surface(np.where(smooth.mixed, coefficients, 0.0))
-    dof = (n - 1) * (m - 1) - mixed
-    square = float((pixels**2).sum()) / dof
+    by_row, by_column, pixels, squares, scatter = pixel_residuals(
+        unit, smooth.weights(coefficients), smooth.across
+    )
+    dof = (n - 1) * (m - 1) - smooth.kinds
+    square = squares / dof
     rows = by_row - smooth.along_rows @ (smooth.along_rows.T @ by_row)
     columns = by_column - smooth.along_columns @ (smooth.along_columns.T @ by_column)
     degree = smooth.degree
-    row = m * float((rows**2).sum()) / (n - 1 - degree)
-    column = n * float((columns**2).sum()) / (m - 1 - degree)
-    surface = (coefficients[smooth.mixed] ** 2).sum()
-    lines = (coefficients[1:, 0] ** 2).sum() * square / max(row, square) + (
-        coefficients[0, 1:] ** 2
-    ).sum() * square / max(column, square)
-    kinds = mixed + 2 * degree
+    row = m * float(rows @ rows) / (n - 1 - degree)
+    column = n * float(columns @ columns) / (m - 1 - degree)
+    power = coefficients**2
+    surface = float(power[smooth.mixed].sum())
+    lines = float(power[1:, 0].sum()) * square / max(row, square)
+    lines += float(power[0, 1:].sum()) * square / max(column, square)
+    kinds = smooth.kinds + 2 * degree
+    mean_square = squares / pixels.size
     numbers = {
         "fixed_pixel_variance": ratio_root(square, dof),
         "fixed_row_variance": ratio_root(row / square, n - 1 - degree, dof),
         "fixed_column_variance": ratio_root(column / square, m - 1 - degree, dof),
         "fixed_smooth_variance": ratio_root((surface + lines) / kinds / square, kinds, dof),
-        **_correlations(pixels),
-        "outlying_pixels": _outlying(pixels, square),
+        **_correlations(pixels, mean_square),
+        "outlying_pixels": _outlying(scatter + mean_square**2, square, pixels.size),
         **_seams(by_row, by_column, (row, column)),
     }
     return Parts(pixels, rows, columns, square, numbers)
 
 
-def _correlations(pixels: Array) -> dict[str, Number]:
-    square = float((pixels**2).mean())
+def _correlations(pixels: Array, square: float) -> dict[str, Number]:
+    n, m = pixels.shape
     sd = 1 / sqrt(pixels.size)
+    beside, below = _neighbours(pixels)
     return {
-        "fixed_correlation_0_1": (float((pixels[:, 1:] * pixels[:, :-1]).mean()) / square, sd),
-        "fixed_correlation_1_0": (float((pixels[1:] * pixels[:-1]).mean()) / square, sd),
+        "fixed_correlation_0_1": (float(beside) / (n * (m - 1)) / square, sd),
+        "fixed_correlation_1_0": (float(below) / ((n - 1) * m) / square, sd),
     }
 
 
-def _outlying(pixels: Array, square: float) -> Number:
+@kernel
+def _neighbours(pixels: Array) -> tuple[float, float]:
+    """Return the sums of products of neighbours in a row, and in a column."""
+    rows, columns = pixels.shape
+    beside, below = 0.0, 0.0
+    for y in range(rows):
+        line, total = pixels[y], 0.0
+        for x in range(1, columns):
+            total += line[x - 1] * line[x]
+        beside += total
+        if y:
+            total, above = 0.0, pixels[y - 1]
+            for x in range(columns):
+                total += above[x] * line[x]
+            below += total
+    return beside, below
+
+
+def _outlying(fourth: float, square: float, size: int) -> Number:
     """Return the excess kurtosis of a map: few pixels that stand far out."""
-    fourth = float((pixels**4).mean()) / square**2
-    return float(np.log(max(fourth, 0.1) / 3)), sqrt(24 / pixels.size) / 3
+    return log(max(fourth / square**2, 0.1) / 3), sqrt(24 / size) / 3
 
 
 def _seams(by_row: Array, by_column: Array, squares: tuple[float, float]) -> dict[str, Number]:
-    """Return the step between halves, and between even and odd lines, in its own noise."""
+    """Return the step between halves, and between even and odd lines, in its own noise.
+
+    Each is the coefficient of its shape beside smooth polynomials, over its error.
+    """
     found: dict[str, Number] = {}
     for axis, means, square, across in (
         ("rows", by_row, squares[0], by_column.size),
         ("columns", by_column, squares[1], by_row.size),
     ):
-        size = means.size
         sd = sqrt(square / across)
-        step = np.where(np.arange(size) < size / 2, -0.5, 0.5)
-        comb = np.where(np.arange(size) % 2 == 0, -0.5, 0.5)
-        for name, shape in (("half_seam", step), ("parity", comb)):
-            found[f"{name} of {axis}"] = _projected(means, shape, sd)
+        for name, shape in zip(("half_seam", "parity"), _seam_shapes(means.size), strict=True):
+            found[f"{name} of {axis}"] = (float(shape @ means) / sd, 1.0)
     return found
 
 
-def _projected(means: Array, shape: Array, sd: float) -> Number:
-    """Return the coefficient of a shape beside smooth polynomials, over its error."""
-    place = np.linspace(-1, 1, means.size)
-    smooth = np.polynomial.legendre.legvander(place, min(4, means.size - 3))
-    rest = shape - smooth @ np.linalg.lstsq(smooth, shape, rcond=None)[0]
-    return float(rest @ means) / (sd * float(np.linalg.norm(rest))), 1.0
+@lru_cache(maxsize=64)
+def _seam_shapes(size: int) -> tuple[Array, Array]:
+    """Return the step between halves and the comb, less smooth polynomials, of norm 1."""
+    place, line = np.linspace(-1, 1, size), np.arange(size)
+    smooth = np.polynomial.legendre.legvander(place, min(4, size - 3))
+    step, comb = np.where(line < size / 2, -0.5, 0.5), np.where(line % 2 == 0, -0.5, 0.5)
+    both = np.stack([step, comb], 1)
+    rest = both - smooth @ np.linalg.lstsq(smooth, both, rcond=None)[0]
+    rest /= np.linalg.norm(rest, axis=0)
+    return np.ascontiguousarray(rest[:, 0]), np.ascontiguousarray(rest[:, 1])

@@ -252,7 +252,9 @@ def _piece(
             rest_v = v - (slope or 0.0) * x
             parameters = np.array([slope or 0.0, float((w * rest_v).sum() / w.sum())])
             inverse = np.array([[np.inf, 0.0], [0.0, 1 / w.sum()]])
-        total = np.maximum(parameters[0] * x + parameters[1] + added, 0.05 * np.maximum(v + added, 1e-9))
+        total = np.maximum(
+            parameters[0] * x + parameters[1] + added, 0.05 * np.maximum(v + added, 1e-9)
+        )
     return Piece(
         low,
         float(parameters[0]),

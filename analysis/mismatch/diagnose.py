@@ -20,6 +20,7 @@ from analysis.mismatch.finding import (
 from analysis.mismatch.name import Named, Search
 from analysis.mismatch.observe import observe
 from analysis.mismatch.recalibrate import layout_of, parameter_errors
+from analysis.mismatch.settle import would_settle
 from analysis.mismatch.source import Source
 from analysis.mismatch.split import Split
 from analysis.mismatch.state import Setting, State
@@ -29,6 +30,7 @@ from dsis.recording import Recording
 
 Progress = Callable[[int, int, str], None]
 VOCABULARY = frozenset({*CANDIDATES, "dual_gain"})
+_NEAR = 8.0  # of log-likelihood: a rival worth naming a recording that would decide
 _ERRORS = 2.2  # standard errors from a gain to the end of its interval, of few frames
 _LARGE = 2.5e7  # samples from which fewer simulations must do
 
@@ -67,7 +69,7 @@ def find_mismatch(
     search = Search(setting, camera, base, words, step)
     final = search.run()
     trial = Trial.of(recording, split, base, seed)
-    final, gains = _proven(search, final, trial)
+    final, gains = _proven(search, search.settle(final), trial)
     proof = trial.proof(base, final, step, source)
     return _finding(camera, base, final, search, gains, proof)
 
@@ -100,15 +102,13 @@ def _finding(
     gains: dict[str, Gain],
     proof: Proof,
 ) -> Finding:
-    errors = parameter_errors(
-        camera, final.calibrated, final.setting.layout, final.fits
-    )
+    errors = parameter_errors(camera, final.calibrated, final.setting.layout, final.fits)
     explanations = explained(base, final, search.changes(final))
     mismatches = tuple(
         replace(m, explained_by=explanations[m.statistic][0], z_after=explanations[m.statistic][1])
         for m in base.mismatches
     )
-    omitted = tuple(_omitted(n, mismatches, gains[n.kind], search) for n in search.named)
+    omitted = tuple(_omitted(n, mismatches, gains[n.kind]) for n in search.named)
     verdict: Verdict = "match"
     if omitted:
         verdict = "omitted_physics"
@@ -116,7 +116,11 @@ def _finding(
         verdict = "unexplained"
     elif errors:
         verdict = "parameters"
-    undecided = tuple(Alternative(kind, None, why) for kind, why in search.refused.items())
+    tied = {one.kind: other.kind for pair in search.ties for one, other in (pair, pair[::-1])}
+    undecided = tuple(
+        Alternative(kind, None, why, would_settle(kind, tied[kind]) if kind in tied else "")
+        for kind, why in search.refused.items()
+    )
     return Finding(
         verdict,
         mismatches,
@@ -130,9 +134,7 @@ def _finding(
     )
 
 
-def _omitted(
-    named: Named, mismatches: tuple[Mismatch, ...], gain: Gain, search: Search
-) -> OmittedEffect:
+def _omitted(named: Named, mismatches: tuple[Mismatch, ...], gain: Gain) -> OmittedEffect:
     parameters = {}
     if named.proposal is not None:
         effect = named.proposal.effect
@@ -143,8 +145,12 @@ def _omitted(
     else:
         parameters["switch_dn"] = FittedParameter(named.switch_dn, named.errors["switch_dn"])
     rivals = tuple(
-        Alternative(kind, None, f"explains the numbers {worse:.3g} nats worse")
+        Alternative(
+            kind,
+            None,
+            f"explains the numbers {worse:.3g} nats worse",
+            would_settle(named.kind, kind) if worse < _NEAR else "",
+        )
         for kind, worse in named.rivals
     )
-    del search
     return OmittedEffect(named.kind, parameters, because(mismatches, named.kind), gain, rivals)

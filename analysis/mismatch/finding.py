@@ -90,9 +90,12 @@ class ParameterError:
 
 @dataclass(frozen=True)
 class FittedParameter:
-    """A parameter of a named effect; `standard_error` in its unit."""
+    """A parameter of a named effect, several numbers for one such as a frequency (x, y).
 
-    value: float
+    `standard_error` is in its unit, that of each number.
+    """
+
+    value: float | tuple[float, ...]
     standard_error: float
 
 
@@ -183,3 +186,9 @@ class Finding:
     camera: Camera
     remarks: tuple[str, ...] = ()
     evidence: Any = field(default=None, compare=False, repr=False)
+
+    def values(self) -> dict[str, Any]:
+        """Return what `mismatch.json` holds: plain values, None for what is not known."""
+        from analysis.mismatch.jsonfile import finding_values  # noqa: PLC0415 # it imports this file
+
+        return finding_values(self)

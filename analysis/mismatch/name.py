@@ -9,15 +9,17 @@ from numpy.typing import NDArray
 from analysis.mismatch.candidates import Proposal
 from analysis.mismatch.polish import polish, with_effects
 from analysis.mismatch.predict import Predictor
-from analysis.mismatch.rank import ranked
+from analysis.mismatch.rank import Ranked, ranked
 from analysis.mismatch.segments import second_path
 from analysis.mismatch.state import Setting, State
+from analysis.mismatch.uncertainty import settled
 from dsis.camera import Camera
 from dsis.effects import Effect
 
 Array = NDArray[np.float64]
 Step = Callable[[], None]
 LEAST_GAIN = 5.0  # of log-likelihood, for an effect to be taken in
+_TIE = 2.0  # of log-likelihood: two effects nearer than that cannot be told apart
 _MOST_EFFECTS = 5
 _CLEAR = 3.0  # departures below are chance
 _RESOLVED = 0.7  # share of what an effect touches that it must explain
@@ -60,6 +62,7 @@ class Search:
     step: Step
     named: list[Named] = field(default_factory=list)
     refused: dict[str, str] = field(default_factory=dict)
+    ties: list[tuple[Ranked, Ranked]] = field(default_factory=list)
 
     def run(self) -> State:
         """Return the final state."""
@@ -71,6 +74,20 @@ class Search:
             self.named.append(added[0])
             state = State.of(self.setting, added[1], self.step)
         return self._pruned(self._polished(state))
+
+    def settle(self, state: State) -> State:
+        """Return the state with final parameters; their errors go into the effects named."""
+        mine = [(n, n.proposal) for n in self.named if n.proposal is not None]
+        if not mine:
+            return state
+        bare = _without(state.camera, [p.effect for _, p in mine], self.camera)
+        effects, errors = settled(state, bare, [p for _, p in mine])
+        fitted = iter(zip(effects, errors, strict=True))
+        self.named = [
+            n if n.proposal is None else _renewed(n, n.proposal, *next(fitted)) for n in self.named
+        ]
+        camera = with_effects(bare, effects)
+        return state if camera is None else State.of(self.setting, camera, self.step)
 
     def without(self, state: State, named: Named) -> Camera:
         """Return a state's camera without one of the effects named."""
@@ -101,7 +118,7 @@ class Search:
     def _best(self, state: State) -> tuple[Named, Camera] | None:
         """Return the effect that explains most, and the camera with it."""
         left = self.vocabulary - {n.kind for n in self.named} - set(self.refused)
-        fitted = ranked(state, left, self.step)
+        fitted = self._decided(ranked(state, left, self.step))
         off = {m.statistic for m in state.mismatches}
         path = second_path(state) if "dual_gain" in left and "pixel_variance" in off else None
         most = fitted[0].gain if fitted else 0.0
@@ -122,6 +139,16 @@ class Search:
         effect = Proposal(best.polished.effects[0], best.proposal.free, best.proposal.signed)
         return Named(best.kind, effect, best.polished.errors[0], best.gain, rivals), camera
 
+    def _decided(self, fitted: list[Ranked]) -> list[Ranked]:
+        """Put aside pairs that tie: neither is claimed."""
+        while len(fitted) > 1 and fitted[1].gain > max(fitted[0].gain - _TIE, LEAST_GAIN):
+            first, second = fitted[:2]
+            self.ties.append((first, second))
+            for one, other in ((first, second), (second, first)):
+                self.refused[one.kind] = f"explains the recording no better than {other.kind}"
+            fitted = fitted[2:]
+        return fitted
+
     def _polished(self, state: State) -> State:
         """Fit the parameters of all effects together, and judge the result once more."""
         mine = [(n, n.proposal) for n in self.named if n.proposal is not None]
@@ -132,11 +159,9 @@ class Search:
         polished = polish(predictor, bare, [p for _, p in mine], rounds=2)
         if polished is None:
             return state
-        scale = (1 + 1 / (2 * self.setting.replicates)) ** 0.5
         fitted = iter(zip(polished.effects, polished.errors, strict=True))
         self.named = [
-            n if n.proposal is None else _renewed(n, n.proposal, *next(fitted), scale)
-            for n in self.named
+            n if n.proposal is None else _renewed(n, n.proposal, *next(fitted)) for n in self.named
         ]
         camera = with_effects(bare, polished.effects)
         return state if camera is None else State.of(self.setting, camera, self.step)
@@ -172,13 +197,11 @@ def _bent(base: State, final: State) -> Array:
     return np.where(own, base.vector.values - final.vector.values, 0.0)
 
 
-def _renewed(
-    named: Named, proposal: Proposal, effect: Effect, errors: dict[str, float], scale: float
-) -> Named:
+def _renewed(named: Named, proposal: Proposal, effect: Effect, errors: dict[str, float]) -> Named:
     return replace(
         named,
         proposal=Proposal(effect, proposal.free, proposal.signed),
-        errors={name: error * scale for name, error in errors.items()},
+        errors=errors,
     )
 
 

@@ -121,5 +121,3 @@ def adjusted(chances: Array, weights: Array) -> Array:
     result = np.empty(len(chances))
     result[order] = np.maximum.accumulate(np.minimum(1.0, scaled[order] * left))
     return result
-
-

@@ -246,7 +246,7 @@ def observe(
                 images[name, kind] = (image, noise)
         if keep:
             images[name, "variance"] = (own.variances.total, own.variances.squares**0.5)
-        pooled[name] = {"variance_persistence": own.variances.number(), **own.spectra.numbers()}
+        pooled[name] = {**own.variances.numbers(), **own.spectra.numbers()}
         for kind, peak in (
             ("spectrum", own.spectra.peak()),
             ("rows", own.spectra.row_peak("")),

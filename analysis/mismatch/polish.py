@@ -90,24 +90,45 @@ def _newton(
     mean: Array,
 ) -> tuple[Array, Array]:
     """Return the Gauss-Newton step of the free parameters and their standard errors."""
+    j = jacobian(predictor, camera, effects, free, mean)
+    score, inverse = information(predictor, mean, j)
+    rest, _, _ = predictor.weights(mean)
+    return inverse @ (score @ rest), np.sqrt(np.diag(inverse))
+
+
+def jacobian(
+    predictor: Predictor,
+    camera: Camera,
+    effects: tuple[Effect, ...],
+    free: Sequence[Free],
+    mean: Array,
+) -> Array:
+    """Return how the predicted numbers move with each free parameter: (number, parameter)."""
     columns = []
     for i, name, signed in free:
-        moved = _moved(effects, i, name, signed, _STEP)
-        shifted = None if moved is None else with_effects(camera, moved[0])
-        if moved is None or shifted is None:
+        other = moved(effects, i, name, signed, _STEP)
+        shifted = None if other is None else with_effects(camera, other[0])
+        if other is None or shifted is None:
             columns.append(np.zeros_like(mean))
         else:
-            columns.append((predictor.mean(shifted) - mean) / moved[1])
-    j = np.stack(columns, 1)
+            columns.append((predictor.mean(shifted) - mean) / other[1])
+    return np.stack(columns, 1)
+
+
+def information(predictor: Predictor, mean: Array, j: Array) -> tuple[Array, Array]:
+    """Return what residuals are multiplied by to a score (parameter, number), and its inverse.
+
+    The second is the inverse information, were the numbers independent.
+    """
     rest, sd, known = predictor.weights(mean)
     known &= np.isfinite(j).all(1)
-    r, s = rest[known], sd[known]
-    w = (_NU + 1) / _NU / (1 + (r / s) ** 2 / _NU) / s**2
-    normal = (j[known] * w[:, None]).T @ j[known]
+    w = np.where(known, (_NU + 1) / _NU / (1 + (rest / sd) ** 2 / _NU) / sd**2, 0.0)
+    usable = np.where(known[:, None], j, 0.0)
+    score = (usable * w[:, None]).T
+    normal = score @ usable
     size = np.sqrt(np.maximum(np.diag(normal), 1e-12))
-    scaled = normal / np.outer(size, size)
-    solve = np.linalg.pinv(scaled + 1e-6 * np.eye(len(free)), rcond=1e-8) / np.outer(size, size)
-    return solve @ (j[known].T @ (w * r)), np.sqrt(np.diag(solve))
+    scaled = normal / np.outer(size, size) + 1e-6 * np.eye(len(normal))
+    return score, np.linalg.pinv(scaled, rcond=1e-8) / np.outer(size, size)
 
 
 def _along(
@@ -123,7 +144,7 @@ def _along(
         own: tuple[Effect, ...] | None = effects
         for (i, name, signed), delta in zip(free, step * shrink, strict=True):
             limited = delta if signed else float(np.clip(delta, -_LARGEST, _LARGEST))
-            changed = None if own is None else _moved(own, i, name, signed, limited, as_is=True)
+            changed = None if own is None else moved(own, i, name, signed, limited, as_is=True)
             own = None if changed is None else changed[0]
         built = None if own is None else with_effects(camera, own)
         if own is None or built is None:
@@ -135,7 +156,7 @@ def _along(
     return None
 
 
-def _moved(
+def moved(
     effects: tuple[Effect, ...],
     which: int,
     name: str,

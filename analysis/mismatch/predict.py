@@ -29,6 +29,7 @@ _FORMS = {
     "column_spectrum_peak": 0.3,
     "one_off_outliers": 0.4,
     "outlying_pixels": 0.3,
+    "noisy_pixels": 0.15,
     "variance_persistence": 0.25,
     "kurtosis": 0.2,
     "kurtosis_within_pixels": 0.3,

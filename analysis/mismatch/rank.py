@@ -32,7 +32,7 @@ def ranked(state: State, kinds: Iterable[str], step: Callable[[], None]) -> list
     for value, kind, proposal in tried[:_MOST]:
         if value < best - _FAR:
             continue
-        polished = polish(predictor, state.camera, [proposal])
+        polished = polish(predictor, state.camera, [proposal], rounds=1 + len(proposal.free))
         if polished is not None:
             gain = polished.loglik - before - len(proposal.free)
             found.append(Ranked(gain, kind, proposal, polished))

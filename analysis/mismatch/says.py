@@ -15,6 +15,7 @@ _WORDS = {
     "kurtosis_within_pixels": "single pixels have tails that a Gaussian has not",
     "variance_spread": "pixels differ in how noisy they are",
     "variance_persistence": "the same pixels are noisy in every exposure",
+    "noisy_pixels": "a few pixels are far noisier than the others, in every exposure",
     "one_off_outliers": "single pixels are far noisier than the others",
     "outlying_pixels": "a few pixels stand far out of the fixed pattern",
     "correlation_0_1": "the noise of neighbours along a row is correlated",

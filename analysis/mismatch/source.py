@@ -36,5 +36,3 @@ class Source:
     def stack(self, exposure: str, numbers: Sequence[int]) -> NDArray[np.uint16]:
         """Return frames (frame, row, column) of an exposure."""
         return np.stack(list(self.frames(exposure, numbers)))
-
-

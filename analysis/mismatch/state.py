@@ -58,6 +58,8 @@ class State:
         The model.
     vector, null
         Recorded numbers, and their null.
+    simulated
+        Numbers of each simulated recording: (simulation, number).
     fits
         Base numbers fitted to each simulated recording: how far they scatter.
     departures, chances
@@ -70,6 +72,7 @@ class State:
     calibrated: Calibrated
     vector: Vector
     null: Null
+    simulated: Array
     fits: tuple[BaseFit, ...]
     departures: Array
     chances: Array
@@ -97,6 +100,7 @@ class State:
             calibrated,
             own,
             null,
+            np.stack([one.values for one in vectors]),
             tuple(fits),
             z,
             chances,

@@ -25,6 +25,7 @@ _FOLLOWS = {
     "kurtosis_within_pixels": frozenset({"kurtosis"}),
     "one_off_outliers": frozenset({"variance_spread", "kurtosis"}),
     "variance_persistence": frozenset({"variance_spread"}),
+    "noisy_pixels": frozenset({"variance_spread"}),
     "outlying_pixels": frozenset({"fixed_pixel_variance"}),
     "line_correlation": _CORRELATIONS | _LINES,
     "column_spectrum_peak": frozenset({"column_variance"}),

@@ -57,9 +57,7 @@ class Trial:
         signals = final.calibrated.model.signals
         return gain_of(self.held, final.camera, without, signals, seed=self.seed)
 
-    def proof(
-        self, base: State, final: State, step: Callable[[], None], source: Source
-    ) -> Proof:
+    def proof(self, base: State, final: State, step: Callable[[], None], source: Source) -> Proof:
         """Return base and final model side by side."""
         nothing = Change(float("nan"), float("nan"))
         counts = Change(len(base.mismatches), len(final.mismatches))

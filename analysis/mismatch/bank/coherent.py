@@ -12,6 +12,7 @@ from dsis.measures import Channel, Estimate
 from dsis.measures.spectra import line_peak, spectral_peak
 
 Array = NDArray[np.float64]
+OUTSTANDING = (4, 7, 12)  # standard deviations of a pixel's summed variance
 LAGS = 16  # along a line, pixels of the plane
 _EULER = 0.5772156649
 
@@ -38,7 +39,19 @@ class VarianceSums:
         self.squares += square
         self.fourths += square**2
 
-    def number(self) -> Number:
+    def numbers(self) -> dict[str, Number]:
+        """Return the persistence, and how many pixels stand out by so many standard deviations.
+
+        Counts enter as twice their root (Anscombe 1948), of standard deviation 1.
+        """
+        found = {"variance_persistence": self._persistence()}
+        sd = sqrt(self.squares)
+        for limit in OUTSTANDING:
+            count = int((self.total > limit * sd).sum()) if sd > 0 else 0
+            found[f"noisy_pixels of {limit}"] = (2 * sqrt(count + 3 / 8), 1.0)
+        return found
+
+    def _persistence(self) -> Number:
         """Return the mean product of different exposures in units of its null error."""
         excess = float((self.total**2).mean()) - self.squares
         null = 2 * (self.squares**2 - self.fourths) / self.total.size

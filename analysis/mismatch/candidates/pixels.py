@@ -38,7 +38,7 @@ def _rts(clues: Clues) -> Sequence[Proposal]:
         return []
     read = max(float(clues.fit.line_dn2(np.zeros(1))[0]), 0.02)
     found: list[Proposal] = []
-    for fraction in (0.003, 0.02, 0.1):
+    for fraction in (0.001, 0.003, 0.01, 0.03, 0.1):
         # The kurtosis of a mixture: 3 f E[(a^2/4)^2] / V^2, E[a^4] = 24 A^4.
         height = (k * read**2 / (3 * fraction * 24 / 16)) ** 0.25
         found += proposals(
@@ -101,7 +101,7 @@ CANDIDATES = (
     Candidate(
         "rts",
         ("variance_spread", "variance_persistence", "kurtosis", "one_off_outliers",
-         "frame_correlation"),
+         "noisy_pixels", "frame_correlation"),
         _rts,
     ),
     Candidate("impulse", ("one_off_outliers", "kurtosis", "skewness"), _impulse),

@@ -1,0 +1,29 @@
+"""Which recording would tell two effects apart."""
+
+_PAIRS = {
+    frozenset({"black_level_drift", "flicker"}): "darks, and a second signal level",
+    frozenset({"row_noise", "line_flicker"}): "darks: only row noise is there without light",
+    frozenset({"row_noise", "pink_noise"}): "more frames: pink noise correlates successive rows",
+    frozenset({"crosstalk", "brighter_fatter"}): "more signal levels: only one grows with them",
+    frozenset({"crosstalk", "spatial_filtering"}): "darks: only a filter correlates read noise",
+    frozenset({"dsnu", "prnu"}): "darks and a bright flat of many frames",
+    frozenset({"dsnu", "hot_pixels"}): "darks at two exposure times",
+    frozenset({"nonlinearity", "saturation"}): "more levels near the top of the range",
+    frozenset({"nonlinearity", "dual_gain_mismatch"}): "more levels on both sides of the switch",
+    frozenset({"nonlinearity", "brighter_fatter"}): "flats of known light: only one bends the mean",
+    frozenset({"dual_gain", "nonlinearity"}): "more levels around the suspected switch",
+    frozenset({"rts", "read_noise_spread"}): "a stack of 50 darks: jumping pixels show two levels",
+    frozenset({"rts", "impulse"}): "more frames: spikes do not come back at the same pixels",
+    frozenset({"read_noise_spread", "heavy_tailed_read_noise"}): "two dark stacks: pixels persist",
+    frozenset({"periodic_noise", "bistable_pattern"}): "more frames: how the phases are spread",
+    frozenset({"shading", "amp_glow"}): "darks at two exposure times",
+    frozenset({"tap_mismatch", "channel_imbalance"}): "the slope of each channel: more levels",
+    frozenset({"dark_current", "black_level_drift"}): "darks at several exposure times, shuffled",
+}
+
+
+def would_settle(first: str, second: str) -> str:
+    """Return the recording that would decide between two effects."""
+    return _PAIRS.get(
+        frozenset({first, second}), "more frames, darks at two exposure times, and a further level"
+    )

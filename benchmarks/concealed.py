@@ -20,7 +20,7 @@ from planter import ranking as rank
 from planter.deck import deal
 from planter.finder import FINDER, diagnose, named
 from planter.judgement import judge
-from planter.ledger import work_through
+from planter.ledger import fingerprint, versions, work_through
 from planter.onreal import RealFrames
 from planter.seal import CROP, conceal, deal_values, reference, seal, vocabulary
 
@@ -97,6 +97,7 @@ def main() -> None:
             "finder": options.finder,
             "number": number,
             "vocabulary": vocabulary(key[name]),
+            "key": fingerprint(json.dumps(key[name]["case"], sort_keys=True)),
         }
         for number, name in enumerate(sorted(key))
     }
@@ -104,20 +105,41 @@ def main() -> None:
         folder = str(options.work / REFERENCE)
         tasks[REFERENCE] = {**tasks["case-000"], "folder": folder, "vocabulary": None}
     found = work_through(options.work / "found.jsonl", tasks, examined, options.jobs)
-    own = named(found[REFERENCE]["values"]) if REFERENCE in found else []
-    cases = [opened(key[name], found[name]["values"], own) for name in sorted(key)]
+    cases = opened_key(key, found)
     lines = (json.dumps(case, sort_keys=True) + "\n" for case in cases)
     (options.work / "judged.jsonl").write_text("".join(lines), encoding="utf-8")
-    if REFERENCE in found:
-        print(f"the real frames alone: {', '.join(own) or 'nothing named'}")
     report(cases)
+    print("\n" + versions(found.values()))
+
+
+def opened_key(
+    key: dict[str, dict[str, Any]], found: dict[str, dict[str, Any]]
+) -> list[dict[str, Any]]:
+    """Return all cases with their judgement.
+
+    On real frames only what is named beyond their own physics can be wrong; where that is not
+    known, those cases are left out.
+    """
+    names, own = sorted(key), []
+    if REFERENCE in found:
+        values = found[REFERENCE]["values"]
+        own = named(values)
+        says = values.get("error") or ", ".join(own) or "nothing named"
+        print(f"the real frames alone: {says} [{values['verdict']}]")
+        if "error" in values:
+            left_out = [name for name in names if key[name]["real"]]
+            print(f"left out, for nothing can be said of them: {', '.join(left_out)}")
+            names = [name for name in names if not key[name]["real"]]
+    return [opened(key[name], found[name]["values"], own) for name in names]
 
 
 def opened(entry: dict[str, Any], values: dict[str, Any], own: list[str]) -> dict[str, Any]:
     """Return a case with its judgement."""
+    known = own if entry["real"] else []
     return {
         **entry,
-        **judge(entry, values, own if entry["real"] else ()),
+        **judge(entry, values, known),
+        "own": known,
         "verdict": values["verdict"],
         "mismatches": len(values.get("mismatches", ())),
         "gap_closed": (values.get("fit") or {}).get("gap_closed"),

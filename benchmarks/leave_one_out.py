@@ -24,7 +24,7 @@ def explained_by(values: dict[str, Any], kind: str) -> set[str]:
 
 def row(whole: dict[str, Any], left: dict[str, Any], kind: str) -> tuple[str, ...]:
     """Return what changes when an effect is left out."""
-    instead = sorted(set(named(left)) - set(named(whole)))
+    instead = sorted(set(named(left)) - (set(named(whole)) - {kind}))
     lost = sorted(set(named(whole)) - set(named(left)) - {kind})
     unexplained = {entry["statistic"] for entry in left.get("unexplained", ())}
     still = sorted(explained_by(whole, kind) & unexplained)

@@ -24,7 +24,7 @@ from planter import Case, Choice, Layout, draw_case, plant
 from planter.finder import FINDER, diagnose, largest, named
 from planter.fitted import fit_into
 from planter.layout import BAYER
-from planter.ledger import work_through
+from planter.ledger import versions, work_through
 from planter.tables import share, table
 
 Task = dict[str, Any]
@@ -168,6 +168,7 @@ def main() -> None:
     }
     done = work_through(options.work / "nulls.jsonl", tasks, judged, options.jobs)
     report(list(done.values()))
+    print(versions(done.values()))
 
 
 if __name__ == "__main__":

@@ -19,7 +19,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parent))  # processes that are started afresh need it too
 from planter import Case, Choice, draw_case, plant
 from planter.finder import FINDER, diagnose, named
-from planter.ledger import work_through
+from planter.ledger import versions, work_through
 from planter.parameters import covered, truth_of
 from planter.tables import share, table
 
@@ -105,6 +105,7 @@ def main() -> None:
     tasks = {f"wrong-{options.seed}-{i}": {**common, "number": i} for i in range(options.cases)}
     done = work_through(options.work / "parameters.jsonl", tasks, judged, options.jobs)
     report(list(done.values()))
+    print(versions(done.values()))
 
 
 if __name__ == "__main__":

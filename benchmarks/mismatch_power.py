@@ -18,7 +18,7 @@ sys.path.insert(0, str(Path(__file__).parent))  # processes that are started afr
 from planter import KINDS, Case, Choice, draw_case, plant
 from planter.acceptable import located
 from planter.finder import FINDER, diagnose, named
-from planter.ledger import work_through
+from planter.ledger import versions, work_through
 from planter.recipes import RECIPES
 from planter.strength import Unidentifiable, calibrate
 from planter.tables import share, table
@@ -130,6 +130,7 @@ def main() -> None:
     }
     done = work_through(options.work / "power.jsonl", tasks, judged, options.jobs)
     report(list(done.values()))
+    print(versions(done.values()))
 
 
 if __name__ == "__main__":

@@ -18,7 +18,7 @@ from planter.calibration import precision  # noqa: E402
 from planter.deck import Deal, camera_for, deal  # noqa: E402
 from planter.evidence import COUNTED, EVIDENCE  # noqa: E402
 from planter.judgement import COMPARED, judge  # noqa: E402
-from planter.ledger import read_ledger  # noqa: E402
+from planter.ledger import read_ledger, versions, work_through  # noqa: E402
 from planter.parameters import covered, truth_of  # noqa: E402
 from planter.recipes import RECIPES  # noqa: E402
 from planter.seal import seal  # noqa: E402
@@ -233,6 +233,11 @@ def test_findings_are_judged_by_the_key(base: Case) -> None:
     other = {"effect": "prnu", "parameters": {}}
     assert judge(entry, {"omitted_physics": [other]})["wrong"] == ["prnu"]
     assert judge(entry, {"omitted_physics": [other]}, known=["prnu"])["wrong"] == []
+    assert judge({**entry, "out": "row_noise"}, {"omitted_physics": [row]})["wrong"] == [
+        "row_noise"
+    ]
+    crash = judge(entry, {"verdict": "error", "error": "KeyError"})
+    assert set(crash["outcome"].values()) == {"crashed"}
     left = {"unexplained": [{"statistic": "fixed_pixel_variance"}]}
     assert judge(entry, left)["outcome"]["dsnu"] == "abstained"
 
@@ -256,3 +261,18 @@ def test_the_key_is_sealed_and_a_cut_ledger_goes_on(tmp_path: Path) -> None:
     ledger = tmp_path / "ledger.jsonl"
     ledger.write_text('{"task": "a", "n": 1}\n{"task": "b", "n"', encoding="utf-8")
     assert set(read_ledger(ledger)) == {"a"}
+
+
+def test_a_ledger_is_used_again_for_the_same_tasks_only(tmp_path: Path) -> None:
+    ledger = tmp_path / "ledger.jsonl"
+    first = work_through(ledger, {"a": {"n": 1}}, dict, 1)
+    again = work_through(ledger, {"a": {"n": 1}}, fails, 1)
+    assert again == first
+    other = work_through(ledger, {"a": {"n": 2}}, dict, 1)
+    assert (first["a"]["n"], other["a"]["n"]) == (1, 2)
+    assert "MIXED" not in versions([*first.values(), *other.values()])
+    assert "MIXED" in versions([{"code": "x"}, {"code": "y"}])
+
+
+def fails(task: object) -> dict[str, object]:
+    raise AssertionError(task)

@@ -13,7 +13,7 @@ from planter.recipes import RECIPES
 
 WITHOUT_EFFECT, ONE, TWO = 0.3, 0.5, 0.3  # shares: of all; of those with effects
 OUT_OF_VOCABULARY, REAL, WRONG, WEAK, DECOYED = 0.12, 0.1, 0.2, 0.15, 0.2
-PLANTABLE_SHARE = 0.35  # about, of hands that real frames can take
+PLANTABLE_SHARE = 0.25  # about, of hands that real frames can take
 WEAKEST, STRONGEST = 4.0, 50.0
 # Together they make no camera: one converter, one switch, one law of shot noise.
 APART = (

@@ -52,7 +52,7 @@ COMPARED: dict[str, tuple[str, ...]] = {
 # Which side is called positive is a convention.
 UNSIGNED = frozenset({"tap_mismatch", "channel_imbalance", "nonlinearity"})
 EXACT = 1e-6  # relative: a number that is known without error
-OUTCOMES = ("right", "abstained", "misnamed", "missed")
+OUTCOMES = ("right", "abstained", "misnamed", "missed", "crashed")
 
 
 def judge(
@@ -71,7 +71,8 @@ def judge(
     """
     case, planted = Case.from_json(json.dumps(entry["case"])), set(entry["z"])
     names = set(named(dict(values)))
-    wrong = sorted(names - planted - set(known))
+    # What is out of the vocabulary may not be named, though it is there.
+    wrong = sorted(names - (planted - {entry.get("out")}) - set(known))
     return {
         "wrong": wrong,
         "named": sorted(names),
@@ -90,6 +91,8 @@ def judge(
 
 
 def _outcome(kind: str, names: set[str], wrong: Sequence[str], values: Mapping[str, Any]) -> str:
+    if "error" in values:
+        return "crashed"
     if kind in names:
         return "right"
     tied = [*values.get("undecided", ())]

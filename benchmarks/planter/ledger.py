@@ -1,15 +1,23 @@
-"""Many cases, in processes, each one line of JSON: killed runs go on where they stopped."""
+"""Many cases, in processes, each one line of JSON: killed runs go on where they stopped.
 
+An entry keeps a fingerprint of its task, so that a ledger of other cases is not taken for this
+one's, and of the code that was judged: `versions` says where a ledger mixes several.
+"""
+
+import hashlib
 import json
 import sys
 import time
-from collections.abc import Callable, Mapping
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, TypeVar
 
 Task = TypeVar("Task")
+PROJECT = Path(__file__).resolve().parents[2]
+JUDGED = ("analysis", "dsis", "benchmarks/planter")
 
 
 def read_ledger(path: Path) -> dict[str, dict[str, Any]]:
@@ -34,15 +42,16 @@ def work_through(
     path
         The ledger, one line of JSON a task.
     tasks
-        By name; a name stands for the same task in every run.
+        By name, JSON-able; an entry of the same name but of another task is done anew.
     work
         Makes an entry of a task, in another process; importable.
     jobs
         Processes.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    done = read_ledger(path)
-    left = {name: task for name, task in tasks.items() if name not in done}
+    done, code = read_ledger(path), fingerprint_of_code()
+    marks = {name: fingerprint(json.dumps(task, sort_keys=True)) for name, task in tasks.items()}
+    left = {n: task for n, task in tasks.items() if done.get(n, {}).get("of") != marks[n]}
     begun = time.monotonic()
     with (
         path.open("a", encoding="utf-8") as lines,
@@ -52,12 +61,32 @@ def work_through(
             lines.write("\n")
         waiting = {pool.submit(work, task): name for name, task in left.items()}
         for number, future in enumerate(as_completed(waiting), 1):
-            entry = {"task": waiting[future], **future.result()}
+            name = waiting[future]
+            entry = {"task": name, "of": marks[name], "code": code, **future.result()}
             lines.write(json.dumps(entry, sort_keys=True) + "\n")
             lines.flush()
             done[entry["task"]] = entry
             _say(number, len(left), time.monotonic() - begun)
     return {name: done[name] for name in tasks}
+
+
+def fingerprint(*texts: str) -> str:
+    """Return the first digits of the SHA-256 of texts."""
+    return hashlib.sha256("\0".join(texts).encode()).hexdigest()[:12]
+
+
+def fingerprint_of_code() -> str:
+    """Return a fingerprint of all source files that results depend on."""
+    paths = sorted(path for part in JUDGED for path in (PROJECT / part).rglob("*.py"))
+    return fingerprint(*(path.read_text(encoding="utf-8") for path in paths))
+
+
+def versions(entries: Iterable[Mapping[str, Any]]) -> str:
+    """Return a line that says by which code entries were made."""
+    codes = Counter(entry["code"] for entry in entries)
+    mixed = "" if len(codes) == 1 else " (MIXED: delete the ledger to judge one)"
+    made = ", ".join(f"{code}: {count}" for code, count in codes.most_common())
+    return f"cases by version of the code: {made}{mixed}"
 
 
 def _say(number: int, total: int, seconds: float) -> None:

@@ -18,10 +18,9 @@ from planter.offsets import OFFSETS
 from planter.readout import AMPLIFIERS, MEMORY, PIXELS
 from planter.view import Image, View
 
+# Fixed patterns are left out: a real sensor has its own, which the camera fitted to it holds.
 PLANTABLE = frozenset(
     {
-        "shading",
-        "prnu",
         "flicker",
         "line_flicker",
         "amp_glow",
@@ -29,7 +28,12 @@ PLANTABLE = frozenset(
         "tap_mismatch",
         "readout_memory",
         "rts",
-        *OFFSETS,
+        "row_noise",
+        "column_noise",
+        "black_level_drift",
+        "pink_noise",
+        "periodic_noise",
+        "bistable_pattern",
     }
 )
 _STEPS = {**LIGHT, **AMPLIFIERS, **PIXELS, **OFFSETS, **MEMORY}

@@ -14,10 +14,13 @@ COVERED = 1.96
 
 
 def planted(cases: Iterable[Judged]) -> Iterable[tuple[str, float, str, Judged]]:
-    """Yield (effect, z, outcome, case) of every effect that may be named and can be seen."""
+    """Yield (effect, z, outcome, case) of every effect that may be named and can be seen.
+
+    What the real frames have by themselves proves nothing where it is planted besides.
+    """
     for case in cases:
         for kind, z in case["z"].items():
-            if kind != case["out"] and z > 0:
+            if kind not in (case["out"], *case["own"]) and z > 0:
                 yield kind, z, case["outcome"][kind], case
 
 

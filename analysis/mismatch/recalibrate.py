@@ -17,6 +17,7 @@ from analysis.mismatch.observe import Layout, Level, Observation, Place, Taken, 
 from analysis.mismatch.rounding import rounded, unrounded
 from dsis.camera import BaseNoise, Camera, Segment
 from dsis.cfa import Cfa
+from dsis.effects.quantisation import Quantisation
 from dsis.recording import Recording
 
 _ROUNDS = 3
@@ -124,7 +125,7 @@ def calibrate(
     left_out = frozenset([interpolated] if interpolated else [])
     start = camera.black_level - layout.black_dn
     slopes = [s.slope for s in camera.noise.segment]
-    undone = _undone(layout, seen.levels)
+    undone = _undone(layout, seen.levels, code_step(camera))
     effects = Offsets()
 
     def fitted(offsets: Offsets, at: tuple[float, ...]) -> BaseFit:
@@ -187,12 +188,17 @@ def signals_of(layout: Layout, fit: BaseFit) -> dict[str, Sites]:
     return signals
 
 
-def _undone(layout: Layout, levels: Mapping[Place, Level]) -> Offsets:
+def code_step(camera: Camera) -> float:
+    """Return the step between codes, DN: coarser than 1 where the camera quantises."""
+    return max((e.step_dn for e in camera.effect if isinstance(e, Quantisation)), default=1.0)
+
+
+def _undone(layout: Layout, levels: Mapping[Place, Level], step_dn: float) -> Offsets:
     """Return what rounding added to the recorded levels and variances, by undoing it."""
     shift, added, stretch = {}, {}, {}
     for place, level in levels.items():
         mean = level.level_dn + layout.black_dn
-        before, variance, slope = unrounded(mean, level.variance_dn2, layout.white_dn)
+        before, variance, slope = unrounded(mean, level.variance_dn2, layout.white_dn, step_dn)
         shift[place], added[place] = mean - before, level.variance_dn2 - variance
         stretch[place] = slope
     return Offsets(shift, added, stretch)
@@ -206,15 +212,18 @@ def _rounding(model: Model, layout: Layout, fit: BaseFit) -> Offsets:
             signal = float(model.signals[e.name][y, x])
             line = float(fit.line_dn2(np.array([signal]))[0])
             mean = layout.black_dn + fit.black_dn[channel] + signal
-            level[e.name, channel], variance[e.name, channel] = rounded(mean, line, layout.white_dn)
+            level[e.name, channel], variance[e.name, channel] = rounded(
+                mean, line, layout.white_dn, code_step(model.camera)
+            )
     return Offsets(level, variance)
 
 
 def _effects(model: Model, layout: Layout, seed: int, jobs: int) -> Offsets:
     """Return what the camera's own effects add to level and variance, by simulation."""
-    if not model.camera.effect:
-        return Offsets()
-    plain = model.with_camera(model.camera.model_copy(update={"effect": ()}))
+    codes = tuple(e for e in model.camera.effect if isinstance(e, Quantisation))
+    if len(codes) == len(model.camera.effect):
+        return Offsets()  # coarse codes are rounding, which is known exactly
+    plain = model.with_camera(model.camera.model_copy(update={"effect": codes}))
     replicates = range(_REPLICATES)
     pairs = list(
         zip(

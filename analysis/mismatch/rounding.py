@@ -10,8 +10,16 @@ _REACH = 8.0
 _STEPS, _SMALL = 40, 1e-5
 
 
-def rounded(mean_dn: float, variance_dn2: float, white_dn: float) -> tuple[float, float]:
-    """Return what rounding to codes 0..white and clipping add to mean (DN) and variance (DN^2)."""
+def rounded(
+    mean_dn: float, variance_dn2: float, white_dn: float, step_dn: float = 1.0
+) -> tuple[float, float]:
+    """Return what rounding to codes 0, step .. white and clipping add to mean and variance.
+
+    DN and DN^2.
+    """
+    if step_dn != 1:
+        shift, added = rounded(mean_dn / step_dn, variance_dn2 / step_dn**2, white_dn // step_dn)
+        return shift * step_dn, added * step_dn**2
     sigma = max(variance_dn2, 1e-12) ** 0.5
     inside = _REACH * sigma < mean_dn < white_dn - _REACH * sigma
     if sigma > _WIDE and inside:
@@ -32,12 +40,19 @@ def rounded(mean_dn: float, variance_dn2: float, white_dn: float) -> tuple[float
     return mean - mean_dn, variance - max(variance_dn2, 0.0)
 
 
-def unrounded(mean_dn: float, variance_dn2: float, white_dn: float) -> tuple[float, float, float]:
+def unrounded(
+    mean_dn: float, variance_dn2: float, white_dn: float, step_dn: float = 1.0
+) -> tuple[float, float, float]:
     """Return the mean, the variance and d variance / d recorded variance before rounding.
 
     The inverse of `rounded`, by Newton's steps on both. Where all samples have one code nothing can
     be told: the variance comes back as recorded, and the derivative as infinite.
     """
+    if step_dn != 1:
+        before, variance, slope = unrounded(
+            mean_dn / step_dn, variance_dn2 / step_dn**2, white_dn // step_dn
+        )
+        return before * step_dn, variance * step_dn**2, slope
     if variance_dn2 > 4 * _WIDE**2 and variance_dn2**0.5 * _REACH < mean_dn:
         return mean_dn, variance_dn2 - 1 / 12, 1.0
     if variance_dn2 <= 1e-4:

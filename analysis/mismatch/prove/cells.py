@@ -6,6 +6,7 @@ tell them, shrunk by the model's own spread of widths.
 """
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -119,21 +120,24 @@ def cells_of(camera: Camera, seed: int) -> Cells:
     return Cells(*_open(lower, lower + width), camera.black_level, 0.0, ones)
 
 
-def _open(lower: Array, upper: Array) -> tuple[Array, Array]:
+def _open(lower: NDArray[np.floating], upper: NDArray[np.floating]) -> tuple[Array, Array]:
     """Return edges whose first and last cells take all that lies beyond."""
     occurring = np.nonzero(upper > lower)[0]
-    lower, upper = lower.copy(), upper.copy()
-    lower[occurring[0]], upper[occurring[-1]] = -_OUTER, _OUTER
-    return lower, upper
+    low, high = lower.astype(np.float64), upper.astype(np.float64)
+    low[occurring[0]], high[occurring[-1]] = -_OUTER, _OUTER
+    return low, high
 
 
 def converted(camera: Camera, image: Image, grid: PixelGrid, sensor: Draw) -> Image:
     """Return codes, float32, of a signal in DN above black."""
     for link in camera.chain():
         if of_converter(link):
-            exposure = Exposure(
-                grid, 0, sensor, sensor, image, camera.read_out, lambda _, same=image: same
-            )
+            still = partial(_same, image)
+            exposure = Exposure(grid, 0, sensor, sensor, image, camera.read_out, still)
             image = link.apply(image, exposure)
     codes: Image = image + np.float32(camera.black_level)
     return codes
+
+
+def _same(image: Image, _: int) -> Image:
+    return image

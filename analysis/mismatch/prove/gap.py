@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+_LEAST = 4
 _OPEN = 3.0  # standard errors by which the gap must be open before it can be closed
 
 
@@ -15,14 +16,19 @@ def gap_closed(x_locked: Array, before_sims: Array, after_sims: Array) -> float 
     x_locked
         Measures of the locked frames: (statistic,).
     before_sims, after_sims
-        The same of simulations of both models: (simulation, statistic), at least two.
+        The same of simulations of both models: (simulation, statistic), at least four.
 
     D is the mean squared difference from one simulation, standardised by the final model's spread
     between simulations and averaged over simulations; Df that of two simulations of the final
     model. Where D0 - Df is below three standard errors of D0, nothing was open: None.
     """
+    simulations = len(after_sims)
+    if simulations < _LEAST:
+        message = f"gap_closed needs {_LEAST} simulations of the final model, not {simulations}"
+        raise ValueError(message)
     known = np.isfinite(x_locked) & np.isfinite(before_sims).all(0) & np.isfinite(after_sims).all(0)
-    sd = after_sims.std(0, ddof=1)
+    # The mean of 1 / s^2 of few draws is larger than 1 / sigma^2.
+    sd = after_sims.std(0, ddof=1) * np.sqrt((simulations - 1) / (simulations - 3))
     known &= sd > 0
     if not known.any():
         return None

@@ -21,6 +21,7 @@ T = TypeVar("T")
 MOST_TRAINING = 16
 MOST_LOCKED = 24
 MOST_EXPOSURES = 24  # with locked frames, and as many without
+STACK = 6  # frames from which an exposure shows more than a pair does
 MOST_CLIPPED = 0.05  # share of samples at an end of the converter: no law of noise is left there
 MOST_SAMPLES = 2**24  # in all: a larger sensor is proven on a window at its centre
 
@@ -33,8 +34,8 @@ class HeldExposure:
     ----------
     name, kind, exposure_time_s, light
         As recorded.
-    trained
-        Training frames used.
+    training
+        Numbers of the training frames used.
     mean_dn, variance_dn2
         Over them, of each pixel, DN of codes (row, column); the variance is zero below two frames.
     training_means_dn
@@ -53,7 +54,7 @@ class HeldExposure:
     kind: str
     exposure_time_s: float
     light: float | None
-    trained: int
+    training: tuple[int, ...]
     mean_dn: Array
     variance_dn2: Array
     training_means_dn: Array
@@ -61,6 +62,11 @@ class HeldExposure:
     numbers: tuple[int, ...]
     codes: Codes
     before: tuple[Codes | None, ...]
+
+    @property
+    def trained(self) -> int:
+        """How many training frames there are."""
+        return len(self.training)
 
 
 @dataclass(frozen=True)
@@ -76,7 +82,7 @@ class Held:
     black_dn, white_code
         Nominal black level, largest code.
     left_out
-        Exposures of which too many samples are clipped.
+        Exposures of which too many samples are clipped, and scenes that are locked altogether.
     """
 
     exposures: tuple[HeldExposure, ...]
@@ -100,8 +106,8 @@ class Held:
 def hold(recording: Recording, training: Numbers, locked: Numbers) -> Held:
     """Return the frames of a recording that a proof needs; each is read once or twice."""
     known = [e for e in recording.exposures if training.get(e.name) or locked.get(e.name)]
-    proving = _thinned([e for e in known if locked.get(e.name)], MOST_EXPOSURES)
-    others = _thinned([e for e in known if not locked.get(e.name)], MOST_EXPOSURES)
+    proving = _chosen([e for e in known if locked.get(e.name)])
+    others = _chosen([e for e in known if not locked.get(e.name)])
     taken = [e for e in known if e in proving or e in others]
     frames = sum(
         min(len(training.get(e.name, ())), MOST_TRAINING)
@@ -114,24 +120,35 @@ def hold(recording: Recording, training: Numbers, locked: Numbers) -> Held:
         _hold(
             recording,
             exposure,
-            _thinned(list(training.get(exposure.name, ())), MOST_TRAINING),
-            _thinned(list(locked.get(exposure.name, ())), MOST_LOCKED),
+            thinned(list(training.get(exposure.name, ())), MOST_TRAINING),
+            thinned(list(locked.get(exposure.name, ())), MOST_LOCKED),
             grid,
         )
         for exposure in taken
     ]
     white = int(recording.sensor.white_level)
-    left_out = tuple(e.name for e in read if _clipped(e, white) > MOST_CLIPPED)
-    kept = tuple(e for e in read if e.name not in left_out)
-    return Held(
-        kept, grid, recording.sensor.cfa, recording.sensor.black_level, white, left_out
+    left_out = tuple(
+        e.name
+        for e in read
+        if _clipped(e, white) > MOST_CLIPPED or (e.kind == "scene" and not e.trained)
     )
+    kept = tuple(e for e in read if e.name not in left_out)
+    return Held(kept, grid, recording.sensor.cfa, recording.sensor.black_level, white, left_out)
 
 
-def _thinned(items: list[T], most: int) -> list[T]:
+def _chosen(exposures: list[RecordedExposure]) -> list[RecordedExposure]:
+    """Return the exposures to use: stacks first, of the others some, evenly spaced."""
+    stacks = thinned([e for e in exposures if len(e.frames) >= STACK], MOST_EXPOSURES)
+    few = [e for e in exposures if len(e.frames) < STACK]
+    return stacks + thinned(few, MOST_EXPOSURES - len(stacks))
+
+
+def thinned(items: list[T], most: int) -> list[T]:
     """Return at most so many items, evenly spaced."""
     if len(items) <= most:
         return items
+    if not most:
+        return []
     return [items[i * len(items) // most] for i in range(most)]
 
 
@@ -179,7 +196,7 @@ def _hold(
         exposure.kind,
         exposure.exposure_time_s,
         exposure.light,
-        n,
+        tuple(training),
         mean,
         np.maximum(variance, 0.0),
         np.array(means),

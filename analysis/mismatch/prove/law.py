@@ -1,8 +1,8 @@
 """The predictive law of a recording's frames under a camera model.
 
 Normal noise of known variance around a uniform level is the base model's law. Physics beyond it
-adds a fixed pattern and noisy pixels, which training frames tell, another shape, memory of the frame
-before, and a spectrum; `learning` finds them.
+adds a fixed pattern and noisy pixels, which training frames tell, another shape, memory of the
+frame before, and a spectrum; `learning` finds them.
 """
 
 from collections.abc import Mapping
@@ -119,7 +119,9 @@ class Sensed:
     groups: Groups
 
 
-def sense(law: Law, held: Held, maps: Mapping[str, Array], variances: Mapping[str, Array]) -> Sensed:
+def sense(
+    law: Law, held: Held, maps: Mapping[str, Array], variances: Mapping[str, Array]
+) -> Sensed:
     """Return what training frames tell under a law.
 
     Parameters
@@ -157,9 +159,7 @@ def sense(law: Law, held: Held, maps: Mapping[str, Array], variances: Mapping[st
     return Sensed(found, groups)
 
 
-def pixel_variance(
-    law: Law, exposure: str, pattern: Array, groups: Groups, held: Held
-) -> Array:
+def pixel_variance(law: Law, exposure: str, pattern: Array, groups: Groups, held: Held) -> Array:
     """Return the predictive variance of each pixel, DN^2."""
     own = law.exposures[exposure]
     least = min(float(e.variance_dn2.min()) for e in law.exposures.values())
@@ -175,7 +175,7 @@ def pixel_variance(
     return np.where(groups == OUTLIER, variance * odd, variance)
 
 
-def below(law: Law, exposure: str, u: Array, groups: Groups, held: Held) -> Array:
+def below(law: Law, exposure: str, u: NDArray[np.floating], groups: Groups, held: Held) -> Array:
     """Return the probability of lying below standardised residuals u (row, column)."""
     own = law.exposures[exposure]
     made = np.empty(u.shape)
@@ -187,7 +187,9 @@ def below(law: Law, exposure: str, u: Array, groups: Groups, held: Held) -> Arra
     return made
 
 
-def innovations(law: Law, exposure: str, score: Array, earlier: Array | None, groups: Groups) -> tuple[Array, float]:
+def innovations(
+    law: Law, exposure: str, score: Array, earlier: Array | None, groups: Groups
+) -> tuple[Array, float]:
     """Return normal scores less what the frame before tells, and the log-likelihood gained."""
     rho = memory_of(law, exposure, groups)
     if earlier is None or not rho.any():

@@ -3,10 +3,10 @@
 Level = black level + light x (DN per light, by colour) + what the camera model adds. Black levels
 and DN per light are fitted to the training frames; each exposure is then predicted without its own,
 by Student's t law, whose scale is what the fit leaves. Locked frames wander about their exposure's
-training level. Where the other exposures do not tell a level (unknown light, scenes) it tells nothing.
+training level. Where the other exposures do not tell a level (unknown light, scenes), the level
+tells nothing.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np

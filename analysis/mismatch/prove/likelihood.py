@@ -6,8 +6,8 @@ log p = sum over pixels of ln P(code) about the frame's own level
       + the law of the frame's level (`levels`).
 
 P(code) is the mass of the code's cell, clipped ends included. Scores are drawn within the cell, the
-same for every model, so that those of a right model are exactly normal. A pixel far outside of every
-law costs ln of `_GROSS` shared by all codes and no more: no single pixel decides.
+same for every model, so that those of a right model are exactly normal. A pixel far outside of
+every law costs ln of `_GROSS` shared by all codes and no more: no single pixel decides.
 """
 
 from collections.abc import Mapping

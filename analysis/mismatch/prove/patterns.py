@@ -82,9 +82,7 @@ def far_pixels(maps: Array) -> Mask:
     return far
 
 
-def pattern_of(
-    model: Halves, base: Halves, variance_dn2: Array, trained: Array
-) -> Pattern:
+def pattern_of(model: Halves, base: Halves, variance_dn2: Array, trained: Array) -> Pattern:
     """Return the pattern of a model from its virtual sensor and that of the base model.
 
     Parameters
@@ -100,9 +98,8 @@ def pattern_of(
     if far.sum() - (far_pixels(base.early) & far_pixels(base.late)).sum() >= _LEAST_OUTLIERS:
         shared = _cross(model.early[:, far], model.late[:, far])
         odd = _gain(_positive(shared, variance_dn2, 0.0), variance_dn2, trained)
-        model = Halves(
-            np.where(far, 0.0, model.early), np.where(far, 0.0, model.late), model.frames
-        )
+    early, late = (np.where(far, 0.0, half) for half in (model.early, model.late))
+    model = Halves(early, late, model.frames)
     waves = [_waves(halves) for halves in (model, base)]
     gains = []
     for members in classes((model.early.shape[1], model.early.shape[2])):
@@ -112,7 +109,9 @@ def pattern_of(
         noise = np.maximum(variance_dn2 + model.frames / 2 * change, 0.1 * variance_dn2)
         # What is new in each frame leaves a shared part by chance: demand more than that.
         own = noise / variance_dn2 - (members.size >= _MANY)
-        floor = 2 * max(float(np.max(own / model.frames)), 0.0) * np.sqrt(len(trained) / members.size)
+        floor = (
+            2 * max(float(np.max(own / model.frames)), 0.0) * np.sqrt(len(trained) / members.size)
+        )
         gains.append(_gain(_positive(shared, variance_dn2, floor), noise, trained))
     return Pattern(np.array(gains), odd)
 

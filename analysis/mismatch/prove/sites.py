@@ -36,7 +36,9 @@ def site_means(frames: NDArray[np.generic], cfa: Cfa) -> NDArray[np.float64]:
     )
 
 
-def spread_over(values: NDArray[np.float64], shape: tuple[int, int], cfa: Cfa) -> NDArray[np.float64]:
+def spread_over(
+    values: NDArray[np.float64], shape: tuple[int, int], cfa: Cfa
+) -> NDArray[np.float64]:
     """Return values of the sites (..., site) at the pixels of each: (..., row, column)."""
     out = np.empty((*values.shape[:-1], *shape))
     for site, place in enumerate(site_places(cfa)):

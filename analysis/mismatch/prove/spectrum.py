@@ -20,6 +20,7 @@ _NEAR = 3  # lags in both directions
 _ALONG = 48  # lags along one line
 _PEAK = 8.0  # robust standard deviations between bins
 _LEAST_PEAK = 0.7  # of white noise: less gains next to nothing
+_ROUNDS = 3
 _SURE = 2.5  # standard errors below which an excess counts as none
 
 
@@ -42,10 +43,9 @@ def spectrum_of(excess: Array, frames: int, shape: tuple[int, int], cfa: Cfa) ->
     noise = np.sqrt(2 / frames)
     peaks = _peaks(excess)
     plain = np.where(peaks, 0.0, excess)
-    made = np.zeros_like(excess)
-    made[1:, 0] = _banded(plain[1:, 0], shape[0], 1, noise)
-    made[0, 1:] = _banded(plain[0, 1:], shape[1], 2, noise)
-    made[1:, 1:] = _off_axes(plain, peaks, shape, frames)
+    made = _off_axes(plain, peaks, shape, frames)
+    made[1:, 0] += _banded((plain - made)[1:, 0], shape[0], 1, noise)
+    made[0, 1:] += _banded((plain - made)[0, 1:], shape[1], 2, noise)
     made = np.where(peaks, excess, made)
     for y, x in means_bins(shape, cfa):
         made[y, x] = 0.0
@@ -83,25 +83,27 @@ def _banded(excess: Array, size: int, per_bin: int, noise: float) -> Array:
 def _off_axes(
     excess: Array, peaks: NDArray[np.bool_], shape: tuple[int, int], frames: int
 ) -> Array:
-    """Return the smooth spectrum off the axes: lags first, then bands of what they leave."""
+    """Return the smooth spectrum that bins off the axes show: lags, then bands of what they leave.
+
+    Lags describe the axes as well; bands are left to `_banded` there.
+    """
     inside = ~peaks
     inside[0, :] = inside[:, 0] = False
-    field = np.where(inside, excess, 0.0)
-    lags = fft.irfft2(field, shape)
-    # The axes and peaks that were left out are a small share: restore the scale.
-    lags *= excess[1:, 1:].size / max(int(inside.sum()), 1)
+    # Bins that are left out are filled by the lags themselves: two rounds suffice, they are few.
+    made = np.zeros_like(excess)
     error = 1 / np.sqrt(frames * shape[0] * shape[1])
-    kept = np.where(_short_lags(shape), _sure_array(lags, error), 0.0)
-    made = fft.rfft2(kept).real
+    for _ in range(_ROUNDS):
+        lags = fft.irfft2(np.where(inside, excess, made), shape)
+        kept = np.where(_short_lags(shape), _sure_array(lags, error), 0.0)
+        made = fft.rfft2(kept).real
     rest = np.where(inside, excess - made, 0.0)
     across = rest[1:, 1:].sum(0) / np.maximum(inside[1:, 1:].sum(0), 1)
-    made[:, 1:] += _bands_of(across, shape[0], np.arange(1, shape[1] // 2 + 1), frames)
+    made[1:, 1:] += _bands_of(across, shape[0], np.arange(1, shape[1] // 2 + 1), frames)
     down = rest[1:, 1:].sum(1) / np.maximum(inside[1:, 1:].sum(1), 1)
     number = np.arange(1, shape[0])
     away = np.minimum(number, shape[0] - number)
-    made[1:, :] += _bands_of(down, shape[1] // 2, away, frames)[:, np.newaxis]
-    smooth: Array = made[1:, 1:]
-    return smooth
+    made[1:, 1:] += _bands_of(down, shape[1] // 2, away, frames)[:, np.newaxis]
+    return made
 
 
 def _bands_of(profile: Array, across: int, away: NDArray[np.intp], frames: int) -> Array:
@@ -134,6 +136,6 @@ def _sure(value: float, error: float) -> float:
 
 def _sure_array(values: Array, error: float) -> Array:
     doubt = (_SURE * error) ** 2
-    share = np.maximum(1 - doubt / np.maximum(values**2, 1e-300), 0)
+    share = np.maximum(1 - doubt / np.maximum(values**2, 1e-30), 0)
     shrunk: Array = values * share
     return shrunk

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.prove.held import Held, HeldExposure
+from analysis.mismatch.prove.sites import site_means, spread_over
 from dsis.camera import BaseNoise, Camera
 from dsis.draw import Draw
 from dsis.effects import Effect, Image, Stage
@@ -57,10 +58,28 @@ class Stack:
 
 
 def clean_signal(held: Held, exposure: HeldExposure, signals: Signals) -> Image:
-    """Return the clean signal of an exposure: uniform, or of a scene the training mean."""
+    """Return the clean signal of an exposure: uniform, or of a scene the training mean.
+
+    A flat without a signal of its own, for all its frames are locked, has that of its light, by the
+    ratio of signal to light in the others; where light is unknown it has its own mean level.
+    """
     if exposure.kind == "scene":
         return (exposure.mean_dn - held.black_dn).astype(np.float32)
-    return tiled(signals[exposure.name], held.grid)
+    if exposure.name in signals:
+        return tiled(signals[exposure.name], held.grid)
+    if exposure.kind == "dark":
+        return tiled(np.zeros((2, 2)), held.grid)
+    ratios = [
+        np.broadcast_to(signals[e.name], (2, 2)) / e.light
+        for e in held.exposures
+        if e.light and e.kind == "flat" and e.name in signals
+    ]
+    if exposure.light and ratios:
+        return tiled(np.median(ratios, 0) * exposure.light, held.grid)
+    darks = [e.training_means_dn.mean() for e in held.exposures if e.kind == "dark" and e.trained]
+    black = float(np.mean(darks)) if darks else held.black_dn
+    means = np.maximum(site_means(exposure.codes, held.cfa).mean(0) - black, 0.0)
+    return spread_over(means, held.shape, held.cfa).astype(np.float32)
 
 
 def virtual_sensor(camera: Camera, held: Held, signals: Signals, seed: int) -> dict[str, Stack]:

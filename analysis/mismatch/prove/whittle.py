@@ -9,11 +9,11 @@ from dsis.cfa import Cfa
 Array = NDArray[np.float64]
 
 
-def periodogram(fields: Array) -> Array:
+def periodogram(fields: NDArray[np.floating]) -> Array:
     """Return the power |F|^2 / N of each bin: (..., row, column // 2 + 1); 1 for white noise."""
     bins = fft.rfft2(fields)
-    power: Array = (bins.real**2 + bins.imag**2) / (fields.shape[-1] * fields.shape[-2])
-    return power
+    power = (bins.real**2 + bins.imag**2) / (fields.shape[-1] * fields.shape[-2])
+    return np.asarray(power, np.float64)
 
 
 def bin_counts(shape: tuple[int, int], cfa: Cfa) -> Array:
@@ -38,7 +38,7 @@ def means_bins(shape: tuple[int, int], cfa: Cfa) -> tuple[tuple[int, int], ...]:
     return tuple((y, x) for y in (0, shape[0] // 2) for x in (0, shape[1] // 2))
 
 
-def whittle_gain(fields: Array, spectrum: Array, counts: Array) -> Array:
+def whittle_gain(fields: NDArray[np.floating], spectrum: Array, counts: Array) -> Array:
     """Return the log-likelihood of each field under a spectrum less that of white noise, nats.
 
     -1/2 sum (ln P + I / P - I) over all dimensions; exact on a torus.

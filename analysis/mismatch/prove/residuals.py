@@ -1,0 +1,60 @@
+"""Residuals of a virtual sensor: its fresh frames less what its training frames tell."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.mismatch.prove.cells import converted
+from analysis.mismatch.prove.held import Held
+from analysis.mismatch.prove.law import Law, Sensed, pixel_variance, sense
+from analysis.mismatch.prove.sites import site_means, spread_over
+from analysis.mismatch.prove.virtual import Stack, sensor_draw
+from dsis.effects import Image
+
+
+@dataclass(frozen=True)
+class Residuals:
+    """A virtual sensor as its law sees it.
+
+    Attributes
+    ----------
+    law
+        The law, as far as it is known.
+    sensed
+        What the training frames tell.
+    residuals
+        Fresh frames less their own mean and the pattern, by exposure: float32 (frame, row, column).
+    """
+
+    law: Law
+    sensed: Sensed
+    residuals: Mapping[str, Image]
+
+    def standardised(self, name: str, held: Held) -> Image:
+        """Return residuals in units of their predicted standard deviation."""
+        pattern, groups = self.sensed.patterns[name], self.sensed.groups
+        variance = pixel_variance(self.law, name, pattern, groups, held)
+        sd = np.sqrt(variance).astype(np.float32)
+        return np.asarray(self.residuals[name] / sd, np.float32)
+
+
+def residuals_of(law: Law, held: Held, stacks: Mapping[str, Stack], seed: int) -> Residuals:
+    """Return a virtual sensor with what its training frames tell under a law."""
+    maps, variances = {}, {}
+    for e in held.exposures:
+        training = stacks[e.name].training
+        zeros = np.zeros(held.shape)
+        maps[e.name] = training.mean(0, dtype=np.float64) if e.trained else zeros
+        variances[e.name] = zeros
+        if e.trained > 1:
+            sensor = sensor_draw(seed)
+            codes = [converted(law.camera, frame, held.grid, sensor) for frame in training]
+            variances[e.name] = np.var(np.stack(codes), axis=0, ddof=1, dtype=np.float64)
+    sensed = sense(law, held, maps, variances)
+    residuals = {}
+    for e in held.exposures:
+        fresh = stacks[e.name].fresh
+        means = spread_over(site_means(fresh, held.cfa), held.shape, held.cfa)
+        residuals[e.name] = (fresh - means - sensed.patterns[e.name]).astype(np.float32)
+    return Residuals(law, sensed, residuals)

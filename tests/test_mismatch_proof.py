@@ -1,0 +1,542 @@
+"""The proof on locked frames: likelihood, gains, gap closed and classifier say what they should."""
+
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.stats
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from analysis.mismatch.prove import (
+    Loglik,
+    auc_of,
+    gain_of,
+    gap_closed,
+    heldout_gain,
+    hold,
+    loglik_of,
+    prove,
+)
+from analysis.mismatch.prove import held as held_module
+from analysis.mismatch.prove.cells import cells_of
+from analysis.mismatch.prove.held import Held
+from analysis.mismatch.prove.learning import law_of
+from analysis.mismatch.prove.shape import NORMAL, counted, shape_of
+from analysis.mismatch.prove.whittle import bin_counts, whittle_gain
+from dsis.camera import BaseNoise, Camera, Segment
+from dsis.cfa import Cfa
+from dsis.effects import Effect, registry
+from dsis.grid import PixelGrid
+from dsis.recording import ExposurePlan, RecordedExposure, Recording, Sensor
+from dsis.simulate import Shot, dark, flat
+from dsis.simulate.simulator import simulated_frames
+
+ROWS, COLUMNS = 96, 128
+LEVELS = (100.0, 250.0, 500.0, 900.0, 1600.0, 2600.0)
+FRAMES = 8
+TRAINING, LOCKED = (0, 1, 2, 4, 5, 6), (3, 7)
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class InMemory(Recording):
+    """A recording whose frames are held in memory."""
+
+    stacks: dict[str, NDArray[np.uint16]] | None = None
+
+    def frame(self, exposure: RecordedExposure, index: int) -> NDArray[np.uint16]:
+        assert self.stacks is not None
+        return self.stacks[exposure.name][index]
+
+
+def camera(
+    *effects: Effect,
+    cfa: str = "MONO",
+    segments: tuple[tuple[float, float, float | None], ...] = ((0.5, 20.0, None),),
+    black: float = 64.0,
+) -> Camera:
+    parts = tuple(Segment(slope=m, intercept=t, upper_dn=end) for m, t, end in segments)
+    return Camera(
+        name="planted",
+        cfa=Cfa(cfa),
+        black_level=black,
+        white_level=4095.0,
+        bit_depth=12,
+        noise=BaseNoise(segment=parts),
+        effect=effects,
+    )
+
+
+def recorded(
+    true: Camera,
+    seed: int,
+    *,
+    rows: int = ROWS,
+    columns: int = COLUMNS,
+    frames: int = FRAMES,
+    levels: tuple[float, ...] = LEVELS,
+    lit: bool = True,
+    scene: NDArray[np.float32] | None = None,
+) -> InMemory:
+    """Return a recording of two dark times and flats."""
+    shots = [
+        dark("dark-0", frames=frames, exposure_time_s=0.005),
+        dark("dark-1", frames=frames, exposure_time_s=0.05),
+    ]
+    shots += [
+        flat(
+            f"flat-{i}",
+            level,
+            frames=frames,
+            exposure_time_s=0.01 * (i + 1),
+            light=level if lit else None,
+        )
+        for i, level in enumerate(levels)
+    ]
+    if scene is not None:
+        shots.append(Shot(ExposurePlan("scene", "scene", 0.01, frames), lambda _: scene.copy()))
+    grid = PixelGrid(rows, columns, true.cfa)
+    made = list(simulated_frames(true, shots, grid, seed=seed))
+    stacks = {
+        shot.plan.name: np.stack(made[k * frames : (k + 1) * frames])
+        for k, shot in enumerate(shots)
+    }
+    exposures = tuple(
+        RecordedExposure(
+            shot.plan.name,
+            shot.plan.kind,
+            shot.plan.exposure_time_s,
+            shot.plan.light,
+            tuple(Path(str(i)) for i in range(frames)),
+        )
+        for shot in shots
+    )
+    sensor = Sensor(
+        name="planted",
+        cfa=true.cfa,
+        black_level=true.black_level,
+        white_level=true.white_level,
+        bit_depth=true.bit_depth,
+    )
+    return InMemory(sensor, exposures, rows, columns, Path(), stacks)
+
+
+def held_of(recording: Recording, locked: tuple[int, ...] = LOCKED) -> Held:
+    names = [e.name for e in recording.exposures]
+    frames = len(recording.exposures[0].frames)
+    training = tuple(i for i in range(frames) if i not in locked)
+    return hold(recording, dict.fromkeys(names, training), dict.fromkeys(names, locked))
+
+
+def signals(levels: tuple[float, ...] = LEVELS) -> dict[str, Array]:
+    made = {f"flat-{i}": np.full((2, 2), level) for i, level in enumerate(levels)}
+    return made | {"dark-0": np.zeros((2, 2)), "dark-1": np.zeros((2, 2))}
+
+
+def test_likelihood_of_white_noise_is_its_closed_form() -> None:
+    """Codes of normal noise: ln(Phi(above) - Phi(below)) by scipy.stats, true level and variance.
+
+    The program knows the level of a frame from 6 training frames only: the means of 16 frames cost
+    ln(1 + 2 / 6) / 4 nats each on average, with a spread of order 1.
+    """
+    base = camera()
+    recording = recorded(base, 3)
+    found = loglik_of(held_of(recording), base, signals(), seed=1)
+    away = []
+    for name, signal in signals().items():
+        sd = np.sqrt(20 + 0.5 * signal[0, 0])
+        for k, number in enumerate(LOCKED):
+            codes = recording.stacks[name][number] - 64.0 - signal[0, 0]
+            upper, lower = (scipy.stats.norm.cdf((codes + h) / sd) for h in (0.5, -0.5))
+            away.append(found.frames[name][k] - np.log(upper - lower).sum())
+    assert np.abs(np.mean(away) + np.log(1 + 2 / 6) / 4) < 5 * np.std(away) / 4
+    assert np.max(np.abs(away)) < 8  # of some 5e4 nats
+
+
+def test_gain_of_row_noise_is_its_closed_form() -> None:
+    """n directions of variance ratio F gain n (F - 1 - ln F) / 2 nats per frame, n = rows.
+
+    The likelihood ratio's own standard deviation is (F - 1) sqrt(n / 2) per frame. Of five 95 %
+    intervals three or more cover but for a chance of 1e-3.
+    """
+    sigma, levels, locked = 1.2, (400.0, 1600.0), tuple(range(3, 16, 4))
+    true = camera(registry()["row_noise"](sigma_dn=sigma))
+    ratios = {
+        name: 1 + COLUMNS * sigma**2 / (20 + 1 / 12 + 0.5 * signal[0, 0])
+        for name, signal in signals(levels).items()
+    }
+    wanted = sum(4 * ROWS * (f - 1 - np.log(f)) / 2 for f in ratios.values())
+    variance = sum(4 * ROWS * (f - 1) ** 2 / 2 for f in ratios.values())
+    seen, covered = [], 0
+    for seed in range(5):
+        held = held_of(recorded(true, seed, frames=16, levels=levels), locked)
+        gain = gain_of(held, true, camera(), signals(levels), seed=seed)
+        seen.append(gain.nats_per_frame * 16)
+        covered += gain.ci95[0] < wanted / 16 < gain.ci95[1]
+    assert abs(np.mean(seen) - wanted) < 5 * np.sqrt(variance / 5)
+    assert covered >= 3
+
+
+@given(st.floats(0.01, 0.12), st.floats(-0.1, 0.1))
+def test_whittle_is_exact_on_a_torus(f: float, g: float) -> None:
+    """A circulant Gaussian field by scipy's multivariate normal; the mean is left to levels."""
+    rows, columns = 6, 8
+    delta = np.zeros((rows, columns))
+    delta[0, 0] = 1 - 2 * f - 2 * g
+    delta[0, 1] = delta[0, -1] = f
+    delta[1, 0] = delta[-1, 0] = g
+    power = np.abs(np.fft.fft2(delta)) ** 2
+    power[0, 0] = 1.0
+    kernel = np.fft.ifft2(power).real
+    place = [(y, x) for y in range(rows) for x in range(columns)]
+    covariance = np.array(
+        [[kernel[(y - v) % rows, (x - u) % columns] for v, u in place] for y, x in place]
+    )
+    field = np.random.default_rng(1).standard_normal((rows, columns))
+    wanted = scipy.stats.multivariate_normal.logpdf(field.reshape(-1), cov=covariance)
+    wanted -= scipy.stats.norm.logpdf(field).sum()
+    counts = bin_counts((rows, columns), Cfa.MONO)
+    found = whittle_gain(field, power[:, : columns // 2 + 1], counts)
+    assert found == pytest.approx(wanted, abs=1e-8)
+
+
+def test_spectrum_of_crosstalk_is_its_closed_form() -> None:
+    """Shot noise through the kernel, read noise white: power of a kernel of nearest neighbours."""
+    f, levels = 0.03, (1600.0,)
+    true = camera(registry()["crosstalk"](fraction=f))
+    held = held_of(recorded(true, 6, levels=levels))
+    spectrum = law_of(true, held, signals(levels), 4).exposures["flat-0"].spectrum
+    assert spectrum is not None
+    y = np.cos(2 * np.pi * np.fft.fftfreq(ROWS))[:, np.newaxis]
+    x = np.cos(2 * np.pi * np.fft.rfftfreq(COLUMNS))[np.newaxis]
+    power = 800.0 * (1 - 4 * f + 2 * f * (x + y)) ** 2 + 20.0
+    counts = bin_counts((ROWS, COLUMNS), Cfa.MONO)
+    power /= (counts * power).sum() / counts.sum()
+    inside = counts > 0
+    # Lags of 8 frames have an error of 1 / sqrt(8 N) = 0.003; a bin adds up four times two of them.
+    assert np.abs(spectrum - power)[inside].max() < 5 * 0.003 * 4
+    # What the difference costs, nats per frame, is next to nothing of the gain.
+    cost, gain = (
+        0.5 * (counts * (power / p - 1 - np.log(power / p))).sum() for p in (spectrum, 1.0)
+    )
+    assert cost < 0.05 * gain
+
+
+PLANTED = {
+    "adc_dnl": {"rms_lsb": 0.1},
+    "amp_glow": {"dn_per_s": 40.0},
+    "bistable_pattern": {"amplitude_dn": 0.18, "frequency": (0.5, 0.5)},
+    "black_level_drift": {"sigma_dn": 0.25},
+    "brighter_fatter": {"per_dn": 5e-6},
+    "channel_imbalance": {"gain_percent": 0.4},
+    "column_fpn": {"sigma_dn": 0.2},
+    "column_noise": {"sigma_dn": 0.4},
+    "crosstalk": {"fraction": 0.015},
+    "dark_current": {"dn_per_s": 15.0},
+    "dsnu": {"sigma_dn": 0.6},
+    "dual_gain_mismatch": {"gain_error_percent": 0.3},
+    "flicker": {"sigma_percent": 0.08},
+    "heavy_tailed_read_noise": {"tail_df": 18.0},
+    "hot_pixels": {"pixel_fraction": 0.001, "mean_dn_per_s": 400.0},
+    "image_lag": {"fraction": 0.04},
+    "impulse": {"per_megapixel_frame": 200.0, "mean_dn": 300.0},
+    "line_flicker": {"depth_percent": 0.12, "cycles_per_frame": 3.3},
+    "nonlinearity": {"percent_full_scale": 0.25},
+    "periodic_noise": {"amplitude_dn": 0.35, "frequency": (0.21, 0.13)},
+    "pink_noise": {"sigma_dn": 0.5},
+    "poisson_shot_noise": {},
+    "prnu": {"sigma_percent": 0.2},
+    "quantisation": {"step_dn": 2.0},
+    "read_noise_spread": {"log_sigma": 0.12},
+    "readout_memory": {"fraction": 0.025, "lag_pixels": 2},
+    "row_fpn": {"sigma_dn": 0.2},
+    "row_noise": {"sigma_dn": 0.4},
+    "rts": {"pixel_fraction": 0.01, "amplitude_dn": 8.0},
+    "saturation": {"full_well_dn": 2690.0},
+    "shading": {"falloff_percent": 0.4},
+    "spatial_filtering": {"fraction": 0.015},
+    "tap_mismatch": {"gain_percent": 0.18},
+}
+"""Strengths at some 20 standard deviations of the statistic that isolates each effect."""
+
+
+def base_for(kind: str) -> Camera:
+    """Return a base model that can have an effect, and show it."""
+    if kind == "channel_imbalance":
+        return camera(cfa="RGGB")
+    if kind == "dual_gain_mismatch":
+        return camera(segments=((0.5, 20.0, 700.0), (0.8, 120.0, None)))
+    if kind == "poisson_shot_noise":
+        return camera(segments=((2.0, 20.0, None),))
+    return camera()
+
+
+def having(base: Camera, effect: Effect) -> Camera:
+    return base.model_copy(update={"effect": (*base.effect, effect)})
+
+
+@pytest.mark.parametrize("kind", registry())
+def test_every_effect_that_was_planted_gains(kind: str) -> None:
+    """Base model with the true numbers, so that nothing but the effect is missing."""
+    base = base_for(kind)
+    true = having(base, registry()[kind](**PLANTED[kind]))
+    gain = gain_of(held_of(recorded(true, 11)), true, base, signals(), seed=5)
+    assert gain.ci95[0] > 0
+    assert gain.ci95[0] < gain.nats_per_frame < gain.ci95[1]
+
+
+def test_a_missing_segment_gains() -> None:
+    base = camera()
+    true = camera(segments=((0.5, 20.0, 700.0), (0.52, 40.0, None)))
+    gain = gain_of(held_of(recorded(true, 11)), true, base, signals(), seed=5)
+    assert gain.ci95[0] > 0
+
+
+@cache
+def null(seed: int) -> tuple[Held, Loglik]:
+    """Return a recording of the base model alone, and its likelihood."""
+    held = held_of(recorded(camera(), 1000 + seed))
+    return held, loglik_of(held, camera(), signals(), seed=seed)
+
+
+WEAK = {
+    "row_noise": {"sigma_dn": 0.02},
+    "dsnu": {"sigma_dn": 0.025},
+    "crosstalk": {"fraction": 3e-4},
+    "flicker": {"sigma_percent": 0.002},
+    "rts": {"pixel_fraction": 2.5e-4, "amplitude_dn": 8.0},
+    "adc_dnl": {"rms_lsb": 0.005},
+}
+"""A tenth of what stands at five standard deviations."""
+
+
+@pytest.mark.parametrize("kind", WEAK)
+def test_an_effect_that_is_not_there_gains_nothing(kind: str) -> None:
+    """At 2.5 % false gains, 3 or more of 6 have the chance 3e-4."""
+    weak = having(camera(), registry()[kind](**WEAK[kind]))
+    gains = []
+    for seed in range(6):
+        held, before = null(seed)
+        after = loglik_of(held, weak, signals(), seed=seed)
+        gains.append(heldout_gain(before, after, seed=seed))
+    assert sum(gain.ci95[0] > 0 for gain in gains) < 3
+    assert np.mean([gain.nats_per_frame for gain in gains]) < 0.5
+
+
+@pytest.mark.parametrize("kind", ["crosstalk", "dsnu", "prnu", "adc_dnl", "image_lag"])
+def test_a_strong_effect_that_is_not_there_loses(kind: str) -> None:
+    wrong = having(camera(), registry()[kind](**PLANTED[kind]))
+    gain = gain_of(null(0)[0], wrong, camera(), signals(), seed=1)
+    assert gain.ci95[1] < 0
+
+
+def test_an_effect_is_not_credited_for_another() -> None:
+    """Two fixed patterns: each gains beside the other, and the true one most."""
+    dsnu = registry()["dsnu"](sigma_dn=0.8)
+    prnu = registry()["prnu"](sigma_percent=0.3)
+    held = held_of(recorded(camera(dsnu, prnu), 21))
+    both = loglik_of(held, camera(dsnu, prnu), signals(), seed=1)
+    for one in (dsnu, prnu):
+        alone = loglik_of(held, camera(one), signals(), seed=1)
+        assert heldout_gain(alone, both, seed=1).ci95[0] > 0
+
+
+def test_levels_are_predicted_from_light() -> None:
+    """A bend of the response is no gain where light is unknown: any level then is as good."""
+    bend = registry()["nonlinearity"](percent_full_scale=0.25)
+    found = [
+        gain_of(
+            held_of(recorded(camera(bend), 4, lit=lit)), camera(bend), camera(), signals(), seed=1
+        )
+        for lit in (True, False)
+    ]
+    assert found[0].ci95[0] > 0
+    assert found[1].nats_per_frame < 0.5 * found[0].nats_per_frame
+
+
+def test_exposures_that_are_locked_altogether() -> None:
+    """Without training frames of their own, without a signal of their own: that of their light."""
+    drift = registry()["prnu"](sigma_percent=0.5)
+    recording = recorded(camera(drift), 8)
+    names = [e.name for e in recording.exposures]
+    locked = {n: tuple(range(FRAMES)) if n in ("dark-1", "flat-3") else LOCKED for n in names}
+    training = {n: () if n in ("dark-1", "flat-3") else TRAINING for n in names}
+    held = hold(recording, training, locked)
+    known = {n: s for n, s in signals().items() if n not in ("dark-1", "flat-3")}
+    before, after = (loglik_of(held, c, known, seed=1) for c in (camera(), camera(drift)))
+    assert np.isfinite(np.concatenate(list(after.per_frame.values()))).all()
+    whole = loglik_of(held, camera(drift), signals(), seed=1)
+    assert after.frames["flat-3"] == pytest.approx(whole.frames["flat-3"], rel=1e-3)
+    # The pattern is known from the other exposures.
+    assert (after.frames["flat-3"] - before.frames["flat-3"]).min() > 0
+
+
+def test_scenes_are_judged_about_their_training_mean() -> None:
+    """A ramp: its variance follows the signal; the training mean's error costs 1 / 6 of it."""
+    rows = camera(registry()["row_noise"](sigma_dn=2.0))
+    ramp = np.broadcast_to(np.linspace(100, 1500, COLUMNS, dtype=np.float32), (ROWS, COLUMNS))
+    recording = recorded(rows, 9, levels=(400.0, 900.0), scene=ramp)
+    held = held_of(recording)
+    known = signals((400.0, 900.0))
+    before, after = (loglik_of(held, c, known, seed=1) for c in (camera(), rows))
+    assert (after.frames["scene"] - before.frames["scene"]).min() > 0
+    assert before.levels["scene"] == 0.0
+    sd = np.sqrt(20 + 0.5 * ramp + 4) * np.sqrt(1 + 1 / 6)
+    codes = recording.stacks["scene"]
+    training = codes[list(TRAINING)].mean(0)
+    closed = scipy.stats.norm.logpdf(codes[3], training, sd).sum()
+    # Rows gain some 40 nats over this white law, the level's own a few; all is some 6e4.
+    assert after.frames["scene"][0] == pytest.approx(closed, abs=200)
+    assert after.frames["scene"][0] > closed
+
+
+def test_clipped_exposures_are_left_out() -> None:
+    levels = (*LEVELS[:4], 4100.0)
+    held = held_of(recorded(camera(), 2, levels=levels))
+    assert held.left_out == ("flat-4",)
+
+
+def test_a_large_sensor_is_seen_through_a_window(monkeypatch: pytest.MonkeyPatch) -> None:
+    """At its centre, from an even row and column on; gains are the window's."""
+    true = camera(registry()["prnu"](sigma_percent=0.5), cfa="RGGB")
+    recording = recorded(true, 2, rows=102, columns=140, levels=(400.0, 1600.0))
+    monkeypatch.setattr(held_module, "MOST_SAMPLES", 4 * 12 * 50 * 70)
+    held = held_of(recording)
+    assert held.grid == PixelGrid(50, 68, Cfa.RGGB, 26, 36, 102, 140)
+    first = held.exposures[2].codes[0]
+    assert (first == recording.stacks["flat-0"][3][26:76, 36:104]).all()
+    gain = gain_of(held, true, camera(cfa="RGGB"), signals((400.0, 1600.0)), seed=1)
+    assert gain.ci95[0] > 0
+
+
+def test_the_same_whatever_the_jobs() -> None:
+    recording = recorded(camera(registry()["row_noise"](sigma_dn=0.5)), 13)
+    names = [e.name for e in recording.exposures]
+    numbers = dict.fromkeys(names, TRAINING), dict.fromkeys(names, LOCKED)
+    after = camera(registry()["row_noise"](sigma_dn=0.5))
+    one, two = (
+        prove(recording, *numbers, camera(), after, signals(), seed=3, jobs=jobs) for jobs in (1, 2)
+    )
+    assert one.gain == two.gain
+    assert one.auc == two.auc
+    assert one.loglik_per_pixel.after - one.loglik_per_pixel.before == pytest.approx(
+        one.gain.nats_per_frame / (ROWS * COLUMNS), rel=1e-6
+    )
+
+
+@pytest.mark.parametrize("kind", ["quantisation", "adc_dnl"])
+def test_cells_cover_the_line(kind: str) -> None:
+    """The chances of all codes add up to one, whatever the converter and the law."""
+    parameters = {"quantisation": {"step_dn": 3.0}, "adc_dnl": {"rms_lsb": 0.4}}[kind]
+    cells = cells_of(camera(registry()[kind](**parameters)), 1)
+    draws = np.random.default_rng(2)
+    heavy, normal = draws.standard_t(4, 20_000), draws.standard_normal(20_000)
+    shape = shape_of(counted(heavy), counted(normal))
+    for centre, sd in ((100.0, 5.0), (-60.0, 8.0), (4030.0, 20.0)):
+        chance = shape.below((cells.upper_dn - centre) / sd) - shape.below(
+            (cells.lower_dn - centre) / sd
+        )
+        assert chance.min() >= 0
+        assert chance.sum() == pytest.approx(1, abs=1e-9)
+    assert cells.plain == (kind == "quantisation")
+
+
+def test_a_law_learned_from_normal_draws_is_normal() -> None:
+    draws = np.random.default_rng(2).standard_normal(50_000)
+    u = np.linspace(-7, 7, 200)
+    learned = shape_of(counted(draws), counted(draws))
+    # A straight table between steps of 1/64: the second derivative is at most 0.25.
+    assert np.abs(learned.below(u) - NORMAL.below(u)).max() < 0.25 / 8 / 64**2 * 1.01
+
+
+@given(st.floats(0.3, 6.0), st.floats(5.0, 30.0))
+def test_centre_of_clipped_and_coarse_noise(sd: float, level: float) -> None:
+    """From the mean code of a clipped, rounded normal law back to its centre: by scipy.stats."""
+    cells = cells_of(camera(black=10.0), 1)
+    codes = np.arange(4096)
+    edges = np.concatenate([[-np.inf], codes[:-1] + 0.5, [np.inf]])
+    mean = float((np.diff(scipy.stats.norm.cdf(edges, level, sd)) * codes).sum())
+    found = cells.centre(mean - 10.0, sd) + 10.0
+    # What is left where nothing is corrected: 4 sd from the end, or noise of 0.6 of a code.
+    assert found == pytest.approx(level, abs=2e-3 * max(sd, 1.0))
+
+
+def test_intervals_cover() -> None:
+    """Normal gains of two frames each in eight exposures: 95 % intervals in 95 % of draws.
+
+    400 draws: 88 % is five standard errors below 95 %.
+    """
+    rng = np.random.default_rng(4)
+    names = [f"e{i}" for i in range(8)]
+    zero = Loglik({n: np.zeros(2) for n in names}, dict.fromkeys(names, 0.0))
+    covered = 0
+    for k in range(400):
+        gains = {n: 2 + 2 * rng.standard_normal(2) for n in names}
+        low, high = heldout_gain(zero, Loglik(gains, dict.fromkeys(names, 0.0)), seed=k).ci95
+        covered += low < 2 < high
+    assert covered / 400 > 0.88
+
+
+def test_one_locked_frame_tells_no_interval() -> None:
+    one = {"a": np.array([1.0])}
+    gain = heldout_gain(Loglik({"a": np.zeros(1)}, {"a": 0.0}), Loglik(one, {"a": 0.0}), seed=1)
+    assert gain.ci95 == (-np.inf, np.inf)
+
+
+def test_gap_closed() -> None:
+    """Normal measures, 300 of them, off by 3 standard deviations before: closed forms.
+
+    D0 - Df = 9; D1 - Df is 0, 9 or 9/4 on average, its standard error some sqrt(8 / 300) / 9 and
+    the shared spread estimate's: 0.05 in all.
+    """
+    rng = np.random.default_rng(7)
+    n, k = 300, 12
+    after = rng.standard_normal((k, n)) * 2
+    x = rng.standard_normal(n) * 2
+    before = rng.standard_normal((k, n)) * 2 + 6
+    assert gap_closed(x, before, after) == pytest.approx(1, abs=0.25)
+    assert gap_closed(x + 6, after, after + 3) == pytest.approx(0.75, abs=0.25)
+    assert gap_closed(x, before, before) == pytest.approx(0, abs=0.25)
+    assert gap_closed(x, rng.standard_normal((k, n)) * 2, after) is None
+    assert gap_closed(np.full(n, np.nan), before, after) is None
+
+
+def test_classifier_finds_nothing_in_the_right_model() -> None:
+    """Six recordings of 24 samples against 144: one area has a standard error of 0.065."""
+    areas = []
+    for seed in range(6):
+        auc = auc_of(null(seed)[0], camera(), signals(), seed=seed)
+        assert auc is not None
+        areas.append(auc.value)
+    assert abs(np.mean(areas) - 0.5) < 5 * 0.065 / np.sqrt(6)
+
+
+@pytest.mark.parametrize(
+    ("kind", "parameters"),
+    [
+        ("quantisation", {"step_dn": 2.0}),
+        ("image_lag", {"fraction": 0.04}),
+        ("spatial_filtering", {"fraction": 0.015}),
+        ("crosstalk", {"fraction": 0.02}),
+        ("heavy_tailed_read_noise", {"tail_df": 18.0}),
+        ("dsnu", {"sigma_dn": 0.6}),
+        ("row_noise", {"sigma_dn": 1.0}),
+    ],
+)
+def test_classifier_sees_what_is_visible(kind: str, parameters: dict[str, float]) -> None:
+    true = camera(registry()[kind](**parameters))
+    held = held_of(recorded(true, 31))
+    before, after = (auc_of(held, c, signals(), seed=1) for c in (camera(), true))
+    assert before is not None
+    assert after is not None
+    assert before.value >= 0.9
+    assert after.ci95[0] < 0.5
+
+
+def test_a_sensor_without_a_patch_has_no_classifier() -> None:
+    held = held_of(recorded(camera(), 1, rows=24, columns=64, levels=(400.0,)))
+    assert auc_of(held, camera(), signals((400.0,)), seed=1) is None

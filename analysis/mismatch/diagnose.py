@@ -31,7 +31,6 @@ from dsis.recording import Recording
 Progress = Callable[[int, int, str], None]
 VOCABULARY = frozenset({*CANDIDATES, "dual_gain"})
 _NEAR = 8.0  # of log-likelihood: a rival worth naming a recording that would decide
-_ERRORS = 2.2  # standard errors from a gain to the end of its interval, of few frames
 _LARGE = 2.5e7  # samples from which fewer simulations must do
 
 
@@ -68,7 +67,7 @@ def find_mismatch(
     words = VOCABULARY if vocabulary is None else vocabulary & VOCABULARY
     search = Search(setting, camera, base, words, step)
     final = search.run()
-    trial = Trial.of(recording, split, base, seed)
+    trial = Trial.of(recording, split, seed)
     final, gains = _proven(search, search.settle(final), trial)
     proof = trial.proof(base, final, step, source)
     return _finding(camera, base, final, search, gains, proof)
@@ -77,21 +76,15 @@ def find_mismatch(
 def _proven(search: Search, final: State, trial: Trial) -> tuple[State, dict[str, Gain]]:
     """Drop, one by one, effects whose gain on the locked frames is within its uncertainty."""
     while True:
-        gains = {
-            named.kind: trial.gain(final, search.without(final, named)) for named in search.named
-        }
-        weak = [named for named in search.named if not _certain(gains[named.kind])]
+        without = {named.kind: search.without(final, named) for named in search.named}
+        gained = trial.gains(final, without)
+        weak = [named for named in search.named if not gained[named.kind].certain]
         if not weak:
-            return final, gains
-        worst = min(weak, key=lambda named: gains[named.kind].nats_per_frame)
-        gain = gains[worst.kind]
-        why = f"gains {gain.nats_per_frame:.3g} nats per locked frame, no more than chance"
+            return final, {kind: one.gain for kind, one in gained.items()}
+        worst = min(weak, key=lambda named: gained[named.kind].total_nats)
+        nats = gained[worst.kind].gain.nats_per_frame
+        why = f"gains {nats:.3g} nats per locked frame, no more than chance"
         final = search.drop(final, worst, why)
-
-
-def _certain(gain: Gain) -> bool:
-    """Return whether a gain is more than its standard error, a quarter of its interval or so."""
-    return gain.nats_per_frame > (gain.nats_per_frame - gain.ci95[0]) / _ERRORS
 
 
 def _finding(

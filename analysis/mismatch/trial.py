@@ -1,6 +1,6 @@
 """The locked frames: what they say of the base model, the final model and every effect."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 from analysis.mismatch.finding import Change, Gain, Proof
 from analysis.mismatch.model import simulate
 from analysis.mismatch.observe import Observation, observe
+from analysis.mismatch.prove.gain import heldout_gain
 from analysis.mismatch.prove.gap import gap_closed
 from analysis.mismatch.prove.held import Held, hold
-from analysis.mismatch.prove.proof import gain_of, prove_held
+from analysis.mismatch.prove.proof import loglik_of, prove_held
 from analysis.mismatch.recalibrate import Calibrated, layout_of
 from analysis.mismatch.source import Source
 from analysis.mismatch.split import Split
@@ -22,6 +23,28 @@ from dsis.recording import Recording
 
 Array = NDArray[np.float64]
 _REPLICATES = 6
+_TOTAL = 4.6  # nats: chance gains as much in 1 % of recordings at most, whatever the frames
+_ERRORS = 2.2  # standard errors from a gain to the end of its interval, of few frames
+
+
+@dataclass(frozen=True)
+class Gained:
+    """A gain per locked frame with its interval, and in all of them together."""
+
+    gain: Gain
+    total_nats: float
+
+    @property
+    def certain(self) -> bool:
+        """Whether chance is ruled out.
+
+        The gain exceeds its own uncertainty, and either its interval is above zero or the ratio of
+        likelihoods is above 100: of a model fixed before, chance exceeds that in 1 % of recordings
+        at most (Markov's inequality).
+        """
+        own = self.gain.nats_per_frame
+        above = own > (own - self.gain.ci95[0]) / _ERRORS
+        return above and (self.gain.ci95[0] > 0 or self.total_nats > _TOTAL)
 
 
 @dataclass(frozen=True)
@@ -44,18 +67,27 @@ class Trial:
     seed: int
 
     @classmethod
-    def of(cls, recording: Recording, split: Split, base: State, seed: int) -> "Trial":
+    def of(cls, recording: Recording, split: Split, seed: int) -> "Trial":
         """Return the trial of a recording."""
-        del base
         held = hold(recording, split.development, split.locked) if split.locked else None
         return cls(recording, split, held, seed)
 
-    def gain(self, final: State, without: Camera) -> Gain:
-        """Return what the final model gains over one without an effect, per locked frame."""
+    def gains(self, final: State, without: Mapping[str, Camera]) -> dict[str, Gained]:
+        """Return what the final model gains over cameras without an effect, by effect."""
         if self.held is None:
-            return Gain(float("nan"), (float("-inf"), float("inf")))
+            nothing = Gain(float("nan"), (float("-inf"), float("inf")))
+            return {kind: Gained(nothing, float("nan")) for kind in without}
+        if not without:
+            return {}
         signals = final.calibrated.model.signals
-        return gain_of(self.held, final.camera, without, signals, seed=self.seed)
+        whole = loglik_of(self.held, final.camera, signals, seed=self.seed)
+        frames = sum(own.size for own in whole.frames.values())
+        found = {}
+        for kind, camera in without.items():
+            less = loglik_of(self.held, camera, signals, seed=self.seed)
+            gain = heldout_gain(less, whole, seed=self.seed)
+            found[kind] = Gained(gain, gain.nats_per_frame * frames)
+        return found
 
     def proof(self, base: State, final: State, step: Callable[[], None], source: Source) -> Proof:
         """Return base and final model side by side."""
@@ -72,7 +104,9 @@ class Trial:
         return Proof(locked, numbers.loglik_per_pixel, counts, gap, numbers.auc, chi2)
 
     def _gap(self, base: State, final: State, source: Source) -> float | None:
-        layout = layout_of(self.recording, self.split.locked, source.frames)
+        signals = final.calibrated.model.signals
+        both = {name: own for name, own in self.split.locked.items() if name in signals}
+        layout = layout_of(self.recording, both, source.frames)
         if not any(e.kind != "scene" for e in layout.exposures):
             return None
         numbers = {e.name: e.numbers for e in layout.exposures}

@@ -147,7 +147,7 @@ def test_robots_go_through_the_plan_and_are_marked(folder):
         store.check()
         assert [o.observer for o in store.observers()] == ["robot-001", "robot-002", "robot-003"]
         assert all(o.simulated for o in store.observers())
-        plan = draw_plan(manifest, "robot-002", 5)
+        plan = draw_plan(manifest, "robot-002", 5, mirrors="robot-001")
         assert tuple(r.presentation for r in store.rows("robot-002")) == plan
     assert len(rows) == 3 * (2 + 3 + 8)
     assert all(r.vote.simulated and r.vote.valid and r.vote.reaction_ms is None for r in rows)

@@ -5,6 +5,7 @@ import hashlib
 import json
 import threading
 import time
+import urllib.error
 import urllib.request
 
 import httpx
@@ -13,10 +14,15 @@ import pytest
 
 from dsis.errors import InputError
 from dsis.manifest import Clip, ClipFiles, Manifest, write_manifest
-from dsis.session import serve, status
+from dsis.session import export_votes, forget, serve, status
+from dsis.session.cliplog import ClipLog
 from dsis.session.observing import Observation
-from dsis.session.server import create_app, enrol
+from dsis.session.panel import enrol
+from dsis.session.personal import PERSONAL, read_records
+from dsis.session.server import WINDOW, create_app
+from dsis.session.setup import Setup, put_in_force
 from dsis.session.store import STORE, open_store, read_store
+from dsis.session.windows import Windows
 from dsis.spec import Sequence, Session
 
 ADDRESS = "127.0.0.1:8123"
@@ -25,12 +31,42 @@ TIMES = {"reference_s": 0.16, "grey_s": 0.2, "test_s": 0.16, "vote_s": 1.0}
 PAIR_S = 0.16 + 0.2 + 0.16 + 0.2
 
 
+OBSERVER = {
+    "age": "25-34",
+    "expertise": "naive",
+    "acuity_chart": "Landolt",
+    "acuity": 1.25,
+    "corrected": True,
+    "colour_test": "Ishihara",
+    "colour_plates": 14,
+    "colour_read": 14,
+    "colour_vision": "normal",
+}
+DISPLAY = {
+    "display": {
+        "model": "Sony BVM",
+        "diagonal_inch": 24.5,
+        "peak_cd_m2": 100,
+        "distance_heights": 3,
+    },
+    "steps_seen": True,
+    "pixels_even": True,
+    "measured": {"refresh_hz": 50.0},
+}
+CONSENT = Setup(consent="I agree to this.", lab="TUM", hidden_references=False)
+FORMS = {
+    "observer": OBSERVER,
+    "consent": {"sha256": CONSENT.consent_sha256},
+    "display": DISPLAY,
+}
+
+
 def frames_of(stimulus):
     seed = int.from_bytes(stimulus.encode(), "little")
     return np.random.default_rng(seed).integers(0, 256, (4, 16, 16, 3), np.uint8)
 
 
-def write_test(folder, *, hashes=True, player=True, **session):
+def write_test(folder, *, hashes=True, form="player", **session):
     """Two contents with two test clips each, and one clip for training."""
     folder.mkdir(exist_ok=True)
     clips = []
@@ -53,7 +89,7 @@ def write_test(folder, *, hashes=True, player=True, **session):
                     content=content,
                     role=role,
                     reference=None if role == "reference" else f"{content}__reference",
-                    files={"player" if player else "png8": files},
+                    files={form: files},
                 )
             )
     manifest = Manifest(
@@ -77,10 +113,10 @@ class Clock:
 
 
 class Browser:
-    """Requests of a browser to the application, one at a time."""
+    """Requests of a window of a browser to the application, one at a time."""
 
-    def __init__(self, app):
-        self._app = app
+    def __init__(self, app, token):
+        self._app, self._token = app, token
 
     def get(self, path, **options):
         return asyncio.run(self._send("GET", path, options))
@@ -89,6 +125,7 @@ class Browser:
         return asyncio.run(self._send("POST", path, options))
 
     async def _send(self, method, path, options):
+        options = {**options, "headers": {WINDOW: self._token, **options.get("headers", {})}}
         transport = httpx.ASGITransport(self._app)
         async with httpx.AsyncClient(transport=transport, base_url=f"http://{ADDRESS}") as client:
             return await client.request(method, path, **options)
@@ -97,15 +134,38 @@ class Browser:
 class Sitting:
     """An observer before the page, as far as the server can tell."""
 
-    def __init__(self, folder, manifest, observer="anna", *, resume=False):
+    def __init__(
+        self,
+        folder,
+        manifest,
+        observer="anna",
+        *,
+        resume=False,
+        forms=True,
+        setup=None,
+        player=None,
+    ):
         self.said, self.clock, self.ends = [], Clock(), 0
         self.session = manifest.session
         self.store = open_store(folder, manifest)
+        if setup is not None:
+            put_in_force(self.store, setup)
         enrol(self.store, manifest, observer, resume=resume, seed=1, say=self.said.append)
         seen = Observation(
-            self.store, manifest, folder, observer, say=self.said.append, clock_s=self.clock
+            self.store,
+            manifest,
+            folder,
+            observer,
+            say=self.said.append,
+            player=player,
+            clock_s=self.clock,
         )
-        self.http = Browser(create_app(seen, ADDRESS, when_done=self._end))
+        self.windows = Windows()
+        self.app = create_app(seen, ADDRESS, when_done=self._end, windows=self.windows)
+        self.http = Browser(self.app, self.windows.claim())
+        if forms:
+            for name in self.http.get("/api/session").json()["missing"]:
+                assert self.fill(name, FORMS[name]).status_code == 200
 
     def __enter__(self):
         return self
@@ -115,6 +175,9 @@ class Sitting:
 
     def _end(self):
         self.ends += 1
+
+    def fill(self, name, values):
+        return self.http.post(f"/api/forms/{name}", json=values)
 
     def next(self):
         return self.http.get("/api/next").json()
@@ -415,7 +478,7 @@ def test_foreign_hosts_and_origins_are_refused(sitting, headers, status_code):
 
 
 def test_the_page_and_its_parts_are_served_and_never_stored(sitting):
-    for path, kind in (("/", "html"), ("/player.js", "javascript"), ("/style.css", "css")):
+    for path, kind in (("/", "html"), ("/session.js", "javascript"), ("/style.css", "css")):
         answer = sitting.http.get(path)
         assert answer.status_code == 200
         assert kind in answer.headers["content-type"]
@@ -448,7 +511,7 @@ def test_a_clip_that_is_not_the_manifests_is_never_shown(folder, hashes):
 
 
 def test_stimuli_that_cannot_be_shown_are_refused_before_anything_is_stored(folder):
-    write_test(folder, player=False)
+    write_test(folder, form="exr")
     with pytest.raises(InputError, match=r'formats = \["player"\]'):
         serve(folder, "anna", open_browser=False)
     write_test(folder)
@@ -481,10 +544,20 @@ def test_serve_listens_on_the_loopback_and_ends_when_the_test_is_done(folder):
         time.sleep(0.01)
     url = next(line for line in said if "http" in line).split()[1].rstrip("/")
 
+    window = urllib.request.urlopen(f"{url}/api/window", timeout=10)  # noqa: S310  http
+    token = window.readline().decode().strip()
+
     def ask(path, body=None):
         data = None if body is None else json.dumps(body).encode()
-        with urllib.request.urlopen(f"{url}{path}", data, timeout=10) as answer:  # noqa: S310  http
+        request = urllib.request.Request(f"{url}{path}", data, {WINDOW: token})  # noqa: S310  http
+        with urllib.request.urlopen(request, timeout=10) as answer:  # noqa: S310  http
             return json.load(answer)
+
+    with pytest.raises(urllib.error.HTTPError) as second:
+        urllib.request.urlopen(f"{url}/api/window", timeout=10)  # noqa: S310  http
+    assert json.load(second.value)["error"] == "window: the session is open in another window"
+    for name in ("observer", "display"):
+        ask(f"/api/forms/{name}", FORMS[name])
 
     votes = 0
     while "done" not in (presentation := ask("/api/next")):
@@ -498,7 +571,178 @@ def test_serve_listens_on_the_loopback_and_ends_when_the_test_is_done(folder):
         form = {"showing": showing, "vote": 5, "reaction_ms": 1.0, "clips": clips}
         assert ask(f"{here}/vote", form) == {"vote": 5}
         votes += 1
-    session.join(timeout=20)
+    session.join(timeout=20)  # although a page is still open
     assert not session.is_alive()
+    window.close()
     assert votes == 4
     assert said[-1] == "anna: done"
+
+
+# ---- one window
+
+
+def test_only_the_window_that_holds_the_session_is_answered(sitting):
+    presentation = sitting.next()
+    form = sitting.form(presentation, sitting.watch(presentation), 7)
+    here = f"/api/presentations/{presentation['id']}"
+    other = Browser(sitting.app, "another-token")
+    asked = [
+        other.get("/api/next"),
+        other.get(f"{here}/test/0"),
+        other.post(f"{here}/start", json={}),
+        other.post(f"{here}/show/1", json={}),
+        other.post(f"{here}/vote", json=form),
+        other.post("/api/forms/observer", json=OBSERVER),
+    ]
+    for answer in asked:
+        assert answer.status_code == 409
+        assert "does not hold the session" in answer.json()["error"]
+    with pytest.raises(InputError, match="open in another window"):
+        sitting.windows.claim()
+    assert sitting.vote(presentation, form).json() == {"vote": 7}
+
+
+def test_a_window_that_is_gone_gives_the_session_back():
+    windows = Windows()
+    first = windows.claim()
+    windows.release("of nobody")
+    windows.check(first)
+    windows.release(first)
+    second = windows.claim()
+    assert second != first
+    for stale in (first, None, ""):
+        with pytest.raises(InputError, match="does not hold the session"):
+            windows.check(stale)
+
+
+# ---- forms
+
+
+def test_nothing_is_shown_before_the_forms_are_filled(folder):
+    with Sitting(folder, write_test(folder), forms=False, setup=CONSENT) as sitting:
+        session = sitting.http.get("/api/session").json()
+        assert session["missing"] == ["observer", "consent", "display"]
+        assert session["consent"] == "I agree to this."
+        presentation = sitting.next()
+        url = f"/api/presentations/{presentation['id']}/start"
+        for name in ("observer", "consent", "display"):
+            refused = sitting.http.post(url, json={})
+            assert refused.status_code == 409
+            assert "first come: " in refused.json()["error"]
+            missing = sitting.fill(name, FORMS[name]).json()["missing"]
+            assert name not in missing
+        assert sitting.http.post(url, json={}).status_code == 200
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "why"),
+    [
+        ("observer", {"age": 31}, "age"),
+        ("observer", {"acuity": None}, "acuity must be given"),
+        ("observer", {"acuity": 40.0}, "less than or equal to 4"),
+        ("observer", {"colour_read": 15}, "more than the plates shown"),
+        ("observer", {"colour_plates": None}, "must be given together"),
+        ("observer", {"colour_vision": "not tested"}, "colour_vision must say"),
+        ("observer", {"name": "Anna Maier"}, "unknown key"),
+        ("observer", {"note": "x" * 501}, "at most 500"),
+        ("consent", {"sha256": "0" * 64}, "is of another text"),
+        ("display", {"display": {"model": ""}}, "display.model"),
+        ("display", {"steps_seen": "yes"}, "boolean"),
+        ("votes", {}, "'votes' is none"),
+    ],
+)
+def test_forms_that_are_not_whole_are_refused(folder, name, change, why):
+    with Sitting(folder, write_test(folder), forms=False, setup=CONSENT) as sitting:
+        values = {**FORMS.get(name, {}), **change}
+        answer = sitting.fill(name, {k: v for k, v in values.items() if v is not None})
+        assert answer.status_code == 409
+        assert why in answer.json()["error"]
+        assert sitting.http.get("/api/session").json()["missing"][0] == "observer"
+    assert read_records(folder) == {}
+
+
+def test_personal_data_is_kept_apart_and_can_be_erased(folder):
+    marker = "wears-a-red-hat"
+    with Sitting(folder, write_test(folder), forms=False) as sitting:
+        record = {**OBSERVER, "note": marker, "acuity": 0.7, "colour_vision": "deficient"}
+        assert sitting.fill("observer", record).status_code == 200
+        assert sitting.fill("display", DISPLAY).status_code == 200
+        assert "anna: visual acuity is 0.7, below 1" in sitting.said
+        assert "anna: colour vision: deficient" in sitting.said
+        while sitting.judge() is not None:
+            pass
+    votes = b"".join(path.read_bytes() for path in (folder / "session").glob("votes*"))
+    assert marker.encode() not in votes
+    assert b"Landolt" not in votes
+    assert read_records(folder)["anna"][1].acuity == 0.7
+
+    out = folder.parent / "votes"
+    export_votes(folder, out)
+    assert not (out / "people.csv").exists()
+    assert all(marker.encode() not in path.read_bytes() for path in out.iterdir())
+    export_votes(folder, out, personal=True)
+    assert marker in (out / "people.csv").read_text(encoding="utf-8")
+    export_votes(folder, out)  # an export with personal data can be replaced by one without
+    assert not (out / "people.csv").exists()
+
+    forget(folder, "anna")
+    assert read_records(folder) == {}
+    assert marker.encode() not in (folder / PERSONAL).read_bytes()
+    with pytest.raises(InputError, match="holds nothing about 'anna'"):
+        forget(folder, "anna")
+
+
+# ---- a player of its own
+
+
+class Program:
+    """A player that shows nothing and drops as many frames as it is told."""
+
+    def __init__(self):
+        self.dropped, self.shown = 0, []
+
+    def describe(self):
+        return {"player": "none", "version": "1"}
+
+    def show(self, steps, clips):
+        self.shown.append([step.show for step in steps])
+        assert all(len(clip.frame_sha256) == 4 for clip in clips.values())
+        whole = [step.show for step in steps if step.show != "grey"]
+        return tuple(ClipLog(show=show, dropped=self.dropped) for show in whole)
+
+    def close(self):
+        pass
+
+
+def test_another_player_shows_the_clips_and_counts_the_frames(folder):
+    program = Program()
+    with Sitting(folder, write_test(folder, training=0, dummies=0), player=program) as sitting:
+        assert sitting.http.get("/api/session").json()["player"] == "program"
+        for number in range(5):
+            program.dropped = int(number == 0)
+            presentation = sitting.next()
+            showing = sitting.start(presentation)
+            form = {"showing": showing, "vote": 3, "reaction_ms": 1.0}
+            sitting.clock.now += 60
+            early = sitting.vote(presentation, form)
+            assert "are not those of the presentation" in early.json()["error"]
+            url = f"/api/presentations/{presentation['id']}/show"
+            assert sitting.http.post(f"{url}/{showing + 1}", json={}).status_code == 409
+            assert sitting.http.post(f"{url}/{showing}", json={}).status_code == 200
+            claimed = sitting.form(presentation, showing, 3)
+            assert "another program" in sitting.vote(presentation, claimed).json()["error"]
+            assert sitting.vote(presentation, form).json() == {"vote": 3}
+        assert "done" in sitting.next()
+    assert program.shown == [["grey", "reference", "grey", "test"] * 2] * 5
+    with read_store(folder) as store:
+        votes = [row.vote for row in store.rows("anna")]
+        assert [vote.dropped_frames for vote in votes] == [4, 0, 0, 0, 0]
+        assert [vote.valid for vote in votes] == [False, True, True, True, True]
+        assert store.events("display")[0]["player"] == {"player": "none", "version": "1"}
+
+
+def test_a_page_cannot_state_its_own_count_of_dropped_frames(sitting):
+    presentation = sitting.next()
+    form = sitting.form(presentation, sitting.watch(presentation), 7)
+    form["clips"][0] = {"show": "reference", "dropped": 0}
+    assert "without counters" in sitting.vote(presentation, form).json()["error"]

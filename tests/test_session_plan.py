@@ -11,9 +11,10 @@ from hypothesis import strategies as st
 
 from dsis.errors import InputError
 from dsis.manifest import Clip, ClipFiles, Manifest, Quality
-from dsis.session import draw_plan, plan_remarks, validate_plan
+from dsis.session import draw_plan, plan_remarks, validate_panel, validate_plan
 from dsis.session.arrange import arrange, unavoidable
-from dsis.session.plan import ATTEMPTS_MAX, repeat
+from dsis.session.plan import ATTEMPTS_MAX, SCORED, early_and_late, repeat
+from dsis.session.sittings import sittings
 from dsis.spec import Sequence, Session
 
 FILES = {"player": ClipFiles(path="clip.rgb")}
@@ -65,27 +66,76 @@ def contents_of(plan, *kinds):
             "repetitions": st.integers(1, 3),
             "dummies": st.integers(0, 5),
             "training": st.integers(0, 5),
+            "session_minutes_max": st.sampled_from([12.0, 30.0]),
         }
     ),
     seed=st.integers(0, 2**63 - 1),
+    hidden=st.booleans(),
+    mirrors=st.sampled_from([None, "bert"]),
 )
-def test_every_plan_keeps_the_rules(counts, practice, energies, session, seed):
+def test_every_plan_keeps_the_rules(counts, practice, energies, session, seed, hidden, mirrors):
     manifest = manifest_of(counts, practice=practice, energies=energies, **session)
-    plan = draw_plan(manifest, "anna", seed)
-    assert validate_plan(plan, manifest) == []
-    assert plan == draw_plan(manifest, "anna", seed)
+    how = {"mirrors": mirrors, "hidden_references": hidden}
+    plan = draw_plan(manifest, "anna", seed, **how)
+    assert validate_plan(plan, manifest, hidden_references=hidden) == []
+    assert plan == draw_plan(manifest, "anna", seed, **how)
 
     tests = contents_of(plan, "test")
     assert Counter(tests) == {c: n * session["repetitions"] for c, n in counts.items()}
+    asked = dict.fromkeys(counts, session["repetitions"]) if hidden else {}
+    assert Counter(contents_of(plan, "reference")) == asked
+    scored = contents_of(plan, "test", "reference")
     if len(counts) > 1:
-        border = contents_of(plan, "dummy")[-1:] + tests[:1]
-        assert alike(contents_of(plan, "dummy")) == 0
-        assert alike(border) == 0
         # n items of one content need n - 1 others between them
-        most, n = max(Counter(tests).values()), len(tests)
-        assert alike(tests) == max(0, 2 * most - n - 1)
-    elif len(tests) > session["repetitions"]:
-        assert alike([p.stimulus for p in plan if p.kind != "training"]) == 0
+        most, n = max(Counter(scored).values()), len(scored)
+        assert alike(scored) == max(0, 2 * most - n - 1)
+        for number in {p.session for p in plan}:
+            mine = [p for p in plan if p.session == number]
+            border = contents_of(mine, "dummy") + contents_of(mine, "test", "reference")[:1]
+            assert alike(border) == 0
+    for number in {p.session for p in plan}:  # a presentation lasts 57 s
+        assert sum(p.session == number for p in plan) * 57 <= 60 * session["session_minutes_max"]
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    length=st.integers(1, 120),
+    training=st.integers(0, 5),
+    dummies=st.integers(0, 5),
+    minutes=st.floats(11, 40),
+)
+def test_a_long_test_is_cut_into_as_few_even_sessions_as_there_must_be(
+    length, training, dummies, minutes
+):
+    session = Session(dummies=dummies, session_minutes_max=minutes)
+    room = int(60 * minutes / 57)
+    leads = [training + dummies] + [min(dummies, 3)] * length
+    parts = sittings(range(length), training, session)
+    assert [i for part in parts for i in part] == list(range(length))
+    held = [len(part) + lead for part, lead in zip(parts, leads, strict=False)]
+    assert max(held) <= room
+    needed = next(n for n in range(1, length + 1) if n * room - sum(leads[:n]) >= length)
+    assert len(parts) == needed
+    assert max(held) - min(held) <= 1 or min(map(len, parts)) == 1
+
+
+def test_a_session_too_short_for_a_presentation_is_refused():
+    manifest = manifest_of({"city": 4, "land": 4}, session_minutes_max=5.0)
+    with pytest.raises(InputError, match=r"session_minutes_max: is 5, must be at least 5\.7"):
+        draw_plan(manifest, "anna", 1)
+
+
+@settings(max_examples=30, deadline=None)
+@given(counts=COUNTS, repetitions=st.integers(1, 3), hidden=st.booleans(), seed=st.integers(0, 99))
+def test_over_a_pair_every_stimulus_is_as_often_early_as_late(counts, repetitions, hidden, seed):
+    manifest = manifest_of(counts, repetitions=repetitions)
+    first = draw_plan(manifest, "anna", seed, hidden_references=hidden)
+    second = draw_plan(manifest, "bert", seed, mirrors="anna", hidden_references=hidden)
+    orders = [[p.stimulus for p in plan if p.kind in SCORED] for plan in (first, second)]
+    assert orders[0] == orders[1][::-1]
+    assert all(early == late for early, late in early_and_late([first, second]).values())
+    assert validate_panel([first, second]) == []
+    assert validate_panel([first, first]) != [] or len(orders[0]) == 1 or repetitions > 1
 
 
 def test_two_contents_of_equal_size_alternate_strictly_from_the_first_dummy_on():
@@ -182,7 +232,7 @@ def test_what_cannot_be_kept_is_remarked():
     long = manifest_of({"city": 20, "land": 20}, training=8, reference_s=20.0, test_s=4.0)
     assert plan_remarks(draw_plan(long, "anna", 1), long) == (
         "2 training presentations, 8 are asked for",
-        "lasts 49 minutes, session_minutes_max is 30",
+        "lasts 52 minutes: 2 viewing sessions, session_minutes_max is 30",
         "clips of 10 s start again: reference_s is 20",
         "clips of 10 s are cut: test_s is 4",
     )
@@ -214,7 +264,9 @@ def test_the_validator_finds_what_is_broken():
     assert broken(list) == ""
     assert "follows" in broken(swapped)
     assert "is tested 0 times, must be 1" in broken(lambda p: p[:-1])
-    assert "2 dummy presentations, must be 3" in broken(lambda p: [*p[:2], *p[3:]])
+    assert "2 dummy presentations in viewing session 1, must be 3" in broken(
+        lambda p: [*p[:2], *p[3:]]
+    )
     assert "1 training presentations, must be 2" in broken(lambda p: p[1:])
     assert "training comes after test" in broken(lambda p: [*p[1:], p[0]])
     assert "repetition is 2, must be 1" in broken(changed(-1 + len(plan), repetition=2))
@@ -224,6 +276,15 @@ def test_the_validator_finds_what_is_broken():
     assert "reference is x, must be" in broken(changed(6, reference="x"))
     assert "different seeds" in broken(changed(6, seed=9))
     assert "shown 2 times in the training" in broken(lambda p: [p[0], *p[:1], *p[2:]])
+    assert "viewing sessions must follow one another" in broken(changed(8, session=2))
+    assert "viewing sessions must be numbered from 1" in broken(changed(-1 + len(plan), session=3))
+    assert "training after the first viewing session" in broken(changed(1, session=2))
+    short = manifest_of({"city": 4, "land": 4}, session_minutes_max=10.0)
+    assert "viewing session 1 lasts 12.3 minutes, must be at most 10" in validate_plan(plan, short)
+    hidden = draw_plan(manifest, "anna", 1, hidden_references=True)
+    assert "as a hidden reference 1 times, must be 0" in "".join(validate_plan(hidden, manifest))
+    missed = "".join(validate_plan(plan, manifest, hidden_references=True))
+    assert "city__reference is judged as a hidden reference 0 times, must be 1" in missed
     assert validate_plan(plan[1:], manifest) == ["places must be 1 to 12 in order"]
 
 
@@ -253,4 +314,10 @@ def test_a_failed_showing_comes_again_at_the_end():
     assert contents_of([dummy], "dummy") != contents_of([last], "test")
     assert after == replace(last, place=15, attempt=2)
     assert repeat(plan, replace(before, attempt=ATTEMPTS_MAX), manifest) == ()
+    full = manifest_of({"city": 4, "land": 4}, session_minutes_max=13 * 57 / 60)
+    *dummies, later = repeat(plan, before, full)  # no time is left in the first session
+    assert [p.kind for p in dummies] == ["dummy"] * 3
+    assert later == replace(before, place=17, attempt=2, session=2)
+    assert {p.session for p in dummies} == {2}
+    assert alike(contents_of([*dummies, later], "dummy", "test")) == 0
     assert repeat(plan, plan[0], manifest) == ()

@@ -1,8 +1,11 @@
 """A vote that was acknowledged is there, once, whenever the session's process is killed."""
 
+import http.client
+import json
 import os
 import random
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -14,6 +17,7 @@ from dsis.session.store import open_store, read_store
 from dsis.spec import Sequence, Session
 
 KILLS = 20
+VOTES_PER_LIFE = 8
 PLANNED = 20_000
 
 # One process imports dsis once and forks a voter for every line that it reads. A voter makes the
@@ -101,3 +105,176 @@ def test_every_acknowledged_vote_is_there_once(folder):
     # each kill may fall between the commit and the acknowledgement of one vote, not of two
     assert 0 <= len(stored) - len(acknowledged) <= KILLS
     assert sorted(stored) == list(range(1, len(stored) + 1))
+
+
+# One process imports dsis once and forks a server for every line that it reads: new, or resumed.
+SERVERS = """
+import os, sys
+from pathlib import Path
+from dsis.session import serve
+
+folder, port = Path(sys.argv[1]), int(sys.argv[2])
+for line in sys.stdin:
+    pid = os.fork()
+    if pid:
+        os.waitpid(pid, 0)
+        os.write(1, b"end\\n")
+        continue
+    os.write(1, f"pid {os.getpid()}\\n".encode())
+    serve(folder, "anna", port=port, open_browser=False, resume=line == "resume\\n", say=len)
+    os._exit(0)
+"""
+FORMS = {
+    "observer": {
+        "age": "not said",
+        "expertise": "naive",
+        "acuity_chart": "not tested",
+        "corrected": False,
+        "colour_test": "not tested",
+        "colour_vision": "not tested",
+    },
+    "display": {
+        "display": {"model": "x", "diagonal_inch": 1, "peak_cd_m2": 1, "distance_heights": 1},
+        "steps_seen": True,
+        "pixels_even": True,
+        "measured": {},
+    },
+}
+
+
+class Window:
+    """A page that shows nothing and votes at once, on one connection that may break anywhere."""
+
+    def __init__(self, port, until):
+        while True:
+            try:
+                self._held = http.client.HTTPConnection("127.0.0.1", port, timeout=20)
+                self._held.request("GET", "/api/window")
+                self._stream = self._held.getresponse()
+                if self._stream.status == 200:
+                    break
+            except OSError:
+                assert time.monotonic() < until, "the server does not start"
+            time.sleep(0.005)
+        self._token = self._stream.readline().decode().strip()
+        self._http = http.client.HTTPConnection("127.0.0.1", port, timeout=20)
+
+    def ask(self, path, body=None):
+        text = None if body is None else json.dumps(body)
+        method = "GET" if body is None else "POST"
+        self._http.request(method, path, text, {"X-Dsis-Window": self._token})
+        answer = self._http.getresponse()
+        values = json.loads(answer.read())
+        assert answer.status == 200, values
+        return values
+
+    def close(self):
+        self._http.close()
+        self._held.close()
+
+
+def vote_on(window, acknowledged, most):
+    """Fill the forms, then vote until the test is done; False: the server went away before.
+
+    After `most` votes wait for the server to go, so that there is always a vote left to lose.
+    """
+    votes = 0
+    try:
+        for name in window.ask("/api/session")["missing"]:
+            window.ask(f"/api/forms/{name}", FORMS[name])
+        while "done" not in (presentation := window.ask("/api/next")):
+            if votes == most:
+                time.sleep(0.001)
+                continue
+            here = f"/api/presentations/{presentation['id']}"
+            showing = window.ask(f"{here}/start", {})["showing"]
+            clips = [{"show": show, "frames": [[0, 0.0]]} for show in ("reference", "test")]
+            vote = presentation["id"] % 10 + 1
+            form = {"showing": showing, "vote": vote, "reaction_ms": 1.0, "clips": clips}
+            window.ask(f"{here}/vote", form)
+            acknowledged.append((presentation["id"], vote))
+            votes += 1
+    except (OSError, http.client.HTTPException):
+        return False
+    return True
+
+
+def write_quick_test(folder, planned):
+    """Clips of one frame that are over at once, judged so often."""
+    (folder / "r").write_bytes(bytes(192))
+    (folder / "s").write_bytes(bytes([9]) * 192)
+    session = Session(
+        variant="I",
+        repetitions=planned,
+        training=0,
+        dummies=0,
+        session_minutes_max=1e6,
+        **dict.fromkeys(("reference_s", "test_s", "grey_s", "vote_s"), 0.001),
+    )
+    clips = (
+        Clip(stimulus="r", content="c", role="reference", files={"player": ClipFiles(path="r")}),
+        Clip(stimulus="s", content="c", reference="r", files={"player": ClipFiles(path="s")}),
+    )
+    manifest = Manifest(
+        schema="dsis-manifest/1",
+        sequence=Sequence(width=8, height=8, fps=1000.0, seconds=0.001),
+        session=session,
+        clips=clips,
+    )
+    write_manifest(manifest, folder)
+
+
+def kill_servers(folder, kills, planned, seed, tell=lambda _: None):
+    """Kill the server so often while votes arrive; return the votes that were acknowledged."""
+    write_quick_test(folder, planned)
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    delays_s = random.Random(seed)  # noqa: S311  moments, no secrets
+    acknowledged = []
+    with subprocess.Popen(
+        [sys.executable, "-c", SERVERS, str(folder), str(port)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    ) as servers:
+        for kill in range(kills + 1):
+            servers.stdin.write("resume\n" if kill else "new\n")
+            servers.stdin.flush()
+            server = int(servers.stdout.readline().split()[1])
+            window = Window(port, time.monotonic() + 60)
+            if kill < kills:
+                moment_s = delays_s.uniform(0.0, 0.15)
+                killer = subprocess.Popen(["sh", "-c", f"sleep {moment_s:.4f}; kill -9 {server}"])
+            done = vote_on(window, acknowledged, VOTES_PER_LIFE if kill < kills else planned)
+            window.close()
+            assert done == (kill == kills)
+            if kill < kills:
+                killer.wait()
+            assert servers.stdout.readline() == "end\n"
+            with open_store(folder, read_manifest(folder)) as store:
+                store.check()
+            tell(kill)
+        servers.stdin.close()
+    return acknowledged
+
+
+def check_after_kills(folder, acknowledged, kills, planned):
+    """Every acknowledged vote is there, once, and the plan is complete."""
+    with read_store(folder) as store:
+        store.check()
+        rows = store.rows("anna")
+        assert len(store.events("resumed")) == kills
+    assert len(rows) == planned
+    assert all(row.vote is not None and row.vote.valid for row in rows)
+    stored = {row.id: row.vote.vote for row in rows}
+    assert len({number for number, _ in acknowledged}) == len(acknowledged)
+    assert all(stored[number] == vote for number, vote in acknowledged)
+    # each kill may fall between the commit and the acknowledgement of one vote, not of two
+    assert 0 <= planned - len(acknowledged) <= kills
+
+
+def test_a_killed_server_loses_and_doubles_no_vote(tmp_path):
+    planned = KILLS * VOTES_PER_LIFE + 10
+    acknowledged = kill_servers(tmp_path, KILLS, planned, seed=7)
+    check_after_kills(tmp_path, acknowledged, KILLS, planned)

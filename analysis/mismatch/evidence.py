@@ -30,6 +30,9 @@ class Curve:
         was named), and its standard deviation when nothing is wrong; nan where unknown.
     unit
         Of the statistic; empty: a pure number.
+    z_before, z_after
+        Departures from each model in standard deviations, as the search judged them; None: what
+        `sd` makes of the departures.
     """
 
     channel: str
@@ -40,6 +43,8 @@ class Curve:
     expected_after: Array | None
     sd: Array
     unit: str = ""
+    z_before: Array | None = None
+    z_after: Array | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +65,14 @@ class Map:
     before: Array | None = None
     after: Array | None = None
     pitch_px: int = 1
+
+
+@dataclass(frozen=True)
+class Shown:
+    """In which map a statistic of fixed patterns departs most, and along which axis."""
+
+    map: str
+    axis: Literal["", "rows", "columns"] = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,6 +122,8 @@ class Series:
 
     Attributes
     ----------
+    frame_means_dn
+        By number of the frame; nan: not looked at.
     sd_before_dn, sd_after_dn
         How far each model lets a frame mean wander; None: unknown, or nothing was named.
     locked
@@ -142,7 +157,10 @@ class Evidence:
     curves
         By statistic, a curve per channel.
     maps
-        By `offset_map`, `gain_map`, `time_map`, `variance_map`.
+        By `offset_map`, `gain_map`, `time_map`, `variance_map`; `offset_alone_map` and
+        `gain_alone_map`: as if there were no other.
+    shown_in
+        Which of them shows a statistic best.
     spectra, row_spectra, column_spectra, series, codes
         By exposure, or `pooled` over all; row spectra: of row means along columns.
     signal_dn
@@ -159,6 +177,7 @@ class Evidence:
 
     curves: Mapping[str, tuple[Curve, ...]] = field(default_factory=dict)
     maps: Mapping[str, tuple[Map, ...]] = field(default_factory=dict)
+    shown_in: Mapping[str, Shown] = field(default_factory=dict)
     spectra: Mapping[str, tuple[Spectrum, ...]] = field(default_factory=dict)
     row_spectra: Mapping[str, tuple[LineSpectrum, ...]] = field(default_factory=dict)
     column_spectra: Mapping[str, tuple[LineSpectrum, ...]] = field(default_factory=dict)

@@ -2,11 +2,12 @@
 
 import math
 from dataclasses import dataclass
-from operator import attrgetter
 from typing import Any
 
 from dsis.manifest import Clip
+from dsis.session.forms import ObserverRecord
 from dsis.session.plan import Presentation
+from dsis.session.setup import Display
 from dsis.session.store import Vote
 
 
@@ -22,7 +23,9 @@ class Column:
 
     def cell(self, entry: object) -> str:
         """Return the cell of a row: blank where nothing is known, the shortest exact number."""
-        value: Any = attrgetter(self.path)(entry)
+        value: Any = entry
+        for name in self.path.split("."):
+            value = None if value is None else getattr(value, name)
         if value is None:
             return ""
         if isinstance(value, bool):
@@ -40,6 +43,17 @@ class Column:
 
 
 @dataclass(frozen=True)
+class Showing:
+    """How a presentation was shown, as far as a player knows; None: nothing is known."""
+
+    started_at: str | None = None
+    refresh_hz: float | None = None
+    device_pixel_ratio: float | None = None
+    full_screen: bool | None = None
+    longest_interval_ms: float | None = None
+
+
+@dataclass(frozen=True)
 class Shown:
     """A presentation of an observer with its clip: a row of `PRESENTATIONS`."""
 
@@ -47,6 +61,8 @@ class Shown:
     presentation: Presentation
     clip: Clip
     vote: Vote | None
+    lab: str = ""
+    showing: Showing = Showing()
 
     @property
     def state(self) -> str:
@@ -60,6 +76,29 @@ class Shown:
         """Hash of the clip as the player shows it, where the manifest has it."""
         player = self.clip.files.get("player")
         return None if player is None else player.sha256
+
+
+@dataclass(frozen=True)
+class Confirmed:
+    """A display as confirmed before a sitting: a row of `DISPLAYS`."""
+
+    observer: str
+    confirmed_at: str
+    display: Display
+    steps_seen: bool
+    pixels_even: bool
+    player: str
+    browser: str
+    note: str
+
+
+@dataclass(frozen=True)
+class Person:
+    """Personal data of an observer: a row of `PEOPLE`."""
+
+    observer: str
+    recorded_at: str
+    record: ObserverRecord
 
 
 @dataclass(frozen=True)
@@ -181,7 +220,34 @@ PRESENTATIONS = (
     *_PLACES,
     Column("seed", "integer", "", "seed of the plan", "presentation.seed"),
     Column("state", "string", "", "planned, voted, or invalid (dropped frames)", "state"),
+    Column(
+        "started_at", "datetime", "", "when it began, ISO 8601 with offset", "showing.started_at"
+    ),
+    Column(
+        "dropped_frames",
+        "integer",
+        "frame",
+        "frames that never were on the screen",
+        "vote.dropped_frames",
+    ),
+    Column(
+        "longest_interval_ms",
+        "number",
+        "ms",
+        "longest time that one frame stayed",
+        "showing.longest_interval_ms",
+    ),
+    Column("refresh_hz", "number", "Hz", "refresh rate of the display", "showing.refresh_hz"),
+    Column(
+        "device_pixel_ratio",
+        "number",
+        "",
+        "zoom of the page; clips are shown pixel for pixel at any",
+        "showing.device_pixel_ratio",
+    ),
+    Column("full_screen", "boolean", "", "the page filled the screen", "showing.full_screen"),
 )
+LAB = Column("lab", "string", "", "laboratory", "lab")
 OBSERVERS = (
     _OBSERVER,
     Column("simulated", "boolean", "", _SIMULATED, "simulated"),
@@ -240,4 +306,39 @@ STIMULI = (
         "visible noise with those effects over that without",
         "effects_visible_ratio",
     ),
+)
+DISPLAYS = (
+    Column("observer", "string", "", "who sat before it", "observer"),
+    Column("confirmed_at", "datetime", "", "ISO 8601 with offset", "confirmed_at"),
+    Column("model", "string", "", "make, model, serial number", "display.model"),
+    Column("diagonal_inch", "number", "inch", "of the picture", "display.diagonal_inch"),
+    Column("peak_cd_m2", "number", "cd/m^2", "luminance of white", "display.peak_cd_m2"),
+    Column("black_cd_m2", "number", "cd/m^2", "luminance of black", "display.black_cd_m2"),
+    Column(
+        "distance_heights",
+        "number",
+        "picture height",
+        "viewing distance",
+        "display.distance_heights",
+    ),
+    Column("room_lux", "number", "lx", "illuminance at the display", "display.room_lux"),
+    Column("steps_seen", "boolean", "", "steps next to black and white differ", "steps_seen"),
+    Column("pixels_even", "boolean", "", "lines one pixel wide are even", "pixels_even"),
+    Column("player", "string", "", "what shows the clips, with its version", "player"),
+    Column("browser", "string", "", "browser of the page, as it names itself", "browser"),
+    Column("note", "string", "", "the experimenter's", "note"),
+)
+PEOPLE = (
+    Column("observer", "string", "", "pseudonym of the observer", "observer"),
+    Column("recorded_at", "datetime", "", "ISO 8601 with offset", "recorded_at"),
+    Column("age", "string", "year", "age group", "record.age"),
+    Column("expertise", "string", "", "naive or expert", "record.expertise"),
+    Column("acuity_chart", "string", "", "Landolt, Snellen, not tested", "record.acuity_chart"),
+    Column("acuity", "number", "", "decimal acuity, both eyes", "record.acuity"),
+    Column("corrected", "boolean", "", "glasses or lenses are worn", "record.corrected"),
+    Column("colour_test", "string", "", "Ishihara, other, not tested", "record.colour_test"),
+    Column("colour_plates", "integer", "", "plates shown", "record.colour_plates"),
+    Column("colour_read", "integer", "", "plates read right", "record.colour_read"),
+    Column("colour_vision", "string", "", "normal, deficient, not tested", "record.colour_vision"),
+    Column("note", "string", "", "the experimenter's", "record.note"),
 )

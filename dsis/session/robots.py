@@ -30,6 +30,7 @@ from dsis.errors import Fault, InputError
 from dsis.grid import PixelGrid
 from dsis.manifest import MANIFEST, Clip, Manifest, read_manifest
 from dsis.session.plan import Presentation, draw_plan
+from dsis.session.setup import Setup, current_setup, put_in_force
 from dsis.session.steps import presentation_s
 from dsis.session.store import Store, Vote, open_store
 from dsis.spec import Session
@@ -96,7 +97,7 @@ def _spread(grade: _Grades, session: Session) -> tuple[float, _Grades]:
     return float(np.sqrt(bias)), np.sqrt(np.maximum(total - bias, 0.0))
 
 
-def run_robots(folder: Path, observers: int, seed: int) -> None:
+def run_robots(folder: Path, observers: int, seed: int, setup: Setup | None = None) -> None:
     """Let robots robot-001, robot-002 ... do the test: plan, votes and store are those of people.
 
     Robots that are there already with this seed are left as they are. Their clock starts at
@@ -111,11 +112,16 @@ def run_robots(folder: Path, observers: int, seed: int) -> None:
     manifest = read_manifest(folder)
     energies = _energies(manifest, folder)
     with open_store(folder, manifest) as store:
+        if setup is not None:
+            put_in_force(store, setup)
+        hidden = current_setup(store).hidden_references
         for number in range(1, observers + 1):
             name = f"robot-{number:03d}"
             known = store.observer(name)
             if known is None:
-                _run(store, name, draw_plan(manifest, name, seed), energies, manifest.session)
+                mirrors = None if number % 2 else f"robot-{number - 1:03d}"
+                plan = draw_plan(manifest, name, seed, mirrors=mirrors, hidden_references=hidden)
+                _run(store, name, plan, energies, manifest.session)
             elif not known.simulated or known.seed != seed:
                 fact = f"{name} is there already with seed {known.seed}; give that seed"
                 raise InputError.of(store.path, "observer", fact)

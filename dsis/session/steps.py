@@ -5,6 +5,15 @@ from typing import Literal
 
 from dsis.spec import Session
 
+FIVE_GRADES = (
+    "very annoying",
+    "annoying",
+    "slightly annoying",
+    "perceptible, but not annoying",
+    "imperceptible",
+)
+"""The words of the five-grade impairment scale of BT.500, grade 1 first."""
+
 GREY = "#7e7e7e"  # 8-bit code 126: the mid-grey of DSIS, the same between clips and around them
 
 
@@ -41,3 +50,9 @@ def steps(session: Session) -> tuple[Step, ...]:
 def presentation_s(session: Session) -> float:
     """Return the duration of a presentation with its vote, in seconds."""
     return sum(step.seconds for step in steps(session)) + session.vote_s
+
+
+def grade_words(session: Session) -> tuple[str, ...]:
+    """Return a word for every grade: those of the five-grade scale if it is that, else none."""
+    five = session.scale == (1, 5) and session.labels == (FIVE_GRADES[0], FIVE_GRADES[-1])
+    return FIVE_GRADES if five else ()

@@ -6,7 +6,17 @@ from itertools import pairwise
 
 from dsis.manifest import Clip, Manifest
 from dsis.session.arrange import unavoidable
-from dsis.session.plan import Kind, Presentation, clips_of, succession
+from dsis.session.plan import (
+    SCORED,
+    Kind,
+    Presentation,
+    clips_of,
+    early_and_late,
+    references_of,
+    succession,
+)
+from dsis.session.sittings import dummies_in
+from dsis.session.steps import presentation_s
 
 _BLOCKS: dict[Kind, int] = {"training": 0, "dummy": 1, "test": 2, "reference": 2}
 _ROLE: dict[Kind, str] = {
@@ -17,7 +27,9 @@ _ROLE: dict[Kind, str] = {
 }
 
 
-def validate_plan(plan: Sequence[Presentation], manifest: Manifest) -> list[str]:
+def validate_plan(
+    plan: Sequence[Presentation], manifest: Manifest, *, hidden_references: bool = False
+) -> list[str]:
     """Return the rules that a plan breaks, as sentences; an empty list: none.
 
     For plans as drawn, before anything is repeated.
@@ -26,7 +38,27 @@ def validate_plan(plan: Sequence[Presentation], manifest: Manifest) -> list[str]
     broken = [*_places(plan), *_names(plan, clips)]
     if broken:
         return broken
-    return [*_blocks(plan), *_numbers(plan, manifest), *_successions(plan, manifest)]
+    return [
+        *_blocks(plan),
+        *_sittings(plan, manifest),
+        *_leads(plan, manifest),
+        *_counts(plan),
+        *_numbers(plan, manifest, hidden_references=hidden_references),
+        *_successions(plan, manifest),
+    ]
+
+
+def validate_panel(plans: Sequence[Sequence[Presentation]]) -> list[str]:
+    """Return where the plans of a panel are unbalanced: stimuli that come too often early or late.
+
+    An odd observer out may move each stimulus by as often as one plan shows it.
+    """
+    allowed = max(Counter((p.kind, p.stimulus) for p in plans[0]).values()) if len(plans) % 2 else 0
+    return [
+        f"{stimulus}: {early} times in the first half of the test, {late} times in the second"
+        for stimulus, (early, late) in early_and_late(plans).items()
+        if abs(early - late) > allowed
+    ]
 
 
 def _places(plan: Sequence[Presentation]) -> Iterator[str]:
@@ -52,17 +84,45 @@ def _names(plan: Sequence[Presentation], clips: dict[str, Clip]) -> Iterator[str
 
 def _blocks(plan: Sequence[Presentation]) -> Iterator[str]:
     for before, after in pairwise(plan):
-        if _BLOCKS[after.kind] < _BLOCKS[before.kind]:
+        if after.session == before.session and _BLOCKS[after.kind] < _BLOCKS[before.kind]:
             yield f"presentation {after.place}: {after.kind} comes after {before.kind}"
+        if after.session > 1 and after.kind == "training":
+            yield f"presentation {after.place}: training after the first viewing session"
 
 
-def _numbers(plan: Sequence[Presentation], manifest: Manifest) -> Iterator[str]:
+def _sittings(plan: Sequence[Presentation], manifest: Manifest) -> Iterator[str]:
+    numbers = [p.session for p in plan]
+    if sorted(set(numbers)) != list(range(1, max(numbers, default=0) + 1)):
+        yield "viewing sessions must be numbered from 1"
+    if numbers != sorted(numbers):
+        yield "viewing sessions must follow one another"
+    limit = manifest.session.session_minutes_max
+    for number, held in sorted(Counter(numbers).items()):
+        minutes = held * presentation_s(manifest.session) / 60
+        if minutes > limit * (1 + 1e-9):  # sums of decimal fractions
+            yield f"viewing session {number} lasts {minutes:.1f} minutes, must be at most {limit:g}"
+
+
+def _leads(plan: Sequence[Presentation], manifest: Manifest) -> Iterator[str]:
+    """Yield where training or dummies are too few or too many."""
     session = manifest.session
     training = min(session.training, len(clips_of(manifest, "training")))
-    for kind, wanted in (("training", training), ("dummy", session.dummies)):
-        found = sum(p.kind == kind for p in plan)
+    found = sum(p.kind == "training" for p in plan)
+    if found != training:
+        yield f"{found} training presentations, must be {training}"
+    for number in sorted({p.session for p in plan}):
+        found = sum(p.kind == "dummy" and p.session == number for p in plan)
+        wanted = dummies_in(number, session)
         if found != wanted:
-            yield f"{found} {kind} presentations, must be {wanted}"
+            yield f"{found} dummy presentations in viewing session {number}, must be {wanted}"
+    shown = Counter(p.stimulus for p in plan if p.kind == "training")
+    for stimulus, found in shown.items():
+        if found > 1:
+            yield f"{stimulus} is shown {found} times in the training"
+
+
+def _counts(plan: Sequence[Presentation]) -> Iterator[str]:
+    """Yield where repetitions or attempts are miscounted."""
     shown: Counter[tuple[str, str]] = Counter()
     for p in plan:
         shown[p.kind, p.stimulus] += 1
@@ -73,24 +133,40 @@ def _numbers(plan: Sequence[Presentation], manifest: Manifest) -> Iterator[str]:
             )
         if p.attempt != 1:
             yield f"presentation {p.place}: attempt is {p.attempt}, must be 1"
-    for clip in clips_of(manifest, "test"):
-        found = shown["test", clip.stimulus]
-        if found != session.repetitions:
-            yield f"{clip.stimulus} is tested {found} times, must be {session.repetitions}"
-    for (kind, stimulus), found in shown.items():
-        if kind == "training" and found > 1:
-            yield f"{stimulus} is shown {found} times in the training"
+
+
+def _numbers(
+    plan: Sequence[Presentation], manifest: Manifest, *, hidden_references: bool
+) -> Iterator[str]:
+    """Yield what is judged too often or not often enough."""
+    wanted: set[tuple[Kind, str]] = {("test", clip.stimulus) for clip in clips_of(manifest, "test")}
+    if hidden_references:
+        wanted |= {("reference", clip.stimulus) for clip in references_of(manifest)}
+    shown = Counter((p.kind, p.stimulus) for p in plan if p.kind in SCORED)
+    for kind, stimulus in sorted(wanted | set(shown)):
+        found, asked = shown[kind, stimulus], manifest.session.repetitions
+        must = asked if (kind, stimulus) in wanted else 0
+        judged = "tested" if kind == "test" else "judged as a hidden reference"
+        if found != must:
+            yield f"{stimulus} is {judged} {found} times, must be {must}"
 
 
 def _successions(plan: Sequence[Presentation], manifest: Manifest) -> Iterator[str]:
-    """Yield where neighbours are alike, wherever there are more of them than are forced."""
+    """Yield where neighbours are alike, wherever there are more of them than are forced.
+
+    A break between viewing sessions parts neighbours.
+    """
     tests = clips_of(manifest, "test")
     alike = succession(tests)
     keys = [(p, alike(manifest.clip(p.stimulus))) for p in plan if p.kind != "training"]
-    counts = Counter(key for p, key in keys if p.kind != "dummy")
-    same = [(b, key) for (a, key), (b, after) in pairwise(keys) if key == after]
-    early = [p for p, _ in same if plan[p.place - 2].kind == "dummy"]
-    late = [p for p, _ in same if plan[p.place - 2].kind != "dummy"]
+    counts = Counter(key for p, key in keys if p.kind in SCORED)
+    same = [
+        (before, after)
+        for (before, key), (after, key_after) in pairwise(keys)
+        if key == key_after and before.session == after.session
+    ]
+    early = [after for before, after in same if before.kind == "dummy"]
+    late = [after for before, after in same if before.kind != "dummy"]
     if early and len({alike(clip) for clip in tests}) > 1:
         yield from (_again(p, plan) for p in early)
     if len(late) > unavoidable(counts):

@@ -22,6 +22,7 @@ from analysis.mismatch.evidence import (
     LineSpectrum,
     Map,
     Series,
+    Shown,
     Spectrum,
 )
 from analysis.mismatch.files import write_finding
@@ -38,7 +39,7 @@ from analysis.mismatch.finding import (
     Where,
 )
 from analysis.mismatch.jsonfile import finding_values, write_json
-from analysis.mismatch.report.figures import MOST, curves, pictures
+from analysis.mismatch.report.figures import MOST, curves, pictures, series
 from analysis.mismatch.report.figures.spectra import folded
 from analysis.mismatch.report.numbers import measured
 from analysis.mismatch.report.sentences import numbers_in_short
@@ -274,11 +275,112 @@ def test_every_kind_of_evidence_has_its_picture() -> None:
         "row_spectrum_peak": "row-spectrum-flat-1",
         "frame_variance": "frame-means",
         "code_imbalance": "codes-flat-1",
-        "fixed_pixel_variance": "gain_map",
+        "fixed_pixel_variance": "gain_map-pixels",
     }
     some = tuple(replace(LINE, statistic=name, z=9.0 - i) for i, name in enumerate(shown))
     found = pictures(replace(FOUND, mismatches=some, unexplained=(), evidence=evidence()))
     assert [picture.name for picture in found] == list(shown.values())
+
+
+def test_a_fixed_pattern_is_shown_where_it_departs_most() -> None:
+    """Rows and columns as line means, a surface smoothed, pixels with their distribution."""
+    image = np.random.default_rng(2).normal(size=(24, 32))
+    some = (Map("MONO", "DN", image, image),)
+    names = {
+        "fixed_row_variance": ("time_map", "", "time_map-rows"),
+        "parity": ("gain_map", "columns", "gain_map-columns-parity"),
+        "half_seam": ("offset_map", "rows", "offset_map-rows-halves"),
+        "fixed_smooth_variance": ("gain_alone_map", "", "gain_alone_map-smooth-MONO"),
+        "outlying_pixels": ("time_map", "", "time_map-pixels-MONO"),
+    }
+    seen = Evidence(
+        maps={name: some for name, _, _ in names.values()},
+        shown_in={
+            statistic: Shown(name, axis)  # type: ignore[arg-type] # one of three words
+            for statistic, (name, axis, _) in names.items()
+        },
+    )
+    for statistic, (_, _, drawn) in names.items():
+        one = replace(LINE, statistic=statistic, where=Where(channel="MONO"))
+        found = pictures(replace(FOUND, mismatches=(one,), unexplained=(), evidence=seen))
+        assert [picture.name for picture in found] == [drawn]
+        found[0].draw(matplotlib.figure.Figure())
+
+
+def test_curves_within_chance_stand_aside_for_a_better_picture() -> None:
+    """A sum over exposures may be certain where no single exposure is."""
+    zero, levels = np.zeros(3), np.array([0.0, 100.0, 300.0])
+    low, high = (
+        Curve("MONO", "signal_dn", levels, zero + z, zero, None, zero + 1) for z in (2.0, 9.0)
+    )
+    (row,) = evidence().row_spectra["flat-1"]
+    seen = Evidence(
+        curves={"frame_variance": (low,), "row_spectrum_peak": (low,), "row_variance": (high,)},
+        row_spectra={"pooled": (row,)},
+    )
+    for statistic, drawn in {
+        "frame_variance": "frame_variance",
+        "row_spectrum_peak": "row-spectrum-pooled",
+        "row_variance": "row_variance",
+    }.items():
+        one = replace(LINE, statistic=statistic)
+        found = pictures(replace(FOUND, mismatches=(one,), unexplained=(), evidence=seen))
+        assert [picture.name for picture in found] == [drawn]
+
+
+def test_codes_are_shown_where_they_differ_most() -> None:
+    counts = 100 + np.arange(40.0)
+    odd = counts + 50 * (-1.0) ** np.arange(40)
+    seen = Evidence(
+        codes={
+            "flat-1": (Histogram("MONO", 90, counts, counts),),
+            "flat-2": (Histogram("MONO", 90, odd, counts),),
+        }
+    )
+    one = replace(LINE, statistic="code_imbalance")
+    (found,) = pictures(replace(FOUND, mismatches=(one,), unexplained=(), evidence=seen))
+    assert found.name == "codes-flat-2"
+
+
+@pytest.mark.parametrize(
+    ("gain", "said"),
+    [
+        (Gain(3.0, (1.0, 5.0)), ""),
+        (Gain(3.0, (-1.0, 5.0)), "Weakly proven: row noise."),
+        (Gain(3.0, (NAN, NAN)), "3, not proven"),
+        (Gain(NAN, (-float("inf"), float("inf"))), "\u2013, not proven"),
+    ],
+)
+def test_a_gain_that_is_not_proven_is_called_so(gain: Gain, said: str, tmp_path: Path) -> None:
+    named = replace(NAMED, heldout_gain=gain)
+    finding = replace(FOUND, omitted_physics=(named,), undecided=())
+    write_finding(finding, tmp_path / "out")
+    text = Page((tmp_path / "out" / "report.html").read_text(encoding="utf-8")).text
+    assert ("not proven" in text) is not np.isfinite(gain.ci95[0])
+    assert ("Not proven" in text) is not np.isfinite(gain.ci95[0])
+    assert ("Weakly proven" in text) is (gain.ci95[0] == -1)
+    assert said in text
+
+
+def test_a_parameter_may_be_several_numbers(tmp_path: Path) -> None:
+    frequency = FittedParameter((0.13, -0.21), 0.0002)
+    named = replace(NAMED, parameters={"frequency": frequency})
+    finding = replace(FOUND, omitted_physics=(named,))
+    assert json.loads(json.dumps(finding.values()))["omitted_physics"][0]["parameters"] == {
+        "frequency": {"value": [0.13, -0.21], "standard_error": 0.0002}
+    }
+    write_finding(finding, tmp_path / "out")
+    text = Page((tmp_path / "out" / "report.html").read_text(encoding="utf-8")).text
+    assert "(0.13000 ± 0.00020, \u22120.21000 ± 0.00020) cycles/pixel" in text
+
+
+def test_frames_that_were_not_looked_at_are_left_out() -> None:
+    means = np.array([1.0, 2.0, NAN, 3.0])
+    figure = matplotlib.figure.Figure()
+    series.draw(figure, {"flat-1": [Series("MONO", means, locked=(2,))]})
+    (axes,) = figure.axes
+    np.testing.assert_array_equal(axes.lines[0].get_xdata(), [0, 1, 3])
+    np.testing.assert_array_equal(axes.lines[0].get_ydata(), [-1, 0, 1])
 
 
 def test_a_strong_effect_does_not_crowd_out_a_weak_one() -> None:

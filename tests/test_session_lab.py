@@ -218,14 +218,14 @@ def test_a_set_up_is_read_kept_and_exported(folder, tmp_path):
     )
     assert main(["session", str(folder), "--plan", "--setup", str(path)]) == 0
     with read_store(folder) as store:
-        assert current_setup(store) == read_setup(path, (1, 10))
+        assert current_setup(store, Session()) == read_setup(path, (1, 10))
         kinds = [row.presentation.kind for row in store.rows("P01")]
         first = store.rows("P01")[0]
     assert kinds.count("reference") == 2
     with open_store(folder, read_manifest(folder)) as store:
-        put_in_force(store, Setup(lab="EPFL", hidden_references=True))  # what may change
+        put_in_force(store, Setup(lab="EPFL", hidden_references=True), Session())  # what may change
         with pytest.raises(InputError, match="hidden_references: is false, must stay true"):
-            put_in_force(store, Setup())
+            put_in_force(store, Setup(), Session())
         store.record_vote(first.id, Vote(4, None, NOW, True, None, False))
     export_votes(folder, tmp_path / "votes")
     (row,) = table(tmp_path / "votes" / "votes.csv")
@@ -474,3 +474,11 @@ def test_the_examples_of_the_docs_work_as_they_stand_there(tmp_path):
     assert read_setup(tmp_path / "lab.toml", (1, 2)).hidden_references
     (tmp_path / "manifest.json").write_text(re.search(r"```json\n(.*?)```", text, re.DOTALL)[1])
     check_playable(read_manifest(tmp_path), tmp_path)
+
+
+def test_consent_and_hidden_references_come_from_the_spec_where_no_set_up_says() -> None:
+    session = Session(consent="I agree.", hidden_references=True)
+    assert Setup(lab="TUM").completed(session).consent == "I agree."
+    assert Setup(lab="TUM").completed(session).hidden_references
+    own = Setup(consent="Ours.", hidden_references=False).completed(session)
+    assert (own.consent, own.hidden_references) == ("Ours.", False)

@@ -149,7 +149,7 @@ class Sitting:
         self.session = manifest.session
         self.store = open_store(folder, manifest)
         if setup is not None:
-            put_in_force(self.store, setup)
+            put_in_force(self.store, setup, manifest.session)
         enrol(self.store, manifest, observer, resume=resume, seed=1, say=self.said.append)
         seen = Observation(
             self.store,

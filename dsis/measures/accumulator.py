@@ -10,16 +10,17 @@ from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
-import scipy.fft
 from numpy.typing import NDArray
 
 from dsis.cfa import Cfa
 from dsis.measures import kernels
 from dsis.measures.assembly import measured
-from dsis.measures.codes import CODES, LOWEST_CODE
+from dsis.measures.codes import CodeCounts
+from dsis.measures.first_pass import Passed, first_pass
 from dsis.measures.kernels import Sums
+from dsis.measures.lag_products import half_plane, lag_products
 from dsis.measures.measured import Measured
-from dsis.measures.plane import Region, planes
+from dsis.measures.plane import Region, planes, sheets
 
 LAGS = 4
 
@@ -27,7 +28,7 @@ LAGS = 4
 class Accumulator:
     """Measures one exposure from its frames, given one at a time.
 
-    Memory: five float64 and five float32 arrays of the size of a frame, two means per row and
+    Memory: five float64 and six float32 arrays of the size of a frame, two sums per row and
     column of each frame, one code histogram.
 
     Parameters
@@ -69,23 +70,25 @@ class Accumulator:
         self.region = _whole(region or (slice(None), slice(None)), rows, columns)
         self.shape = tuple(part.stop - part.start for part in self.region)
         self.planes = planes(cfa, self.region)
+        self.sheets = sheets(self.planes)
         if lags < 2:
             message = f"lags is {lags}, must be at least 2: the scalar measures need lag 2"
             raise ValueError(message)
-        self.lags = np.array(
-            [(y, x) for y in range(lags + 1) for x in range(-lags, lags + 1) if y > 0 or x >= 0]
-        )
+        self.reach = lags
         self.frames = 0
         s1, s2, s3, s4, s11 = (np.zeros(self.shape) for _ in range(5))
         self.moments = (s1, s2, s3, s4, s11)
-        self.first: NDArray[np.float32]  # set by the first frame, as are the next three
+        self.first: NDArray[np.float32]  # set by the first frame, as are the next four
+        self.difference: NDArray[np.float32]
         self.before: NDArray[np.float32]
         self.centred: NDArray[np.float32]
         self.centred_before: NDArray[np.float32]
-        self.lag_sums = np.zeros((len(self.lags), 2, 2))
-        self.histogram = np.zeros((2, 2, CODES), np.int64)
-        self.code_range = (CODES, -1)  # first and last entry of the histogram in use
-        self.whole_codes = True
+        self.row_sums: list[Sums] = []  # of each frame, as are the next three: `Passed`
+        self.column_sums: list[Sums] = []
+        self.means: list[Sums] = []  # of d by phase
+        self.pair_squares: list[Sums] = []  # of each pair of frames
+        self.lag_sums = np.zeros((len(half_plane(lags)), 2, 2))
+        self.codes = CodeCounts()
 
     def add(self, frame: NDArray[Any]) -> None:
         """Take the next frame, in the order recorded: uint16 or float32 (row, column), DN.
@@ -97,21 +100,15 @@ class Accumulator:
             message = f"frame {self.frames} is {frame.shape}, must be {self.frame_shape}"
             raise ValueError(message)
         codes = np.ascontiguousarray(frame[self.region], np.float32)
-        if not np.isfinite(codes).all():
-            message = f"frame {self.frames} holds values that are not finite (NaN or infinite)"
-            raise ValueError(message)
         if self.frames == 0:
             self._begin(codes)
-        difference = codes - self.first
-        by_row, by_column = kernels.line_sums(difference, self.threads)
-        self._count_codes(codes)
-        row_offset, column_offset = self._take_means(by_row, by_column)
-        if self.frames % 2:
-            self._take_pair(kernels.pair_squares(difference, self.before, self.threads))
-        self._take_surfaces(difference)
-        if self.frames:
-            self._take_noise(difference, row_offset, column_offset)
-        self.before = difference
+        found = first_pass(codes, self.first, self.before, self.difference, self.threads)
+        if not (found.whole or np.isfinite(codes).all()):
+            message = f"frame {self.frames} holds values that are not finite (NaN or infinite)"
+            raise ValueError(message)
+        self.codes.add(codes, whole=found.whole, low=found.lowest, high=found.highest)
+        self._take_lines(found)
+        self.before, self.difference = self.difference, self.before
         self.frames += 1
 
     def result(self) -> Measured:
@@ -121,50 +118,30 @@ class Accumulator:
             raise ValueError(message)
         return measured(self)
 
-    def _count_codes(self, codes: NDArray[np.float32]) -> None:
-        if not self.whole_codes:
-            return
-        self.whole_codes = kernels.count_codes(codes, self.histogram, LOWEST_CODE)
-        if self.whole_codes:
-            low, high = int(codes.min()) - LOWEST_CODE, int(codes.max()) - LOWEST_CODE
-            self.code_range = (min(low, self.code_range[0]), max(high, self.code_range[1]))
-
     def _begin(self, codes: NDArray[np.float32]) -> None:
         self.first = codes.copy()
-        self.before = np.zeros_like(codes)
+        self.before, self.difference = np.zeros_like(codes), np.empty_like(codes)
         self.centred, self.centred_before = np.zeros_like(codes), np.zeros_like(codes)
 
-    def _take_means(self, by_row: Sums, by_column: Sums) -> tuple[Sums, Sums]:
-        """Keep the means of every plane; return what to subtract from each pixel."""
-        row_offset, column_offset = np.empty_like(by_row), np.empty_like(by_column)
-        for plane in self.planes:
-            rows, columns = plane.pixels
-            across, down = list({p for _, p in plane.phases}), list({p for p, _ in plane.phases})
-            n, m = plane.shape
-            row_means = by_row[rows][:, across].sum(1) / m
-            column_means = by_column[down, columns].sum(0) / n
-            mean = float(row_means.mean())
-            plane.row_means.append(row_means)
-            plane.column_means.append(column_means)
-            plane.frame_means.append(mean)
-            for p in across:
-                row_offset[rows, p] = row_means
-            for p in down:
-                column_offset[p, columns] = column_means - mean
-        return row_offset, column_offset
+    def _take_lines(self, found: Passed) -> None:
+        """Keep the sums of lines; take their means off, and add up what is left."""
+        row_offset, column_offset, means = kernels.offsets(
+            found.by_row, found.by_column, self.cfa is Cfa.MONO
+        )
+        self.row_sums.append(found.by_row)
+        self.column_sums.append(found.by_column)
+        self.means.append(means)
+        if self.frames % 2:
+            self.pair_squares.append(found.squares)
+        for sheet in self.sheets:
+            sheet.add(self.difference, means, self.threads)
+        if self.frames:
+            self._take_noise(row_offset, column_offset)
 
-    def _take_pair(self, squares: Sums) -> None:
-        for plane in self.planes:
-            total = sum(squares[y::2, x].sum() for y, x in plane.phases)
-            plane.pair_squares.append(float(total) / (plane.shape[0] * plane.shape[1]))
-            plane.pair_means.append(plane.frame_means[-1] - plane.frame_means[-2])
-
-    def _take_noise(
-        self, difference: NDArray[np.float32], row_offset: Sums, column_offset: Sums
-    ) -> None:
+    def _take_noise(self, row_offset: Sums, column_offset: Sums) -> None:
         self.centred, self.centred_before = self.centred_before, self.centred
         kernels.add_moments(
-            difference,
+            self.difference,
             row_offset,
             column_offset,
             self.centred_before,
@@ -172,13 +149,7 @@ class Accumulator:
             self.moments,
             self.threads,
         )
-        self.lag_sums += kernels.lag_products(self.centred, self.lags, self.threads)
-
-    def _take_surfaces(self, difference: NDArray[np.float32]) -> None:
-        for plane in self.planes:
-            image = difference[plane.pixels] - np.float32(plane.frame_means[-1])
-            kernels.add_power(scipy.fft.rfft2(image), plane.power)
-            plane.surfaces.append(plane.smooth.coefficients(image))
+        self.lag_sums += lag_products(self.centred, self.reach, self.threads)
 
 
 def measure_exposure(

@@ -6,17 +6,19 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+import scipy.fft
 from numpy.typing import NDArray
 
 from dsis.measures import kernels
 from dsis.measures.autocovariance import Autocorrelation, LagTable, autocorrelation
-from dsis.measures.codes import LOWEST_CODE, Codes
 from dsis.measures.estimate import Estimate, estimate, unknown
 from dsis.measures.fixed_pattern import FixedPattern, fixed_pattern
+from dsis.measures.lag_products import lag_products
 from dsis.measures.measured import Channel, Measured
-from dsis.measures.moments import PixelMoments
+from dsis.measures.moments import PixelMoments, kept
 from dsis.measures.pairs import pair_variance
-from dsis.measures.plane import Plane
+from dsis.measures.pixels import pixel_moments
+from dsis.measures.plane import Plane, Sheets
 from dsis.measures.spectra import line_peak, spectral_peak
 from dsis.measures.variance_components import Components, components, line_power
 from dsis.measures.vocabulary import CORRELATION_LAGS, FIXED_CORRELATION_LAGS, MEASURES
@@ -29,87 +31,138 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class _Noise:
-    """Temporal noise of one channel before neighbours of other channels are looked at."""
+    """One channel before neighbours of other channels are looked at."""
 
     plane: Plane
     moments: PixelMoments
-    rows: Array
+    rows: Array  # means of d: (frame, row), as are the next two
     columns: Array
     means: Array
-    offset: Array  # mean over frames of d
+    row_power: Array
+    column_power: Array
+    first_rows: Array  # means of the first frame: (row), (column)
+    first_columns: Array
+    mean_frame: Array
+    power: Array
+    surfaces: Array
 
 
 def measured(sums: Accumulator) -> Measured:
     """Return the measures of what an accumulator has summed; needs two frames."""
-    noise = [_noise(sums, plane) for plane in sums.planes]
+    found = {one.plane.name: one for sheet in sums.sheets for one in _noise(sums, sheet)}
+    noise = [found[plane.name] for plane in sums.planes]
     temporal = _temporal_correlations(sums, noise)
     parts = [
-        components(one.rows, one.columns, one.means, one.moments.variance_map, moving.inflation())
+        components(
+            one.row_power,
+            one.column_power,
+            one.means,
+            one.plane.shape,
+            (one.moments.variance, one.moments.variance_error2 * moving.inflation()),
+        )
         for one, moving in zip(noise, temporal, strict=True)
     ]
-    fixed = [_fixed(sums, one, part) for one, part in zip(noise, parts, strict=True)]
+    fixed = [
+        fixed_pattern(
+            one.mean_frame,
+            one.plane.smooth,
+            one.surfaces,
+            one.rows,
+            one.columns,
+            part,
+            sums.threads,
+        )
+        for one, part in zip(noise, parts, strict=True)
+    ]
     spatial = _fixed_correlations(sums, noise, fixed)
     channels = {}
     for one, part, pattern, moving, still in zip(
         noise, parts, fixed, temporal, spatial, strict=True
     ):
-        channels[one.plane.name] = _channel(
-            sums, one, part, pattern, moving, still.less(moving, sums.frames)
-        )
+        pair = (moving, still.less(moving, sums.frames))
+        channels[one.plane.name] = _channel(sums, one, part, pattern, pair)
     return Measured(sums.frames, sums.cfa, sums.region, sums.black_level, channels)
 
 
-def _noise(sums: Accumulator, plane: Plane) -> _Noise:
-    moments = PixelMoments.of(
-        sums.frames,
-        tuple(part[plane.pixels] for part in sums.moments),
-        sums.centred[plane.pixels].astype(np.float64),
-    )
-    rows, columns = np.array(plane.row_means), np.array(plane.column_means)
-    means = np.array(plane.frame_means)
-    offset = sums.moments[0][plane.pixels] / sums.frames
-    offset = offset + rows.mean(0)[:, None] + columns.mean(0) - means.mean()
-    return _Noise(plane, moments, rows, columns, means, offset)
+def _noise(sums: Accumulator, sheet: Sheets) -> list[_Noise]:
+    """Return the noise of channels of one size."""
+    frames, (count, n, m) = sums.frames, sheet.images.shape
+    rows, columns = sheet.lines(np.array(sums.row_sums), np.array(sums.column_sums))
+    means = np.array([[mean[plane.start] for mean in sums.means] for plane in sheet.planes])
+    row_power, column_power = line_power(rows, means), line_power(columns, means)
+    surfaces = np.array(sheet.surfaces)
+    mean_frames, changes = np.empty((count, n, m)), np.empty((count, n, m))
+    first = [
+        kernels.mean_frame(
+            sums.first,
+            sums.moments[0],
+            frames,
+            plane.place,
+            rows[k],
+            columns[k],
+            -sums.black_level,
+            mean_frames[k],
+            changes[k],
+        )
+        for k, plane in enumerate(sheet.planes)
+    ]
+    transform = scipy.fft.rfft2(changes, workers=sums.threads, overwrite_x=True)
+    noise = []
+    for k, plane in enumerate(sheet.planes):
+        variance, neighbour, scatter = pixel_moments(
+            sums.moments,
+            sums.centred,
+            frames,
+            plane.place,
+            plane.shape,
+            kept(frames, n, m, 2),
+            sums.threads,
+        )
+        noise.append(
+            _Noise(
+                plane,
+                PixelMoments(frames, n, m, variance, neighbour, scatter),
+                rows[k],
+                columns[k],
+                means[k],
+                row_power[k],
+                column_power[k],
+                *first[k],
+                mean_frames[k],
+                kernels.temporal_power(sheet.power[k], transform[k], m, frames),
+                np.ascontiguousarray(surfaces[:, k]),
+            )
+        )
+    return noise
 
 
 def _temporal_correlations(sums: Accumulator, noise: list[_Noise]) -> list[Autocorrelation]:
     """Return the correlations of the residual: sums of u u' less those of its mean over time."""
     mean = (sums.moments[0] / sums.frames).astype(np.float32)
-    left = kernels.lag_products(mean, sums.lags, sums.threads)
-    table = LagTable.of(sums.lags, sums.lag_sums - sums.frames * left, sums.shape)
-    variances = {
-        phase: float(one.moments.variance_map.mean()) for one in noise for phase in one.plane.phases
-    }
+    left = lag_products(mean, sums.reach, sums.threads)
+    table = LagTable.of(sums.reach, sums.lag_sums - sums.frames * left, sums.shape)
+    variances = np.empty((2, 2))
+    for one in noise:
+        for phase in one.plane.phases:
+            variances[phase] = one.moments.variance
     return [
         autocorrelation(table, one.plane.phases, variances, one.plane.shape, sums.frames - 1)
         for one in noise
     ]
 
 
-def _fixed(sums: Accumulator, one: _Noise, part: Components) -> FixedPattern:
-    mean = sums.first[one.plane.pixels] + one.offset
-    surfaces = np.array(one.plane.surfaces)
-    return fixed_pattern(mean, one.plane.smooth, surfaces, one.rows, one.columns, part)
-
-
 def _fixed_correlations(
     sums: Accumulator, noise: list[_Noise], fixed: list[FixedPattern]
 ) -> list[Autocorrelation]:
-    mosaic = np.empty(sums.shape, np.float32)
-    variances: dict[tuple[int, int], float] = {}
+    mosaic, variances = np.empty(sums.shape, np.float32), np.empty((2, 2))
     for one, pattern in zip(noise, fixed, strict=True):
         mosaic[one.plane.pixels] = pattern.pixels
-        variances |= dict.fromkeys(one.plane.phases, pattern.mean_square)
-    products = kernels.lag_products(mosaic, sums.lags, sums.threads)
-    table = LagTable.of(sums.lags, products, sums.shape)
+        for phase in one.plane.phases:
+            variances[phase] = pattern.mean_square
+    table = LagTable.of(sums.reach, lag_products(mosaic, sums.reach, sums.threads), sums.shape)
     return [
         autocorrelation(
-            table,
-            one.plane.phases,
-            variances,
-            one.plane.shape,
-            1,
-            int(one.plane.smooth.mixed.sum()),
+            table, one.plane.phases, variances, one.plane.shape, 1, one.plane.smooth.kinds
         )
         for one in noise
     ]
@@ -120,52 +173,60 @@ def _channel(
     one: _Noise,
     part: Components,
     fixed: FixedPattern,
-    temporal: Autocorrelation,
-    still: Autocorrelation,
+    correlations: tuple[Autocorrelation, Autocorrelation],
 ) -> Channel:
-    plane, frames = one.plane, sums.frames
+    plane, frames, (temporal, still) = one.plane, sums.frames, correlations
     n, m = plane.shape
-    mean = sums.first[plane.pixels] + one.offset - sums.black_level
-    flat = one.offset - one.means.mean()
-    power = plane.power - frames * np.abs(np.fft.rfft2(flat)) ** 2
-    power = np.maximum(power, 0.0) / (n * m * (frames - 1))
-    row_power = line_power(one.rows - one.means[:, None]) * m / (frames - 1)
-    column_power = line_power(one.columns - one.means[:, None]) * n / (frames - 1)
-    codes = _codes(sums, plane)
+    row_power, column_power = (
+        one.row_power * (m / (frames - 1)),
+        one.column_power * (n / (frames - 1)),
+    )
+    first = float(one.first_rows.sum()) / n
+    codes = sums.codes.of(plane.phases)
     estimates = {
-        "level": _level(float(mean.mean()), part, fixed),
+        "level": _level(float(one.mean_frame.mean()), part, fixed),
         **part.estimates(),
         **one.moments.estimates(temporal.inflation()),
-        **{name: temporal.at(lag) for name, lag in CORRELATION_LAGS.items()},
-        "spectral_peak": spectral_peak(power, m, frames - 1),
+        **temporal.at(CORRELATION_LAGS),
+        "spectral_peak": spectral_peak(one.power, m, frames - 1),
         "row_spectrum_peak": line_peak(row_power, n, frames - 1),
         "code_spacing": codes.spacing() if codes else unknown(1.0),
         "code_imbalance": codes.imbalance(part.ms_pixel) if codes else unknown(0.0),
         **fixed.estimates,
-        **{name: still.at(lag) for name, lag in FIXED_CORRELATION_LAGS.items()},
+        **still.at(FIXED_CORRELATION_LAGS),
     }
-    first = sums.first[plane.pixels].astype(np.float64) - sums.black_level
     low, high = sums.lowest_code, sums.white_level
     return Channel(
         {name: estimates[name] for name in MEASURES},
         one.moments.kurtosis_within_pixels(),
-        pair_variance(plane.pair_squares, plane.pair_means, part),
-        mean,
+        pair_variance(*_pairs(sums, plane, one.means), part),
+        one.mean_frame,
         one.moments.variance_map,
         one.moments.neighbour,
         fixed.pixels,
         temporal.covariance,
         still.covariance,
-        power,
+        one.power,
         row_power,
         column_power,
-        one.rows + first.mean(1),
-        one.columns + first.mean(0),
-        one.means + first.mean(),
+        one.rows + one.first_rows,
+        one.columns + one.first_columns,
+        one.means + first,
         codes,
         codes.share_at_most(low) if codes and low is not None else np.nan,
         codes.share_at_least(high) if codes and high is not None else np.nan,
     )
+
+
+def _pairs(sums: Accumulator, plane: Plane, means: Array) -> tuple[list[float], list[float]]:
+    """Return mean squares and means of the difference of each pair of frames."""
+    n, m = plane.shape
+    squares = [
+        sum(float(square[phase]) for phase in plane.phases) / (n * m)
+        for square in sums.pair_squares
+    ]
+    pairs = len(squares)
+    return squares, (means[1 : 2 * pairs : 2] - means[: 2 * pairs : 2]).tolist()
 
 
 def _level(value: float, part: Components, fixed: FixedPattern) -> Estimate:
@@ -179,12 +240,3 @@ def _level(value: float, part: Components, fixed: FixedPattern) -> Estimate:
     # The parts are unbiased, so each may come out below zero; their sum may not.
     error = max(part.ms_frame / (part.frames * n * m) + scatter, still / 4)
     return estimate(value, error, np.nan, still)
-
-
-def _codes(sums: Accumulator, plane: Plane) -> Codes | None:
-    if not sums.whole_codes:
-        return None
-    low, high = sums.code_range
-    used = sums.histogram[:, :, low : high + 1]
-    counts: NDArray[np.int64] = np.sum([used[phase] for phase in plane.phases], axis=0)
-    return Codes.of(LOWEST_CODE + low, counts)

@@ -12,7 +12,9 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from dsis.compiled import inlined, kernel
 from dsis.measures.estimate import Estimate, estimate, unknown
+from dsis.measures.lag_products import half_plane
 
 Array = NDArray[np.float64]
 Phases = tuple[tuple[int, int], ...]
@@ -29,32 +31,24 @@ class LagTable:
     pairs: Array
 
     @classmethod
-    def of(cls, lags: NDArray[np.int64], sums: Array, shape: tuple[int, ...]) -> "LagTable":
+    def of(cls, reach: int, sums: Array, shape: tuple[int, ...]) -> "LagTable":
         """Return the table of sums (lag, row parity, column parity) of the half plane of lags.
 
         The other half holds the same pairs, seen from their other pixel.
         """
-        reach = int(lags.max())
         size = 2 * reach + 1
-        products = np.zeros((2, 2, size, size))
-        for (dy, dx), by_phase in zip(lags.tolist(), sums.tolist(), strict=True):
-            for y in (0, 1):
-                for x in (0, 1):
-                    products[y, x, reach + dy, reach + dx] = by_phase[y][x]
-                    there = ((y + dy) % 2, (x + dx) % 2)
-                    products[(*there, reach - dy, reach - dx)] = by_phase[y][x]
-        return cls(products, _pairs(reach, *shape))
-
-    @property
-    def reach(self) -> int:
-        """Largest lag L."""
-        return int(self.products.shape[2] // 2)
+        products = np.empty(4 * size * size)
+        here, there = _entries(reach)
+        products[here] = products[there] = sums.reshape(-1)
+        return cls(products.reshape(2, 2, size, size), _pairs(reach, *shape))
 
     def of_channel(self, phases: Phases) -> tuple[Array, Array]:
         """Return mean products (2 L + 1, 2 L + 1) and pairs of a channel's pixels."""
-        pairs = sum(self.pairs[phase] for phase in phases)
-        products = sum(self.products[phase] for phase in phases)
-        return products / np.maximum(pairs, 1), np.asarray(pairs)
+        if len(phases) == 1:
+            pairs, products = self.pairs[phases[0]], self.products[phases[0]]
+        else:
+            pairs, products = self.pairs.sum((0, 1)), self.products.sum((0, 1))
+        return products / np.maximum(pairs, 1), pairs
 
 
 @dataclass(frozen=True)
@@ -92,11 +86,7 @@ class Autocorrelation:
 
     def inflation(self) -> float:
         """Return the sum of rho^2 over lags less what their errors add; at least 1."""
-        squares = np.where(self.pairs > 0, self.values**2, 0.0)
-        noise = np.where(self.pairs > 0, 1 / np.maximum(self.pairs * self.degrees, 1), 0.0)
-        centre = self.values.shape[0] // 2
-        squares[centre, centre], noise[centre, centre] = 1.0, 0.0
-        total = float((squares - noise).sum())
+        total = float(_inflation(self.values, self.pairs, self.degrees))
         return total if total > 1 else 1.0  # 1 also where there is no noise at all
 
     def less(self, temporal: "Autocorrelation", frames: int) -> "Autocorrelation":
@@ -108,42 +98,30 @@ class Autocorrelation:
         values = self.values - left
         return Autocorrelation(values, self.pairs, self.scale, 1, self.values, share, frames)
 
-    def at(self, lag: tuple[int, int]) -> Estimate:
-        """Return the correlation at a lag (dy, dx); error by Bartlett's formula."""
+    def at(self, lags: Mapping[str, tuple[int, int]]) -> dict[str, Estimate]:
+        """Return the correlation at some lags (dy, dx) by name; error by Bartlett's formula."""
         centre = self.values.shape[0] // 2
-        here = (centre + lag[0], centre + lag[1])
-        count = float(self.pairs[here]) * self.degrees
-        if count < 1:
-            return unknown(0.0)
-        rho = float(self.values[here])
+        scatters = _bartlett(self.observed, self.pairs, self.degrees, tuple(lags.values()))
         # What temporal noise leaves is estimated from T - 1 frames and taken off: its noise again.
         again = 1 / (self.frames - 1)
         null = 1 + (again if self.left else 0.0)
-        error = self._bartlett(lag) * (1 + self.left**2 * again)
-        return estimate(rho, error / count, 0.0, null / count)
-
-    def _bartlett(self, lag: tuple[int, int]) -> float:
-        """Return n var(rho) of a linear process, from the lags known (Bartlett 1946)."""
-        centre = self.values.shape[0] // 2
-        reach = 2 * centre
-        wide = np.zeros((2 * reach + 1,) * 2)
-        inner = slice(reach - centre, reach + centre + 1)
-        known = np.where(self.pairs > 0, self.observed, 0.0)
-        known[centre, centre] = 1.0
-        # Lags within their own error would only add noise: 80 lags of it.
-        error = 1 / np.sqrt(np.maximum(self.pairs * self.degrees, 1))
-        wide[inner, inner] = np.where(np.abs(known) > 3 * error, known, 0.0)
-        h = known[centre + lag[0], centre + lag[1]]
-        ahead = np.roll(wide, (-lag[0], -lag[1]), (0, 1))
-        behind = np.roll(wide, lag, (0, 1))
-        terms = wide**2 + ahead * behind - 4 * h * wide * behind + 2 * h**2 * wide**2
-        return max(float(terms.sum()), 0.1)
+        found = {}
+        for (name, (dy, dx)), scatter in zip(lags.items(), scatters.tolist(), strict=True):
+            here = (centre + dy, centre + dx)
+            count = float(self.pairs[here]) * self.degrees
+            error = max(scatter, 0.1) * (1 + self.left**2 * again)
+            found[name] = (
+                estimate(float(self.values[here]), error / count, 0.0, null / count)
+                if count >= 1
+                else unknown(0.0)
+            )
+        return found
 
 
 def autocorrelation(
     table: LagTable,
     phases: Phases,
-    variances: Mapping[tuple[int, int], float],
+    variances: Array,
     shape: tuple[int, int],
     degrees: int,
     lost: int = 0,
@@ -157,7 +135,7 @@ def autocorrelation(
     phases
         The channel's 2 x 2 phases.
     variances
-        Variance of the pixels of each phase, DN^2.
+        Variance of the pixels of each phase (row parity, column parity), DN^2.
     shape
         Rows and columns of the channel.
     degrees
@@ -166,43 +144,125 @@ def autocorrelation(
         Smooth surfaces taken off besides rows and columns.
     """
     products, pairs = table.of_channel(phases)
-    lag = np.arange(-table.reach, table.reach + 1)
-    dy, dx = np.meshgrid(lag, lag, indexing="ij")
-    y, x = phases[0]
-    own = variances[phases[0]]
-    partner = np.vectorize(lambda a, b: variances[(y + a) % 2, (x + b) % 2])(dy, dx)
-    scale = np.sqrt(own * partner)
-    with np.errstate(divide="ignore", invalid="ignore"):  # no noise: undefined, and said so
-        raw = products / degrees / scale
-    centre = (table.reach, table.reach)
-    rho = np.zeros_like(raw)
-    rho[centre] = 1.0
-    for _ in range(4):  # white first, then the lags that stand out; converges as 1/columns
-        values = raw + _taken_off(rho, shape, 1 if len(phases) > 1 else 2, lost)
-        values[centre] = raw[centre]
-        # Lags within their own error would only add noise.
-        clear = np.abs(values) > 3 / np.sqrt(np.maximum(pairs * degrees, 1))
-        rho = np.where(clear & (pairs > 0), values, 0.0)
-        rho[centre] = 1.0
-    values = np.where(pairs > 0, values, np.nan)
+    step = 1 if len(phases) > 1 else 2
+    values, scale = _correlation(
+        products, pairs, variances, phases[0], degrees, (*shape, step, lost)
+    )
     return Autocorrelation(values, pairs, scale, degrees, values)
 
 
-def _taken_off(rho: Array, shape: tuple[int, int], step: int, lost: int) -> Array:
-    """Return what removed means take off each lag, from the correlations known.
+@kernel
+def _correlation(
+    products: Array,
+    pairs: Array,
+    variances: Array,
+    phase: tuple[int, int],
+    degrees: int,
+    size: tuple[int, int, int, int],
+) -> tuple[Array, Array]:
+    """Return the correlation, nan without pairs, and the product of standard deviations.
+
+    White noise first, then the lags that stand out, in four rounds: converges as 1/columns.
+    """
+    lags = products.shape[0]
+    centre = lags // 2
+    y, x = phase
+    scale, raw, values = np.empty_like(products), np.empty_like(products), np.empty_like(products)
+    rho = np.zeros_like(products)
+    rho[centre, centre] = 1.0
+    for i in range(lags):
+        for j in range(lags):
+            partner = variances[(y + i - centre) % 2, (x + j - centre) % 2]
+            scale[i, j] = np.sqrt(variances[y, x] * partner)
+            raw[i, j] = products[i, j] / degrees / scale[i, j]
+    for _ in range(4):
+        _taken_off(rho, size, values)
+        for i in range(lags):
+            for j in range(lags):
+                values[i, j] += raw[i, j]
+                # Lags within their own error would only add noise.
+                clear = np.abs(values[i, j]) > 3 / np.sqrt(max(pairs[i, j] * degrees, 1.0))
+                rho[i, j] = values[i, j] if clear and pairs[i, j] > 0 else 0.0
+        values[centre, centre] = raw[centre, centre]
+        rho[centre, centre] = 1.0
+    for i in range(lags):
+        for j in range(lags):
+            if not pairs[i, j] > 0:
+                values[i, j] = np.nan
+    return values, scale
+
+
+@inlined
+def _taken_off(rho: Array, size: tuple[int, int, int, int], off: Array) -> None:
+    """Write what removed means take off each lag, from the correlations known.
 
     A pixel's row mean holds 1/m of every pixel of the partner's channel in that row, so each lag
     loses the sum of its row's lags over m; likewise columns, and both means hold the frame's.
     """
-    n, m = shape
-    off = np.zeros_like(rho)
+    n, m, step, lost = size
     for y in range(step):
         for x in range(step):
-            plane = rho[y::step, x::step]
-            total = plane.sum()
-            rows, columns = plane.sum(1, keepdims=True) / m, plane.sum(0, keepdims=True) / n
-            off[y::step, x::step] = rows + columns - total * (1 - lost) / (n * m)
-    return off
+            part, out = rho[y::step, x::step], off[y::step, x::step]
+            rows, columns = part.sum(axis=1) / m, part.sum(axis=0) / n
+            both = rows.sum() * (1 - lost) / n
+            for i in range(rows.size):
+                for j in range(columns.size):
+                    out[i, j] = rows[i] + columns[j] - both
+
+
+@kernel
+def _inflation(values: Array, pairs: Array, degrees: int) -> float:
+    centre = values.shape[0] // 2
+    total = 1.0
+    for i in range(values.shape[0]):
+        for j in range(values.shape[1]):
+            if (i != centre or j != centre) and pairs[i, j] > 0:
+                total += values[i, j] ** 2 - 1 / max(pairs[i, j] * degrees, 1.0)
+    return total
+
+
+@kernel
+def _bartlett(
+    observed: Array, pairs: Array, degrees: int, lags: tuple[tuple[int, int], ...]
+) -> Array:
+    """Return n var(rho) of a linear process at some lags, from the lags known (Bartlett 1946)."""
+    size = observed.shape[0]
+    centre = size // 2
+    # A margin of zeros: the formula looks one lag ahead, and one behind.
+    start, wide = 2 * centre, np.zeros((size + 4 * centre, size + 4 * centre))
+    known = np.zeros((size, size))
+    for i in range(size):
+        for j in range(size):
+            # Lags within their own error would only add noise: 80 lags of it.
+            least = 3 / np.sqrt(max(pairs[i, j] * degrees, 1.0))
+            known[i, j] = observed[i, j] if pairs[i, j] > 0 else 0.0
+            if i == centre and j == centre:
+                known[i, j] = 1.0
+            if np.abs(known[i, j]) > least:
+                wide[start + i, start + j] = known[i, j]
+    found = np.empty(len(lags))
+    for k in range(len(lags)):
+        dy, dx = lags[k]
+        h = known[centre + dy, centre + dx]
+        total = 0.0
+        for i in range(centre, size + 3 * centre):
+            for j in range(centre, size + 3 * centre):
+                w, ahead, behind = wide[i, j], wide[i + dy, j + dx], wide[i - dy, j - dx]
+                total += w * w + ahead * behind - 4 * h * w * behind + 2 * h * h * (w * w)
+        found[k] = total
+    return found
+
+
+@lru_cache(maxsize=16)
+def _entries(reach: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return where sums (lag, row parity, column parity) stand in a table, and their mirror."""
+    lags = half_plane(reach)
+    size = 2 * reach + 1
+    y, x = np.indices((2, 2)).reshape(2, -1)
+    dy, dx = lags[:, :1], lags[:, 1:]
+    here = ((y * 2 + x) * size + reach + dy) * size + reach + dx
+    there = (((y + dy) % 2 * 2 + (x + dx) % 2) * size + reach - dy) * size + reach - dx
+    return here.reshape(-1), there.reshape(-1)
 
 
 @lru_cache(maxsize=16)

@@ -5,7 +5,11 @@ code exp(-2 pi^2 s^2 w^2) of it is left. What the histogram's spectrum holds whe
 above counting noise, is unequal code widths, whatever light, pattern or drift the pixels saw.
 """
 
+import math
 from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from math import nan
+from typing import NamedTuple
 
 import numpy as np
 import scipy.fft
@@ -13,10 +17,58 @@ import scipy.special
 from numpy.typing import NDArray
 
 from dsis.measures.estimate import Estimate, estimate, unknown
+from dsis.measures.kernels import count_codes
 
 LOWEST_CODE, CODES = -(2**16), 2**18  # the first code counted, and how many
 LEAST_SIGMA_STEPS = 2.0  # below, noise does not smooth the density: no code width can be told
 _LEAK = 1e-7  # of the smooth density's power is let into the band
+_REMEMBERED = 4096  # transforms up to this size keep their bands: 17 MB at most
+_LEAST_DOF, _NODES = 4.0, 20
+
+
+class CodeCounts:
+    """Counts of whole codes by phase, held for the range of codes that was seen.
+
+    Attributes
+    ----------
+    whole
+        Whether all frames held whole codes within the range that is counted.
+    lowest
+        Code of the first count, DN.
+    counts
+        (row parity, column parity, code - lowest): int64.
+    """
+
+    def __init__(self) -> None:
+        self.whole = True
+        self.lowest = 0
+        self.counts = np.zeros((2, 2, 0), np.int64)
+
+    def add(self, frame: NDArray[np.float32], *, whole: bool, low: int, high: int) -> None:
+        """Count the codes of a frame: whether they are whole, the lowest and the highest."""
+        self.whole = self.whole and whole and low >= LOWEST_CODE and high < LOWEST_CODE + CODES
+        if self.whole:
+            self._make_room(low, high)
+            count_codes(frame, self.counts, self.lowest)
+
+    def of(self, phases: tuple[tuple[int, int], ...]) -> "Codes | None":
+        """Return the histogram of some phases; None where frames held other values."""
+        if not self.whole:
+            return None
+        return Codes.of(self.lowest, np.sum([self.counts[phase] for phase in phases], axis=0))
+
+    def _make_room(self, low: int, high: int) -> None:
+        size = self.counts.shape[2]
+        if size and low >= self.lowest and high < self.lowest + size:
+            return
+        margin = high - low + 64
+        first, last = low - margin, high + margin
+        if size:
+            first, last = min(first, self.lowest), max(last, self.lowest + size - 1)
+        wider = np.zeros((2, 2, last - first + 1), np.int64)
+        start = self.lowest - first if size else 0
+        wider[:, :, start : start + size] = self.counts
+        self.lowest, self.counts = first, wider
 
 
 @dataclass(frozen=True)
@@ -40,13 +92,18 @@ class Codes:
         used = np.flatnonzero(counts)
         return cls(lowest + int(used[0]), counts[used[0] : used[-1] + 1].copy())
 
+    @cached_property
+    def total(self) -> int:
+        """Samples."""
+        return int(self.counts.sum())
+
     def share_at_most(self, code: float) -> float:
         """Return the share of samples at or below a code."""
-        return float(self.counts[: max(int(code) - self.lowest + 1, 0)].sum() / self.counts.sum())
+        return float(self.counts[: max(int(code) - self.lowest + 1, 0)].sum() / self.total)
 
     def share_at_least(self, code: float) -> float:
         """Return the share of samples at or above a code."""
-        return float(self.counts[max(int(code) - self.lowest, 0) :].sum() / self.counts.sum())
+        return float(self.counts[max(int(code) - self.lowest, 0) :].sum() / self.total)
 
     def spacing(self) -> Estimate:
         """Return the greatest common step of the codes that occur, DN.
@@ -54,8 +111,12 @@ class Codes:
         Exact; its error is the chance that all codes seen lie on twice the true step. The ends may
         be clipped off the lattice and are left out where something lies between them.
         """
+        return self._spacing
+
+    @cached_property
+    def _spacing(self) -> Estimate:
         used = np.flatnonzero(self.counts)
-        if self._clipped():
+        if self._clipped:
             used = used[1:-1]
         if used.size < 2:
             return unknown(1.0)
@@ -73,49 +134,115 @@ class Codes:
         With D(w) the transform of counts h, mean |D|^2 over the band = sum h + rms^2 sum h^2.
         """
         step = self.spacing().value
-        sigma = np.sqrt(variance_dn2) / step
-        if not sigma >= LEAST_SIGMA_STEPS or self._clipped():
+        sigma = variance_dn2**0.5 / step if variance_dn2 >= 0 else nan
+        if not sigma >= LEAST_SIGMA_STEPS or self._clipped:
             return unknown(0.0)
         counts = self.counts[:: int(step)].astype(np.float64)
-        size = scipy.fft.next_fast_len(2 * counts.size, real=True)
-        frequency = np.arange(size // 2 + 1) / size
-        edge = np.sqrt(-np.log(_LEAK) / (4 * np.pi**2)) / sigma
-        weight = np.where(frequency >= edge, 2.0, 0.0)
-        if size % 2 == 0:
-            weight[-1] = 1.0
-        power = np.abs(scipy.fft.rfft(counts, size)) ** 2
-        total, squares = counts.sum(), float((counts**2).sum() - counts.sum())
-        excess = float((weight * power).sum() / weight.sum() - total) / squares
-        band = scipy.fft.irfft(np.where(frequency >= edge, 1.0, 0.0), size)
-        window = (band / band[0]) ** 2
-        null = _quadratic(counts, window) / squares**2
-        error = _quadratic(counts + max(excess, 0.0) * counts**2, window) / squares**2
+        band = _band_of(counts.size, sigma)
+        power = _power(counts, band.size)
+        total, squares = float(counts.sum()), float(counts @ counts - counts.sum())
+        excess = (float(band.mean @ power) - total) / squares
+        null = float(band.pairs @ power) / squares**2
+        raised = _power(counts + max(excess, 0.0) * counts**2, band.size)
+        error = float(band.pairs @ raised) / squares**2
         mean, variance = _signed_root(2 * (total / squares) ** 2 / null)
         # Far above the noise the root's error is that of its square over 2 rms.
         clear = max(excess - 2 * error**0.5, 0.0)
         return estimate(
-            float(np.sign(excess) * np.sqrt(np.abs(excess))),
+            math.copysign(abs(excess) ** 0.5, excess),
             error / (4 * clear + error**0.5 / variance),
             mean * null**0.25,
             variance * null**0.5,
         )
 
+    @cached_property
     def _clipped(self) -> bool:
         """Whether the ends hold more than the tail of a smooth density would."""
-        few = 5 + 0.1 * np.sqrt(self.counts.sum())
+        few = 5 + 0.1 * self.total**0.5
         return bool(max(self.counts[0], self.counts[-1]) > few)
 
 
-def _quadratic(variances: NDArray[np.float64], window: NDArray[np.float64]) -> float:
-    """Return 2 sum window(j - k) v_j v_k: the variance of a sum over pairs of codes."""
-    size = window.size
-    power = np.abs(scipy.fft.rfft(variances, size)) ** 2
-    return 2 * float((window * scipy.fft.irfft(power, size)).sum())
+class _Band(NamedTuple):
+    """The band of frequencies that noise leaves empty, as weights on the bins of a half spectrum.
+
+    Attributes
+    ----------
+    size
+        Of the transform.
+    mean
+        Give the mean over the band.
+    pairs
+        Give 2 sum window(j - k) v_j v_k, the variance of a sum over pairs of codes: v the counts'
+        variances, window the band's transform squared, 1 at 0.
+    """
+
+    size: int
+    mean: NDArray[np.float64]
+    pairs: NDArray[np.float64]
+
+
+def _band_of(codes: int, sigma: float) -> _Band:
+    """Return the band for so many codes and noise of `sigma` steps."""
+    size = scipy.fft.next_fast_len(2 * codes, real=True)
+    edge = (-math.log(_LEAK) / (4 * math.pi**2)) ** 0.5 / sigma
+    make = _remembered_band if size <= _REMEMBERED else _band
+    return make(size, math.ceil(edge * size))
+
+
+def _band(size: int, first: int) -> _Band:
+    """Return the band from bin `first` on."""
+    bins = np.arange(size // 2 + 1)
+    halves = np.full(bins.size, 2.0)
+    halves[0] = 1.0
+    if size % 2 == 0:
+        halves[-1] = 1.0
+    mean = np.where(bins >= first, halves, 0.0)
+    window = scipy.fft.irfft((bins >= first).astype(np.float64), size)
+    transform = scipy.fft.rfft((window / window[0]) ** 2).real
+    return _Band(size, mean / mean.sum(), 2 * halves * transform / size)
+
+
+_remembered_band = lru_cache(maxsize=512)(_band)
+
+
+def _power(counts: NDArray[np.float64], size: int) -> NDArray[np.float64]:
+    """Return the power of counts in each bin of a half spectrum."""
+    transform = np.asarray(scipy.fft.rfft(counts, size), np.complex128)
+    power: NDArray[np.float64] = transform.real**2 + transform.imag**2
+    return power
 
 
 def _signed_root(dof: float) -> tuple[float, float]:
     """Return mean and variance of sign(z) sqrt|z|, z a standardised chi-squared variate."""
+    z = _quantiles(dof) if dof < _LEAST_DOF else _quantiles_between(dof)
+    root = np.copysign(np.sqrt(np.abs(z)), z)
+    mean = float(root.mean())
+    return mean, float(root @ root) / root.size - mean**2
+
+
+def _quantiles(dof: float) -> NDArray[np.float64]:
+    """Return 250 quantiles of a standardised chi-squared variate."""
     share = (np.arange(250) + 0.5) / 250
-    z = (scipy.special.gammaincinv(dof / 2, share) * 2 / dof - 1) * np.sqrt(dof / 2)
-    root = np.sign(z) * np.sqrt(np.abs(z))
-    return float(root.mean()), float(root.var())
+    ratio = np.asarray(scipy.special.gammaincinv(dof / 2, share), np.float64) * 2 / dof
+    return (ratio - 1) * math.sqrt(dof / 2)
+
+
+def _quantiles_between(dof: float) -> NDArray[np.float64]:
+    """Return the quantiles interpolated in 1 / sqrt(dof), where they are smooth: to 1e-12."""
+    nodes, signs, table = _chebyshev()
+    distance = 2 * (_LEAST_DOF / dof) ** 0.5 - 1 - nodes
+    if not distance.all():
+        return _quantiles(dof)  # at a node
+    weights = signs / distance
+    quantiles: NDArray[np.float64] = weights @ table / weights.sum()
+    return quantiles
+
+
+@lru_cache(maxsize=1)
+def _chebyshev() -> tuple[NDArray[np.float64], ...]:
+    """Return nodes, barycentric signs and quantiles (node, quantile)."""
+    angle = math.pi * (np.arange(_NODES) + 0.5) / _NODES
+    nodes, signs = np.cos(angle), np.sin(angle)
+    signs[1::2] *= -1
+    table = np.stack([_quantiles(4 * _LEAST_DOF / (node + 1) ** 2) for node in nodes.tolist()])
+    return nodes, signs, table

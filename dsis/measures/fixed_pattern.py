@@ -7,13 +7,16 @@ taken off (Searle, Casella & McCulloch, "Variance components", 1992, chapter 4).
 """
 
 from dataclasses import dataclass
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.polynomial.legendre import legvander
 from numpy.typing import NDArray
 
+from dsis.compiled import kernel
 from dsis.measures import kernels
 from dsis.measures.estimate import Estimate, estimate
+from dsis.measures.residuals import line_residuals, pixel_residuals
 from dsis.measures.variance_components import Components
 
 DEGREE = 6
@@ -34,6 +37,7 @@ class Smooth:
     along_columns: Array
 
     @classmethod
+    @lru_cache(maxsize=64)
     def of(cls, rows: int, columns: int) -> "Smooth":
         """Return the basis of degree 6, or less where a plane has fewer than 14 rows or columns."""
         degree = min(DEGREE, (min(rows, columns) - 2) // 2)
@@ -47,16 +51,33 @@ class Smooth:
         """Largest total degree."""
         return int(self.along_rows.shape[1]) - 1
 
-    @property
+    @cached_property
     def mixed(self) -> NDArray[np.bool_]:
         """Which products (row degree, column degree) are smooth and neither rows nor columns."""
         i = np.arange(self.degree + 1)
         return (i[:, None] >= 1) & (i >= 1) & (i[:, None] + i <= self.degree)
 
-    def coefficients(self, image: NDArray[np.floating]) -> Array:
-        """Return the coefficients (row degree, column degree) of an image (row, column)."""
-        product: Array = kernels.project(image, self.along_rows) @ self.along_columns
-        return product
+    @cached_property
+    def kinds(self) -> int:
+        """How many products are smooth and neither rows nor columns."""
+        return int(self.mixed.sum())
+
+    @cached_property
+    def across(self) -> Array:
+        """Polynomials along columns, (degree, column), rows of it contiguous."""
+        return np.ascontiguousarray(self.along_columns.T)
+
+    def coefficients(self, images: NDArray[np.floating]) -> Array:
+        """Return the coefficients (.., row degree, column degree) of images (.., row, column)."""
+        n, m = images.shape[-2:]
+        first = kernels.project(images.reshape(-1, n, m), self.along_rows)
+        product: Array = first @ self.along_columns
+        return product.reshape(*images.shape[:-2], *product.shape[1:])
+
+    def weights(self, coefficients: Array) -> Array:
+        """Return those of `across` in each row, (row, degree), of what is smooth in both."""
+        weights: Array = self.along_rows @ np.where(self.mixed, coefficients, 0.0)
+        return weights
 
     def surface(self, coefficients: Array) -> Array:
         """Return the image (row, column) of coefficients."""
@@ -100,6 +121,7 @@ def fixed_pattern(
     row_means: Array,
     column_means: Array,
     c: Components,
+    threads: int = 1,
 ) -> FixedPattern:
     """Return the fixed pattern of a mean frame (row, column), DN.
 
@@ -113,19 +135,21 @@ def fixed_pattern(
         Of each frame: (frame, row), (frame, column), DN.
     c
         Components of the temporal noise.
+    threads
+        Threads that may be used.
     """
     n, m = mean.shape
     coefficients = smooth.coefficients(mean)
-    pixels = mean - mean.mean(1)[:, None] - mean.mean(0) + mean.mean()
-    pixels = pixels - smooth.surface(np.where(smooth.mixed, coefficients, 0.0))
-    mixed = int(smooth.mixed.sum())
-    dof = (n - 1) * (m - 1) - mixed
-    square = float((pixels**2).sum()) / dof if dof > 0 else np.nan
+    by_row, by_column, pixels, squares, scatter = pixel_residuals(
+        mean, smooth.weights(coefficients), smooth.across, threads
+    )
+    dof = (n - 1) * (m - 1) - smooth.kinds
+    square = squares / dof if dof > 0 else np.nan
     noise = c.ms_pixel / c.frames
-    spatial_error = float((pixels**2).var()) / pixels.size * (pixels.size / dof) ** 2 if dof else 0
+    spatial_error = scatter / pixels.size * (pixels.size / dof) ** 2 if dof else 0
     pixel = square - noise
-    rows = _lines(mean.mean(1), row_means, smooth.along_rows, m)
-    columns = _lines(mean.mean(0), column_means, smooth.along_columns, n)
+    rows = _lines(by_row, row_means, smooth.along_rows, m)
+    columns = _lines(by_column, column_means, smooth.along_columns, n)
     # Chi-squared of the mean frame, and of the temporal noise that is taken off.
     pixel_null = 2 * noise**2 / dof * (1 + 1 / (c.frames - 1)) if dof > 0 else np.nan
     estimates = {
@@ -133,13 +157,11 @@ def fixed_pattern(
             pixel, spatial_error + c.var_ms_pixel / c.frames**2, 0.0, pixel_null
         )
     }
-    variances = []
     for name, lines in (("row", rows), ("column", columns)):
         value = (lines.spatial - square - lines.temporal + noise) / lines.size
         error = 2 * lines.spatial**2 / (lines.dof + 2) + spatial_error
         error += 2 * lines.temporal**2 / ((c.frames - 1) * lines.dof + 2)
         null = 2 * noise**2 / lines.dof * (1 + 1 / (c.frames - 1)) + pixel_null
-        variances.append(value)
         estimates[f"fixed_{name}_variance"] = estimate(
             value, error / lines.size**2, 0.0, null / lines.size**2
         )
@@ -151,11 +173,8 @@ def fixed_pattern(
 
 def _lines(means: Array, series: Array, basis: Array, size: int) -> _Lines:
     frames, dof = len(series), len(means) - basis.shape[1]
-    rest = means - basis @ (basis.T @ means)
-    wander = series - series.mean(0)
-    wander = wander - (wander @ basis) @ basis.T
-    temporal = size * float((wander**2).sum()) / ((frames - 1) * dof) / frames
-    return _Lines(size, dof, size * float((rest**2).sum()) / dof, temporal)
+    spatial, temporal = line_residuals(means, series, basis)
+    return _Lines(size, dof, size * spatial / dof, size * temporal / ((frames - 1) * dof) / frames)
 
 
 def _smooth_variance(
@@ -172,25 +191,54 @@ def _smooth_variance(
     """
     square, rows, columns = finer
     noise, frames = temporal
-    tau = np.where(smooth.mixed, square, 0.0)
-    tau[1:, 0], tau[0, 1:] = rows.spatial, columns.spatial
-    use = smooth.mixed.copy()
-    use[1:, 0] = use[0, 1:] = True
-    # Temporal noise may have smooth parts of its own: what each leaves is measured, not assumed.
-    left = surfaces.var(0, ddof=1) / frames
-    expected = tau.copy()
-    expected -= np.where(smooth.mixed, noise, 0.0)
-    expected[1:, 0] -= rows.temporal
-    expected[0, 1:] -= columns.temporal
-    value = (coefficients**2 - left - expected)[use].sum()
-    # 4 tau (coefficient^2 - tau) estimates the second term without bias.
-    error = max((4 * tau * coefficients**2 - 2 * tau**2)[use].sum(), (tau**2)[use].sum())
-    error += (2 * left**2 / (frames + 1))[use].sum()
+    value, error, known = _smooth_sums(
+        coefficients,
+        surfaces,
+        (square, rows.spatial, columns.spatial),
+        (noise, rows.temporal, columns.temporal),
+    )
     lines_error = sum(
         smooth.degree**2 * 2 * (part.spatial**2 + part.temporal**2 / (frames - 1)) / (part.dof + 2)
         for part in (rows, columns)
     )
-    kinds = int(use.sum()) + smooth.degree**2 * (1 / rows.dof + 1 / columns.dof)
+    kinds = known + smooth.degree**2 * (1 / rows.dof + 1 / columns.dof)
     null = 2 * noise**2 * (1 + 1 / (frames - 1)) * kinds
     size = shape[0] * shape[1]
-    return estimate(float(value) / size, (error + lines_error) / size**2, 0.0, null / size**2)
+    return estimate(value / size, (error + lines_error) / size**2, 0.0, null / size**2)
+
+
+@kernel
+def _smooth_sums(
+    coefficients: Array,
+    surfaces: Array,
+    spatial: tuple[float, float, float],
+    temporal: tuple[float, float, float],
+) -> tuple[float, float, int]:
+    """Return the sum of squared coefficients beyond finer patterns, its variance, their number.
+
+    `spatial`, `temporal`: mean squares of pixels, rows, columns.
+    """
+    frames, top, _ = surfaces.shape
+    value, error, null, again = 0.0, 0.0, 0.0, 0.0
+    count = 0
+    for i in range(top):
+        for j in range(top):
+            kind = (0 if i else 2) if j else 1
+            if i + j == 0 or (i and j and i + j >= top):
+                continue
+            count += 1
+            tau = spatial[kind]
+            # Temporal noise may have smooth parts of its own: measured, not assumed.
+            mean, left = 0.0, 0.0
+            for t in range(frames):
+                mean += surfaces[t, i, j] / frames
+            for t in range(frames):
+                left += (surfaces[t, i, j] - mean) ** 2
+            left /= (frames - 1) * frames
+            square = coefficients[i, j] ** 2
+            value += square - left - (tau - temporal[kind])
+            # 4 tau (coefficient^2 - tau) estimates the second term without bias.
+            error += 4 * tau * square - 2 * tau * tau
+            null += tau * tau
+            again += 2 * left * left / (frames + 1)
+    return value, max(error, null) + again, count

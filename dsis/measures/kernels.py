@@ -7,46 +7,16 @@ number of threads. A 2 x 2 phase is (row parity, column parity) within the array
 import numpy as np
 from numpy.typing import NDArray
 
-from dsis.compiled import ROWS_PER_BLOCK, kernel, over_rows
+from dsis.compiled import kernel, over_rows
 
 Frame = NDArray[np.float32]
 Sums = NDArray[np.float64]
 FiveSums = tuple[Sums, Sums, Sums, Sums, Sums]
 
-_BLOCK = ROWS_PER_BLOCK
 
-
-def count_codes(frame: Frame, histogram: NDArray[np.int64], lowest: int) -> bool:
-    """Add the frame's codes to `histogram` (row parity, column parity, code - lowest).
-
-    Returns False, with the histogram in an undefined state, where a value is no whole code or lies
-    outside the histogram.
-    """
-    return bool(_count_codes(frame, histogram, lowest))
-
-
-def line_sums(difference: Frame, threads: int) -> tuple[Sums, Sums]:
-    """Return sums over columns (row, column parity) and over rows (row parity, column)."""
-    rows, columns = difference.shape
-    by_row = np.zeros((rows, 2))
-    by_column = np.zeros((-(-rows // _BLOCK), 2, columns))
-
-    def block(first: int, last: int) -> None:
-        _line_sums(difference, first, last, by_row, by_column)
-
-    over_rows(block, rows, threads)
-    return by_row, by_column.sum(0)
-
-
-def pair_squares(difference: Frame, previous: Frame, threads: int) -> Sums:
-    """Return sums of (difference - previous)^2 over columns: (row, column parity)."""
-    by_row = np.zeros((difference.shape[0], 2))
-
-    def block(first: int, last: int) -> None:
-        _pair_squares(difference, previous, first, last, by_row)
-
-    over_rows(block, difference.shape[0], threads)
-    return by_row
+def count_codes(frame: Frame, histogram: NDArray[np.int64], lowest: int) -> None:
+    """Add whole codes, all within it, to `histogram` (row parity, column parity, code - lowest)."""
+    _count_codes(frame, histogram, lowest)
 
 
 def add_moments(
@@ -71,62 +41,62 @@ def add_moments(
     over_rows(block, difference.shape[0], threads)
 
 
-def lag_products(image: Frame, lags: NDArray[np.int64], threads: int) -> Sums:
-    """Return sums of image(y, x) image(y + dy, x + dx): (lag, row parity, column parity) of (y, x).
+@kernel
+def offsets(by_row: Sums, by_column: Sums, single: bool) -> tuple[Sums, Sums, Sums]:
+    """Return what to subtract from each pixel, and the mean of each phase (2, 2).
 
-    Lags (lag, 2): dy >= 0, dx of any sign; pairs that leave the image are left out.
+    Row means (row, column parity), and column means less the mean (row parity, column); `single`:
+    all phases are one channel.
     """
-    rows = image.shape[0]
-    sums = np.zeros((-(-rows // _BLOCK), len(lags), 2, 2))
-
-    def block(first: int, last: int) -> None:
-        _lag_products(image, lags, first, last, sums)
-
-    over_rows(block, rows, threads)
-    total: Sums = sums.sum(0)
-    return total
-
-
-@kernel
-def _count_codes(frame: Frame, histogram: NDArray[np.int64], lowest: int) -> bool:
-    rows, columns = frame.shape
-    size = histogram.shape[2]
+    rows, columns = by_row.shape[0], by_column.shape[1]
+    of_rows, of_columns, means = np.empty((rows, 2)), np.empty((2, columns)), np.zeros((2, 2))
+    if single:
+        means[:] = by_row.sum() / (rows * columns)
+        for y in range(rows):
+            of_rows[y] = (by_row[y, 0] + by_row[y, 1]) / columns
+        for x in range(columns):
+            of_columns[:, x] = (by_column[0, x] + by_column[1, x]) / rows - means[0, 0]
+        return of_rows, of_columns, means
+    down, across = ((rows + 1) // 2, rows // 2), ((columns + 1) // 2, columns // 2)
     for y in range(rows):
+        for p in range(2):
+            of_rows[y, p] = by_row[y, p] / across[p]
+            means[y & 1, p] += by_row[y, p]
+    for p in range(2):
+        for q in range(2):
+            means[p, q] /= down[p] * across[q]
         for x in range(columns):
-            value = frame[y, x]
-            code = np.int64(value)
-            i = code - lowest
-            if np.float32(code) != value or i < 0 or i >= size:
-                return False
-            histogram[y & 1, x & 1, i] += 1
-    return True
+            of_columns[p, x] = by_column[p, x] / down[p] - means[p, x & 1]
+    return of_rows, of_columns, means
 
 
 @kernel
-def _line_sums(difference: Frame, first: int, last: int, by_row: Sums, by_column: Sums) -> None:
-    columns = difference.shape[1]
-    for y in range(first, last):
-        line, into = difference[y], by_column[y // _BLOCK, y & 1]
-        even, odd = 0.0, 0.0
-        for x in range(columns):
-            into[x] += line[x]
+def split(image: Frame, places: NDArray[np.int64], means: Sums, out: Frame) -> None:
+    """Write planes less their means: (plane, row, column); `places`: first row, column and step."""
+    _, n, m = out.shape
+    for k in range(places.shape[0]):
+        y0, x0, step = places[k, 0], places[k, 1], places[k, 2]
+        mean = np.float32(means[y0, x0])
+        for y in range(n):
+            line, into = image[y0 + y * step], out[k, y]
+            if step == 1:
+                for x in range(m):
+                    into[x] = line[x] - mean
+            else:
+                for x in range(m):
+                    into[x] = line[x0 + 2 * x] - mean
+
+
+@kernel
+def _count_codes(frame: Frame, histogram: NDArray[np.int64], lowest: int) -> None:
+    rows, columns = frame.shape
+    for y in range(rows):
+        line, even, odd = frame[y], histogram[y & 1, 0], histogram[y & 1, 1]
         for i in range(columns // 2):
-            even += line[2 * i]
-            odd += line[2 * i + 1]
+            even[np.uintp(np.int32(line[2 * i]) - lowest)] += 1
+            odd[np.uintp(np.int32(line[2 * i + 1]) - lowest)] += 1
         if columns & 1:
-            even += line[columns - 1]
-        by_row[y, 0], by_row[y, 1] = even, odd
-
-
-@kernel
-def _pair_squares(difference: Frame, previous: Frame, first: int, last: int, by_row: Sums) -> None:
-    columns = difference.shape[1]
-    for y in range(first, last):
-        sums = np.zeros(2)
-        for x in range(columns):
-            change = np.float64(difference[y, x] - previous[y, x])
-            sums[x & 1] += change * change
-        by_row[y, 0], by_row[y, 1] = sums[0], sums[1]
+            even[np.uintp(np.int32(line[columns - 1]) - lowest)] += 1
 
 
 @kernel
@@ -163,46 +133,97 @@ def _add_moments(
 
 
 @kernel
-def _lag_products(image: Frame, lags: NDArray[np.int64], first: int, last: int, sums: Sums) -> None:
-    rows, columns = image.shape
-    # Sums by column vectorise; float32 holds 32 products of one sign to 1e-6.
-    by_column = np.empty((2, columns), np.float32)
-    for start in range(first, last, _BLOCK):
-        for lag in range(lags.shape[0]):
-            dy, dx = lags[lag, 0], lags[lag, 1]
-            low, high = max(0, -dx), min(columns, columns - dx)
-            by_column[:] = 0
-            for y in range(start, min(start + _BLOCK, last, rows - dy)):
-                here = image[y][low:high]
-                there = image[y + dy][low + dx : high + dx]
-                into = by_column[y & 1][low:high]
-                for i in range(into.size):
-                    into[i] += here[i] * there[i]
-            for x in range(low, high):
-                sums[start // _BLOCK, lag, 0, x & 1] += by_column[0, x]
-                sums[start // _BLOCK, lag, 1, x & 1] += by_column[1, x]
-
-
-@kernel
 def add_power(transform: NDArray[np.complex64], power: Sums) -> None:
-    """Add |transform|^2 to `power`."""
-    rows, columns = transform.shape
-    for y in range(rows):
-        line, into = transform[y], power[y]
-        for x in range(columns):
-            re, im = np.float64(line[x].real), np.float64(line[x].imag)
-            into[x] += re * re + im * im
+    """Add |transform|^2 to `power`: (plane, row, column) both."""
+    planes, rows, columns = transform.shape
+    for k in range(planes):
+        for y in range(rows):
+            line, into = transform[k, y], power[k, y]
+            for x in range(columns):
+                re, im = np.float64(line[x].real), np.float64(line[x].imag)
+                into[x] += re * re + im * im
 
 
 @kernel
-def project(image: NDArray[np.floating], basis: Sums) -> Sums:
-    """Return sums over rows of basis(row, degree) image(row, column): (degree, column)."""
-    rows, columns = image.shape
-    out = np.zeros((basis.shape[1], columns))
+def project(images: NDArray[np.floating], basis: Sums) -> Sums:
+    """Return sums over rows of basis(row, degree) image(row, column): (plane, degree, column)."""
+    planes, rows, columns = images.shape
+    out = np.zeros((planes, basis.shape[1], columns))
+    for k in range(planes):
+        for y in range(rows):
+            line = images[k, y]
+            for degree in range(basis.shape[1]):
+                weight, into = basis[y, degree], out[k, degree]
+                for x in range(columns):
+                    into[x] += weight * line[x]
+    return out
+
+
+@kernel
+def mean_frame(
+    base: Frame,
+    sums: Sums,
+    frames: int,
+    place: tuple[int, int, int],
+    row_means: Sums,
+    column_means: Sums,
+    shift: float,
+    mean: Sums,
+    change: Sums,
+) -> tuple[Sums, Sums]:
+    """Write the mean frame of a channel, and its change since the first frame less the mean's.
+
+    Returns the means of rows and of columns of the first frame, shifted as the mean frame is.
+
+    Parameters
+    ----------
+    base, sums
+        The first frame, and the sums of u: (row, column) of the array.
+    frames, place
+        Number of frames; first row, first column and step of the channel.
+    row_means, column_means
+        Of d: (frame, row), (frame, column).
+    shift
+        Added to the mean frame.
+    mean, change
+        Are written: (row, column).
+    """
+    y0, x0, step = place
+    n, m = mean.shape
+    rows, columns = np.zeros(n), np.zeros(m)
+    for t in range(frames):
+        rows += row_means[t]
+        columns += column_means[t]
+    rows /= frames
+    columns /= frames
+    level = rows.sum() / n
+    rows -= level
+    columns -= level
+    by_row, by_column = np.zeros(n), np.zeros(m)
+    for y in range(n):
+        line, total = base[y0 + y * step, x0::step], sums[y0 + y * step, x0::step]
+        into, over = mean[y], change[y]
+        for x in range(m):
+            over[x] = total[x] / frames + rows[y] + columns[x]
+            into[x] = line[x] + (over[x] + level) + shift
+            by_column[x] += line[x]
+            by_row[y] += line[x]
+    return by_row / m + shift, by_column / n + shift
+
+
+@kernel
+def temporal_power(
+    power: Sums, transform: NDArray[np.complex128], columns: int, frames: int
+) -> Sums:
+    """Return power summed over frames less that of the mean, per pixel and free frame.
+
+    Power (row, column) of images of `columns` columns; nothing is below zero.
+    """
+    rows, bins = power.shape
+    out = np.empty((rows, bins))
+    share = rows * columns * (frames - 1)
     for y in range(rows):
-        line = image[y]
-        for degree in range(basis.shape[1]):
-            weight, into = basis[y, degree], out[degree]
-            for x in range(columns):
-                into[x] += weight * line[x]
+        for x in range(bins):
+            still = transform[y, x].real ** 2 + transform[y, x].imag ** 2
+            out[y, x] = max(power[y, x] - frames * still, 0.0) / share
     return out

@@ -7,55 +7,50 @@ scatter, so strong pixels and heavy tails are in them; null errors are those of 
 """
 
 from dataclasses import dataclass
-from math import factorial, inf
+from functools import lru_cache
+from math import factorial, inf, prod
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dsis.measures.estimate import Estimate, estimate, unknown
+from dsis.measures.pixels import Scatter
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class PixelMoments:
-    """What each pixel of a channel shows over time, row, column and frame means removed.
+    """What the pixels of a channel show over time, row, column and frame means removed.
 
     Attributes
     ----------
-    frames
-        Number of frames T.
-    square, cube, fourth
-        Mean over frames of the residual's powers: (row, column), DN^2, DN^3, DN^4.
+    frames, rows, columns
+        Number of frames T, rows and columns of the channel.
+    variance_map
+        Unbiased variance of each pixel over time: (row, column), DN^2.
     neighbour
         Mean over T - 1 pairs of the residual times the next frame's: (row, column), DN^2.
+    scatter
+        Means and products over pixels of the residual's mean powers.
     """
 
     frames: int
-    square: Array
-    cube: Array
-    fourth: Array
+    rows: int
+    columns: int
+    variance_map: Array
     neighbour: Array
-
-    @classmethod
-    def of(cls, frames: int, sums: tuple[Array, ...], last: Array) -> "PixelMoments":
-        """Return moments from sums over frames of u, u^2, u^3, u^4 and u times the previous u.
-
-        The first u is zero; `last` is the last one.
-        """
-        s1, s2, s3, s4, s11 = (part / frames for part in sums)
-        square = s2 - s1**2
-        cube = s3 - 3 * s1 * s2 + 2 * s1**3
-        fourth = s4 - 4 * s1 * s3 + 6 * s1**2 * s2 - 3 * s1**4
-        ends = 2 * frames * s1 - last
-        pairs = frames - 1
-        neighbour = (frames * s11 - s1 * ends + pairs * s1**2) / max(pairs, 1)
-        return cls(frames, square, cube, fourth, neighbour)
+    scatter: Scatter
 
     @property
-    def variance_map(self) -> Array:
-        """Unbiased variance of each pixel over time: (row, column), DN^2."""
-        return self.square / self._kept(2)
+    def variance(self) -> float:
+        """Mean of the variance map, DN^2."""
+        return self.scatter.square / self._kept(2)
+
+    @property
+    def variance_error2(self) -> float:
+        """Variance of that mean where pixels are independent, DN^4."""
+        return self.scatter.squares / self._kept(2) ** 2 / (self.rows * self.columns)
 
     def estimates(self, inflation: float = 1.0) -> dict[str, Estimate]:
         """Return skewness, kurtosis, frame_correlation and variance_spread.
@@ -63,7 +58,7 @@ class PixelMoments:
         `inflation`: sum of rho^2 over lags, by which products of correlated neighbours scatter
         more (higher powers: rho^3 and beyond, left out).
         """
-        if not self.square.any():
+        if not self.scatter.any:
             return {
                 "skewness": unknown(0.0),
                 "kurtosis": unknown(0.0),
@@ -83,83 +78,90 @@ class PixelMoments:
         Blind to pixels that differ in variance, which raise `kurtosis` by three times their spread;
         needs four frames (Fisher's k-statistic k4, var 24 T (T+1) / ((T-1)(T-2)(T-3))).
         """
-        t = self.frames
-        if t < 4 or not self.square.any():
+        t, size = self.frames, self.rows * self.columns
+        if t < 4 or not self.scatter.any:
             return unknown(0.0)
-        k4 = t**2 * ((t + 1) * self.fourth - 3 * (t - 1) * self.square**2)
-        k4 = k4 / ((t - 1) * (t - 2) * (t - 3))
-        rows, columns = self.square.shape
-        plane = _share(rows, 4) * _share(columns, 4)
-        scale = plane * float(self.variance_map.mean()) ** 2
-        null = 24 * t * (t + 1) / ((t - 1) * (t - 2) * (t - 3)) / k4.size
-        null *= _loss(rows, 4) * _loss(columns, 4)
-        return estimate(k4.mean() / scale, k4.var() / k4.size / scale**2, 0.0, null)
+        scale = _share(self.rows, 4) * _share(self.columns, 4) * self.variance**2
+        null = 24 * t * (t + 1) / ((t - 1) * (t - 2) * (t - 3)) / size
+        null *= _loss(self.rows, 4) * _loss(self.columns, 4)
+        return estimate(
+            self.scatter.k4 / scale, self.scatter.k4_squares / size / scale**2, 0.0, null
+        )
 
     def _kept(self, power: int) -> float:
         """Return the sum of weights^power of a residual: over time, rows and columns."""
-        return float(np.prod([_share(size, power) for size in (self.frames, *self.square.shape)]))
+        return kept(self.frames, self.rows, self.columns, power)
 
     def _null(self, power: int) -> float:
         """Return the variance of a standardised cumulant of Gaussian residuals."""
-        sizes = (self.frames, *self.square.shape)
-        loss = float(np.prod([_loss(size, power) for size in sizes]))
-        return factorial(power) / float(np.prod(sizes)) * loss
+        return _null(self.frames, self.rows, self.columns, power)
 
     def _skewness(self) -> Estimate:
-        kept = self._kept(3)
-        size = self.square.size
-        if kept == 0:
+        weights = self._kept(3)
+        if weights == 0:
             return unknown(0.0)  # the residuals of two samples are symmetric
-        m2, m3 = float(self.square.mean()), float(self.cube.mean())
-        scale = self._kept(2) ** 1.5 / kept / m2**1.5
-        influence = self.cube - 1.5 * m3 / m2 * self.square
-        return estimate(m3 * scale, influence.var() / size * scale**2, 0.0, self._null(3))
+        of, size = self.scatter, self.rows * self.columns
+        scale = self._kept(2) ** 1.5 / weights / of.square**1.5
+        lean = 1.5 * of.cube / of.square
+        influence = of.cubes - 2 * lean * of.cube_square + lean**2 * of.squares
+        return estimate(of.cube * scale, influence / size * scale**2, 0.0, self._null(3))
 
     def _kurtosis(self) -> Estimate:
-        size = self.square.size
-        m2, m4 = float(self.square.mean()), float(self.fourth.mean())
-        variance = float(self.square.var()) / size
-        scale = self._kept(2) ** 2 / self._kept(4) / m2**2
-        influence = self.fourth - 2 * m4 / m2 * self.square
-        value = (m4 - 3 * (m2**2 - variance)) * scale
-        return estimate(value, influence.var() / size * scale**2, 0.0, self._null(4))
+        of, size = self.scatter, self.rows * self.columns
+        scale = self._kept(2) ** 2 / self._kept(4) / of.square**2
+        lean = 2 * of.fourth / of.square
+        influence = of.fourths - 2 * lean * of.fourth_square + lean**2 * of.squares
+        value = (of.fourth - 3 * (of.square**2 - of.squares / size)) * scale
+        return estimate(value, influence / size * scale**2, 0.0, self._null(4))
 
     def _frame_correlation(self, inflation: float) -> Estimate:
         """Solve the expected ratio for rho: the removed mean correlates frames by -1/(T-1).
 
         Exact for noise that is correlated with the next frame only.
         """
-        t, size = self.frames, self.square.size
+        t, size, of = self.frames, self.rows * self.columns, self.scatter
         if t < 3:
             return unknown(0.0)  # two residuals are each other's negative
-        m2 = float(self.square.mean())
-        ratio = float(self.neighbour.mean()) / m2
+        ratio = of.neighbour / of.square
         # Traces of P A P A, A P and P: P takes the mean off, A pairs neighbours.
         papa = (t - 1) / 2 - 2 * (t - 1.5) / t + ((t - 1) / t) ** 2
         top = ratio * (t - 1) / t + 1 / t
         bottom = 2 * papa / (t - 1) + 2 * ratio * (t - 1) / t**2
         slope = (t - 1) / t / bottom - top * 2 * (t - 1) / t**2 / bottom**2
-        influence = (self.neighbour - ratio * self.square) / m2
+        influence = of.neighbours - 2 * ratio * of.neighbour_square + ratio**2 * of.squares
         a, b = t / (t - 1) ** 2, -1 / (t - 1) ** 2
         null = 2 * (a**2 * papa + 2 * a * b * (t - 1) / t + b**2 * (t - 1)) / size
         null_bottom = 2 * papa / (t - 1) - 2 / t**2
         return estimate(
             top / bottom,
-            influence.var() / size * slope**2 * inflation,
+            influence / of.square**2 / size * slope**2 * inflation,
             0.0,
             null * ((t - 1) / t / null_bottom) ** 2,
         )
 
     def _variance_spread(self) -> Estimate:
-        d, size = self.frames - 1, self.square.size
-        x = self.square / self.square.mean()
-        spread = float(x.var(ddof=1))
-        influence = (x - 1) ** 2 - 2 * spread * (x - 1)
+        d, size, of = self.frames - 1, self.rows * self.columns, self.scatter
+        second = of.squares / of.square**2
+        spread = second * size / (size - 1)
+        influence = of.squares_4 / of.square**4 - 4 * spread * of.squares_3 / of.square**3
+        influence += 4 * spread**2 * second - second**2
         null = 8 / d**2 * (1 + 2 / d) / size
         # Pixels of equal variance v have a variance of v^2 2/(T-1) between them.
         value = (spread - 2 / d) / (1 + 2 / d)
         shrink = (1 + 2 / d) ** -2
-        return estimate(value, influence.var() / size * shrink, 0.0, null * shrink)
+        return estimate(value, influence / size * shrink, 0.0, null * shrink)
+
+
+@lru_cache(maxsize=1024)
+def kept(frames: int, rows: int, columns: int, power: int) -> float:
+    """Return the sum of the weights' powers with which samples enter a residual."""
+    return prod(_share(size, power) for size in (frames, rows, columns))
+
+
+@lru_cache(maxsize=1024)
+def _null(frames: int, rows: int, columns: int, power: int) -> float:
+    loss = prod(_loss(size, power) for size in (frames, rows, columns))
+    return factorial(power) / (frames * rows * columns) * loss
 
 
 def _share(size: int, power: int) -> float:

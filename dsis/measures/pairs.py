@@ -2,8 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-
-import numpy as np
+from math import nan
 
 from dsis.measures.estimate import Estimate, estimate
 from dsis.measures.variance_components import Components
@@ -45,8 +44,8 @@ def pair_variance(
         Components of the same frames; row and column noise is in the error.
     """
     pairs, size = len(squares), noise.rows * noise.columns
-    removed = float(np.mean(np.square(means))) / 2
-    uncorrected = float(np.mean(squares)) / 2
+    removed = sum(mean**2 for mean in means) / pairs / 2
+    uncorrected = sum(squares) / pairs / 2
     # Each pair is one degree of freedom of the T - 1 that the components rest on.
     share = (noise.frames - 1) / pairs
     error = noise.var_ms_pixel
@@ -55,8 +54,8 @@ def pair_variance(
     null = 2 * noise.ms_pixel**2 / (pairs * size)
     null_removed = 2 * (noise.ms_pixel / size) ** 2 / pairs
     return PairVariance(
-        estimate(uncorrected - removed, error * share, np.nan, null),
+        estimate(uncorrected - removed, error * share, nan, null),
         estimate(removed, error_removed, noise.ms_pixel / size, null_removed),
-        estimate(uncorrected, error * share + error_removed, np.nan, null),
+        estimate(uncorrected, error * share + error_removed, nan, null),
         pairs,
     )

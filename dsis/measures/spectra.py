@@ -41,22 +41,37 @@ def line_peak(power: Array, lines: int, degrees: int) -> Estimate:
 
 def _peak(inner: Array, edge: Array, alone: Array, degrees: int) -> Estimate:
     """Return the largest of complex bins (`inner`, `edge`) and of self-conjugate ones (`alone`)."""
-    if inner.size < 4 or not inner.any():
+    if inner.size < 4:
         return unknown()
-    middle = float(scipy.special.gammaincinv(degrees, 0.5)) / degrees
-    white = float(np.median(inner)) / middle
+    middle, density = _median_of_white(degrees)
+    white = _median(inner) / middle
     if white == 0:
         return unknown()
     value = max(float(part.max()) for part in (inner, edge, alone) if part.size) / white
     mean, variance = _largest_of_white(inner.size + edge.size, alone.size, degrees)
     # The median of K bins scatters by 1 / (4 K density^2); the largest is divided by it.
-    log_density = (degrees - 1) * np.log(middle * degrees) - middle * degrees
-    density = degrees * np.exp(log_density - scipy.special.gammaln(degrees))
-    scatter = float(1 / (4 * inner.size * (density * middle) ** 2))
+    scatter = 1 / (4 * inner.size * (density * middle) ** 2)
     null_value, null = mean * (1 + scatter), variance + mean**2 * scatter
     # A line of fixed amplitude and free phase in white noise: non-central chi-squared.
     excess = max(value - null_value - 3 * null**0.5, 0.0)
     return estimate(value, null * (1 + excess) ** 2 + 2 * excess / (degrees + 1), null_value, null)
+
+
+def _median(values: Array) -> float:
+    """Return the median; `numpy.median` takes longer to ask what it was given."""
+    half = values.size // 2
+    if values.size % 2:
+        return float(np.partition(values, half)[half])
+    middle = np.partition(values, (half - 1, half))[half - 1 : half + 1]
+    return float(middle[0] + middle[1]) / 2
+
+
+@lru_cache(maxsize=256)
+def _median_of_white(degrees: int) -> tuple[float, float]:
+    """Return the median of Gamma(degrees)/degrees, and the density of that variate there."""
+    middle = float(scipy.special.gammaincinv(degrees, 0.5)) / degrees
+    log_density = (degrees - 1) * np.log(middle * degrees) - middle * degrees
+    return middle, float(degrees * np.exp(log_density - scipy.special.gammaln(degrees)))
 
 
 @lru_cache(maxsize=256)

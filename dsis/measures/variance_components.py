@@ -6,10 +6,13 @@ variance, each unbiased and each blind to the others.
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
+import scipy.fft
 from numpy.typing import NDArray
 
+from dsis.compiled import kernel
 from dsis.measures.estimate import Estimate, estimate
 
 Array = NDArray[np.float64]
@@ -85,67 +88,102 @@ class Components:
 
 
 def components(
-    row_means: Array,
-    column_means: Array,
+    row_power: Array,
+    column_power: Array,
     frame_means: Array,
-    variance_map: Array,
-    inflation: float = 1.0,
+    shape: tuple[int, int],
+    pixel: tuple[float, float],
 ) -> Components:
     """Return the components of one channel.
 
     Parameters
     ----------
-    row_means, column_means, frame_means
-        Of each frame: (frame, row), (frame, column), (frame), DN.
-    variance_map
-        Temporal variance of each pixel (row, column) without rows, columns and frames, DN^2. Its
-        spread gives the error of its mean: kurtosis and pixels that differ are in it.
-    inflation
-        Factor of that error where the noise of neighbours is correlated: 1 + sum of rho^2.
+    row_power, column_power
+        `line_power` of the means of rows and of columns less the frame's, DN^2.
+    frame_means
+        Of each frame, DN.
+    shape
+        Rows and columns of the channel.
+    pixel
+        Temporal variance of a pixel without rows, columns and frames, and the variance of that.
     """
-    frames, rows = row_means.shape
-    columns = column_means.shape[1]
-    wander = frame_means - frame_means.mean()
-    ms_frame = rows * columns * float((wander**2).sum()) / (frames - 1)
-    ms_row, var_row = _lines(row_means - frame_means[:, None], columns)
-    ms_column, var_column = _lines(column_means - frame_means[:, None], rows)
+    frames, (rows, columns) = frame_means.size, shape
+    wander = frame_means - frame_means.sum() / frames
+    ms_frame = rows * columns * float(wander @ wander) / (frames - 1)
+    ms_row, var_row = _lines(row_power, frames, rows, columns)
+    ms_column, var_column = _lines(column_power, frames, columns, rows)
     return Components(
         frames,
         rows,
         columns,
-        float(variance_map.mean()),
+        pixel[0],
         ms_row,
         ms_column,
         ms_frame,
-        float(variance_map.var()) / variance_map.size * inflation,
+        pixel[1],
         var_row,
         var_column,
         2 * ms_frame**2 / (frames + 1),
     )
 
 
-def line_power(series: Array) -> Array:
-    """Return sums over frames of the power of a series (frame, line) less its mean over frames.
+def line_power(means: Array, frame_means: Array) -> Array:
+    """Return sums over frames of the power of line means less the frame's, their mean left out.
 
-    Half spectrum of a real transform along the lines; the sum of the whole one is that of squares.
+    Means (plane, frame, line), (plane, frame); power (plane, bin): half spectrum of a real
+    transform along the lines; the sum of the whole one is that of squares.
     """
-    transform = np.fft.rfft(series - series.mean(0), axis=1)
-    power: Array = (np.abs(transform) ** 2).sum(0) / series.shape[1]
+    transform = scipy.fft.rfft(_wander(means, frame_means))
+    power: Array = _over_frames(transform, means.shape[2])
     return power
 
 
-def _lines(series: Array, size: int) -> tuple[float, float]:
+@kernel
+def _wander(means: Array, frame_means: Array) -> Array:
+    """Return line means less the frame's, less their mean over frames: (plane, frame, line)."""
+    planes, frames, lines = means.shape
+    out = np.empty((planes, frames, lines))
+    for k in range(planes):
+        centre = np.zeros(lines)
+        for t in range(frames):
+            for i in range(lines):
+                out[k, t, i] = means[k, t, i] - frame_means[k, t]
+                centre[i] += out[k, t, i]
+        for t in range(frames):
+            for i in range(lines):
+                out[k, t, i] -= centre[i] / frames
+    return out
+
+
+@kernel
+def _over_frames(transform: NDArray[np.complex128], lines: int) -> Array:
+    """Return the sum over frames of |transform|^2 per line: (plane, bin)."""
+    planes, frames, bins = transform.shape
+    power = np.zeros((planes, bins))
+    for k in range(planes):
+        for t in range(frames):
+            for i in range(bins):
+                power[k, i] += transform[k, t, i].real ** 2 + transform[k, t, i].imag ** 2
+    return power / lines
+
+
+def _lines(power: Array, frames: int, lines: int, size: int) -> tuple[float, float]:
     """Return the mean square of lines of `size` pixels and its variance.
 
     var of the sum of power P_k is 2 sum P_k^2 / T for Gaussian lines of any spectrum: coloured
     lines have fewer degrees of freedom.
     """
-    frames, lines = series.shape
-    power = line_power(series)
-    twice = np.full(len(power), 2.0)
-    twice[0] = 1.0
-    if lines % 2 == 0:
-        twice[-1] = 1.0
+    twice = _halves(len(power), lines % 2 == 0)
     scale = size / ((frames - 1) * (lines - 1))
-    square = float((twice * power).sum()) * scale
-    return square, 2 * float((twice * power**2).sum()) / frames * scale**2
+    weighted = twice * power
+    return float(weighted.sum()) * scale, 2 * float(weighted @ power) / frames * scale**2
+
+
+@lru_cache(maxsize=64)
+def _halves(bins: int, even: bool) -> Array:
+    """Return how often each bin of a half spectrum stands in the whole one."""
+    twice = np.full(bins, 2.0)
+    twice[0] = 1.0
+    if even:
+        twice[-1] = 1.0
+    return twice

@@ -89,7 +89,7 @@ def export_votes(folder: Path, out: Path, *, personal: bool = False) -> None:
 def _shown(store: Store, manifest: Manifest, logs: list[dict[str, Any]]) -> Iterator[Shown]:
     """Yield every presentation with its vote and with how it was shown."""
     clips = {clip.stimulus: clip for clip in manifest.clips}
-    lab = current_setup(store).lab
+    lab = current_setup(store, manifest.session).lab
     by_place: dict[tuple[str, int], list[dict[str, Any]]] = {}
     for log in logs:
         by_place.setdefault((log["observer"], log["presentation"]), []).append(log)

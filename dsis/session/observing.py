@@ -71,7 +71,7 @@ class Observation:
         self._store, self._manifest, self._folder = store, manifest, folder
         self._say, self._clock_s, self._player = say, clock_s, player
         self._clips_kept = clips_kept
-        self._setup = current_setup(store)
+        self._setup = current_setup(store, manifest.session)
         self._clips: dict[str, PlayerClip] = {}
         self._showing: tuple[int, int, float] | None = None  # row, number, start in seconds
         self._shown: tuple[ClipLog, ...] = ()  # by a player of the server's

@@ -23,7 +23,7 @@ def add_to_panel(store: Store, manifest: Manifest, observer: str, seed: int) -> 
     """
     with store.transaction():
         mirrors = unpaired(store, seed)
-        hidden = current_setup(store).hidden_references
+        hidden = current_setup(store, manifest.session).hidden_references
         plan = draw_plan(manifest, observer, seed, mirrors=mirrors, hidden_references=hidden)
         store.add_observer(observer, plan, simulated=False)
         store.log("paired", observer=observer, mirrors=mirrors)

@@ -42,8 +42,8 @@ def plan_panel(
     manifest = read_manifest(folder)
     with open_store(folder, manifest) as store:
         if setup is not None:
-            put_in_force(store, setup)
-        hidden = current_setup(store).hidden_references
+            put_in_force(store, setup, manifest.session)
+        hidden = current_setup(store, manifest.session).hidden_references
         with store.transaction():
             if observer is None:
                 new = names_of_panel(store, manifest.session.observers)

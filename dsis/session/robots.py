@@ -113,8 +113,8 @@ def run_robots(folder: Path, observers: int, seed: int, setup: Setup | None = No
     energies = _energies(manifest, folder)
     with open_store(folder, manifest) as store:
         if setup is not None:
-            put_in_force(store, setup)
-        hidden = current_setup(store).hidden_references
+            put_in_force(store, setup, manifest.session)
+        hidden = current_setup(store, manifest.session).hidden_references
         for number in range(1, observers + 1):
             name = f"robot-{number:03d}"
             known = store.observer(name)

@@ -114,7 +114,7 @@ def serve(
         stack.enter_context(held(folder, observer))
         store = stack.enter_context(open_store(folder, manifest))
         if setup is not None:
-            put_in_force(store, setup)
+            put_in_force(store, setup, manifest.session)
         enrol(store, manifest, observer, resume=resume, seed=seed, say=say)
         address = f"{ADDRESS}:{listening.getsockname()[1]}"
         kept = clips_kept(manifest, available)

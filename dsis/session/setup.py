@@ -19,13 +19,14 @@ once somebody has a plan.
 import hashlib
 import json
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 from pydantic import Field
 
 from dsis.errors import InputError
 from dsis.model import Model, read_toml, structure
 from dsis.session.store import Store
+from dsis.spec import Session
 
 SCHEMA: Literal["dsis-session/1"] = "dsis-session/1"
 Positive = Annotated[float, Field(gt=0)]
@@ -64,9 +65,10 @@ class Setup(Model):
     lab
         Its name, a column of the votes; empty: none.
     hidden_references
-        Show every reference as a stimulus too.
+        Show every reference as a stimulus too; where the file says nothing, as the test's spec has
+        it.
     consent
-        What observers agree to before they begin; empty: they are not asked.
+        What observers agree to before they begin; empty: they are not asked. Likewise.
     instructions
         Shown instead of the page's own explanation; empty: that one.
     grade_words
@@ -89,6 +91,16 @@ class Setup(Model):
         """Hash of the text that is agreed to."""
         return hashlib.sha256(self.consent.encode()).hexdigest()
 
+    def completed(self, session: Session) -> Self:
+        """Return the set-up, what it does not say taken from the test's spec."""
+        said = self.model_fields_set
+        own = {
+            name: getattr(session, name)
+            for name in ("hidden_references", "consent")
+            if name not in said
+        }
+        return self.model_copy(update=own)
+
 
 def read_setup(path: Path, scale: tuple[int, int]) -> Setup:
     """Return the set-up in a file; raise `InputError` with all its faults."""
@@ -103,24 +115,25 @@ def read_setup(path: Path, scale: tuple[int, int]) -> Setup:
     return setup
 
 
-def current_setup(store: Store) -> Setup:
-    """Return the set-up that is in force; the default one where none was given."""
+def current_setup(store: Store, session: Session) -> Setup:
+    """Return the set-up that is in force; what the test's spec says where none was given."""
     kept = store.events("setup")
     if not kept:
-        return Setup()
+        return Setup().completed(session)
     return Setup.model_validate_json(json.dumps(kept[-1]["setup"]))
 
 
-def put_in_force(store: Store, setup: Setup) -> None:
-    """Keep a set-up in the store from now on.
+def put_in_force(store: Store, setup: Setup, session: Session) -> None:
+    """Keep a set-up in the store from now on, completed by the test's spec.
 
     Raises
     ------
     InputError
         It asks for other plans than those that observers have already.
     """
+    setup = setup.completed(session)
     with store.transaction():
-        before = current_setup(store)
+        before = current_setup(store, session)
         if setup.hidden_references != before.hidden_references and store.observers():
             fact = (
                 f"is {str(setup.hidden_references).lower()}, must stay "

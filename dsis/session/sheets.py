@@ -37,7 +37,7 @@ def write_sheets(folder: Path, out: Path) -> int:
         people = [known.observer for known in store.observers() if not known.simulated]
         if not people:
             raise InputError.of(store.path, "", "nobody has a plan yet: dsis session DIR --plan")
-        setup = current_setup(store)
+        setup = current_setup(store, manifest.session)
         rows = {name: store.rows(name) for name in people}
     with result_folder(out, TO_TYPE, keep=_not_ours) as partial:
         lines: list[tuple[object, ...]] = []

@@ -227,6 +227,8 @@ class Session(Model):
     training: Annotated[int, Field(ge=0)] = 4
     session_minutes_max: Positive = 30
     observers: Annotated[int, Field(ge=1)] = 18
+    hidden_references: bool = False
+    consent: str = ""
 
     @field_validator("scale")
     @classmethod

@@ -1,0 +1,131 @@
+"""The first pass over a frame: its change since the first frame, sums of lines, range of values."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsis.compiled import ROWS_PER_BLOCK, inlined, kernel, over_rows
+from dsis.measures.kernels import Frame, Sums
+
+_BLOCK = ROWS_PER_BLOCK
+_FAR = 2**40  # beyond every code
+
+
+class Passed(NamedTuple):
+    """What one pass over a frame found.
+
+    Attributes
+    ----------
+    by_row, by_column
+        Sums of the difference over columns (row, column parity), over rows (row parity, column).
+    squares
+        Sums of (difference - previous)^2 by phase.
+    whole
+        Whether all values are whole numbers.
+    lowest, highest
+        Of the whole numbers among the values.
+    """
+
+    by_row: Sums
+    by_column: Sums
+    squares: Sums
+    whole: bool
+    lowest: int
+    highest: int
+
+
+def first_pass(
+    frame: Frame, first: Frame, previous: Frame, difference: Frame, threads: int
+) -> Passed:
+    """Write frame - first to `difference` and return its sums; see `Passed`."""
+    rows, columns = frame.shape
+    blocks = -(-rows // _BLOCK)
+    by_row, by_column = np.empty((rows, 2)), np.zeros((blocks, 2, columns))
+    squares, limits = np.empty((blocks, 2, 2)), np.zeros((blocks, 3), np.int64)
+    limits[:, 1], limits[:, 2] = _FAR, -_FAR
+
+    def block(start: int, stop: int) -> None:
+        _first_pass(
+            frame, first, previous, difference, start, stop, by_row, by_column, squares, limits
+        )
+
+    over_rows(block, rows, threads)
+    broken, lowest, highest = _over_blocks(by_column, squares, limits)
+    return Passed(by_row, by_column[0], squares[0], not broken, lowest, highest)
+
+
+@kernel
+def _first_pass(
+    frame: Frame,
+    base: Frame,
+    previous: Frame,
+    difference: Frame,
+    first: int,
+    last: int,
+    by_row: Sums,
+    by_column: Sums,
+    squares: Sums,
+    limits: NDArray[np.int64],
+) -> None:
+    columns = frame.shape[1]
+    folded, changes = np.empty(columns), np.zeros((2, columns))
+    for y in range(first, last):
+        line, out, start, before = frame[y], difference[y], base[y], previous[y]
+        into, squared = by_column[y // _BLOCK, y & 1], changes[y & 1]
+        for x in range(columns):
+            out[x] = line[x] - start[x]
+        for x in range(columns):
+            into[x] += out[x]
+            folded[x] = out[x]
+        for x in range(columns):
+            change = np.float64(out[x] - before[x])
+            squared[x] += change * change
+        _fold(folded, by_row[y])
+        _take_limits(line, limits[y // _BLOCK])
+        if (y + 1) % _BLOCK == 0 or y + 1 == last:
+            for p in range(2):
+                _fold(changes[p], squares[y // _BLOCK, p])
+            changes[:] = 0
+
+
+@kernel
+def _over_blocks(by_column: Sums, squares: Sums, limits: NDArray[np.int64]) -> tuple[int, int, int]:
+    """Add up the blocks into the first; return their (not whole, lowest, highest)."""
+    broken, low, high = limits[0, 0], limits[0, 1], limits[0, 2]
+    for k in range(1, limits.shape[0]):
+        by_column[0] += by_column[k]
+        squares[0] += squares[k]
+        broken |= limits[k, 0]
+        low, high = min(low, limits[k, 1]), max(high, limits[k, 2])
+    return broken, low, high
+
+
+@inlined
+def _fold(line: Sums, out: Sums) -> None:
+    """Write the sums of the even and of the odd entries; halves are added until few are left."""
+    left = line.size
+    while left > 16:
+        half = (left + 3) // 4 * 2
+        for i in range(left - half):
+            line[i] += line[half + i]
+        left = half
+    even, odd = 0.0, 0.0
+    for i in range(left // 2):
+        even += line[2 * i]
+        odd += line[2 * i + 1]
+    if left & 1:
+        even += line[left - 1]
+    out[0], out[1] = even, odd
+
+
+@inlined
+def _take_limits(line: Frame, limits: NDArray[np.int64]) -> None:
+    """Widen (not whole, lowest, highest) by a line; the range is that of the whole numbers."""
+    odd, low, high = np.int64(0), limits[1], limits[2]
+    for x in range(line.size):
+        code = np.int64(np.int32(line[x]))
+        odd |= np.int64(np.float32(code) != line[x])  # also where it is not finite
+        low, high = min(low, code), max(high, code)
+    limits[0] |= odd
+    limits[1], limits[2] = low, high

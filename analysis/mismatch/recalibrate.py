@@ -133,7 +133,7 @@ def calibrate(
             layout, seen.levels, at, offsets, black_dn=start, left_out=left_out, slopes=slopes
         )
 
-    for _ in range(_ROUNDS if camera.effect else 1):
+    for _ in range(_ROUNDS if _bends(camera) else 1):
         recorded = _sum(undone, effects)
         fit = fitted(recorded, switches)
         if len(switches) == 1:
@@ -218,11 +218,20 @@ def _rounding(model: Model, layout: Layout, fit: BaseFit) -> Offsets:
     return Offsets(level, variance)
 
 
+def _bends(camera: Camera) -> bool:
+    """Return whether effects change levels or variances; of coarse codes that is known exactly."""
+    return any(
+        e.measures & {"level", "pixel_variance"}
+        for e in camera.effect
+        if not isinstance(e, Quantisation)
+    )
+
+
 def _effects(model: Model, layout: Layout, seed: int, jobs: int) -> Offsets:
     """Return what the camera's own effects add to level and variance, by simulation."""
+    if not _bends(model.camera):
+        return Offsets()
     codes = tuple(e for e in model.camera.effect if isinstance(e, Quantisation))
-    if len(codes) == len(model.camera.effect):
-        return Offsets()  # coarse codes are rounding, which is known exactly
     plain = model.with_camera(model.camera.model_copy(update={"effect": codes}))
     replicates = range(_REPLICATES)
     pairs = list(

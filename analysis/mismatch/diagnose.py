@@ -20,6 +20,7 @@ from analysis.mismatch.finding import (
 from analysis.mismatch.name import Named, Search
 from analysis.mismatch.observe import observe
 from analysis.mismatch.recalibrate import layout_of, parameter_errors
+from analysis.mismatch.remarks import remarks_on
 from analysis.mismatch.settle import would_settle
 from analysis.mismatch.source import Source
 from analysis.mismatch.split import Split
@@ -59,6 +60,7 @@ def find_mismatch(
     source = Source(recording)
     layout = layout_of(recording, development, source.frames)
     numbers = {e.name: e.numbers for e in layout.exposures}
+    remarks = remarks_on(recording, development, layout)
     seen = observe(layout, lambda name: source.frames(name, numbers[name]), keep=True)
     samples = sum(len(e.numbers) for e in layout.exposures) * layout.rows * layout.columns
     nulls, replicates = (8, 2) if samples > _LARGE else (16, 2)
@@ -70,7 +72,7 @@ def find_mismatch(
     trial = Trial.of(recording, split, seed)
     final, gains = _proven(search, search.settle(final), trial)
     proof = trial.proof(base, final, step, source)
-    return _finding(camera, base, final, search, gains, proof)
+    return replace(_finding(camera, base, final, search, gains, proof), remarks=remarks)
 
 
 def _proven(search: Search, final: State, trial: Trial) -> tuple[State, dict[str, Gain]]:

@@ -10,7 +10,7 @@ import numpy as np
 import scipy.stats
 from numpy.typing import NDArray
 
-from analysis.mismatch.basefit import BaseFit, Offsets, colour, fit_base
+from analysis.mismatch.basefit import CLIPPED_SHARE, BaseFit, Offsets, colour, fit_base
 from analysis.mismatch.finding import ParameterError
 from analysis.mismatch.model import Model, Sites, simulate
 from analysis.mismatch.observe import Layout, Level, Observation, Place, Taken, sites
@@ -18,9 +18,11 @@ from analysis.mismatch.rounding import rounded, unrounded
 from dsis.camera import BaseNoise, Camera, Segment
 from dsis.cfa import Cfa
 from dsis.effects.quantisation import Quantisation
+from dsis.errors import InputError
 from dsis.recording import Recording
 
 _ROUNDS = 3
+_LEAST_FRAMES = 2
 _REPLICATES = 3
 P_PARAMETERS = 0.004  # chance that numbers without error are called wrong
 _SWITCH_DEVIANCE = 12.0  # by which another gap must fit better before the switch is moved
@@ -72,25 +74,41 @@ def layout_of(
 ) -> Layout:
     """Return the layout of the frames `numbers`; two frames of each exposure set the weights.
 
-    `first(exposure, numbers)` gives frames. Exposures with fewer than two frames are left out.
+    `first(exposure, numbers)` gives frames. Exposures with fewer than two frames, with more than
+    0.1 % of a channel at the white level, or whose frames are copies are left out.
+
+    Raises
+    ------
+    InputError
+        Nothing is left.
     """
-    taken = tuple(
-        Taken(e.name, e.kind, e.exposure_time_s, e.light, tuple(numbers[e.name]))
-        for e in recording.exposures
-        if len(numbers.get(e.name, ())) >= 2
-    )
     sensor = recording.sensor
+    taken = []
     means: dict[Place, float] = {}
     variances: dict[Place, float] = {}
-    for e in taken:
-        a, b = (np.asarray(f, np.float32) for f in first(e.name, e.numbers[:2]))
+    step = 1 if sensor.cfa is Cfa.MONO else 2
+    for recorded in recording.exposures:
+        own = tuple(numbers.get(recorded.name, ()))
+        if len(own) < _LEAST_FRAMES:
+            continue
+        e = Taken(recorded.name, recorded.kind, recorded.exposure_time_s, recorded.light, own)
+        a, b = (np.asarray(f, np.float32) for f in first(e.name, own[:2]))
+        clipped = [
+            float((a[y::step, x::step] >= sensor.white_level).mean())
+            for y, x in sites(sensor.cfa).values()
+        ]
+        if max(clipped) > CLIPPED_SHARE or (a == b).all():
+            continue
+        taken.append(e)
         for channel, (y, x) in sites(sensor.cfa).items():
-            step = 1 if sensor.cfa is Cfa.MONO else 2
             one, two = a[y::step, x::step], b[y::step, x::step]
             means[e.name, channel] = float(one.mean() + two.mean()) / 2 - sensor.black_level
             spread = np.percentile(two - one, [15.865, 84.135])
             robust = float(spread[1] - spread[0]) ** 2 / 8
             variances[e.name, channel] = max(robust, 0.05)
+    if not any(e.kind != "scene" for e in taken):
+        fact = "holds no dark or flat of two different frames that are not clipped"
+        raise InputError.of(recording.folder, "exposure", fact)
     signal = {}
     for e in taken:
         for channel in sites(sensor.cfa):
@@ -100,7 +118,7 @@ def layout_of(
                 0.0 if e.kind == "dark" else max(means[e.name, channel] - ground, 0.0)
             )
     return Layout(
-        taken,
+        tuple(taken),
         recording.rows,
         recording.columns,
         sensor.cfa,

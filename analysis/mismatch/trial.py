@@ -19,6 +19,7 @@ from analysis.mismatch.split import Split
 from analysis.mismatch.state import State
 from analysis.mismatch.vector import vector
 from dsis.camera import Camera
+from dsis.errors import InputError
 from dsis.recording import Recording
 
 Array = NDArray[np.float64]
@@ -106,9 +107,10 @@ class Trial:
     def _gap(self, base: State, final: State, source: Source) -> float | None:
         signals = final.calibrated.model.signals
         both = {name: own for name, own in self.split.locked.items() if name in signals}
-        layout = layout_of(self.recording, both, source.frames)
-        if not any(e.kind != "scene" for e in layout.exposures):
-            return None
+        try:
+            layout = layout_of(self.recording, both, source.frames)
+        except InputError:
+            return None  # no exposure has two locked frames
         numbers = {e.name: e.numbers for e in layout.exposures}
         seen = observe(layout, lambda name: source.frames(name, numbers[name]))
         setting = base.setting

@@ -1,0 +1,45 @@
+"""What limits a diagnosis, in sentences."""
+
+from collections.abc import Mapping, Sequence
+
+from analysis.mismatch.observe import Layout
+from dsis.recording import Recording
+
+_SHOWN = 8
+
+
+def remarks_on(
+    recording: Recording, development: Mapping[str, Sequence[int]], layout: Layout
+) -> tuple[str, ...]:
+    """Return what a reader of the result must know of the frames that were used."""
+    used = {e.name for e in layout.uniform}
+    scenes = [e.name for e in recording.exposures if e.kind == "scene"]
+    unfit = [
+        e.name
+        for e in recording.exposures
+        if e.kind != "scene" and e.name in development and e.name not in used
+    ]
+    found = []
+    if unfit:
+        found.append(
+            f"{len(unfit)} exposure(s) are left out, clipped at the white level, of a single frame "
+            f"or of copies: {_listed(unfit)}."
+        )
+    if scenes:
+        found.append(f"{len(scenes)} exposure(s) of kind scene are not looked at.")
+    if not recording.of_kind("dark"):
+        found.append(
+            "There are no darks: the black level is the camera model's, offsets and dark current "
+            "cannot be told from it."
+        )
+    flats = [e for e in layout.uniform if e.kind == "flat"]
+    if flats and any(e.light is None for e in flats):
+        found.append(
+            "The light of some flats is unknown: their levels cannot show a bent response."
+        )
+    return tuple(found)
+
+
+def _listed(names: Sequence[str]) -> str:
+    more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
+    return ", ".join(names[:_SHOWN]) + more

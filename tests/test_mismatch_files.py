@@ -135,6 +135,7 @@ def evidence() -> Evidence:
     return Evidence(
         curves={"row_variance": (curve,)},
         maps={"gain_map": (Map("MONO", "1", image, image, image),)},
+        shown_in={"fixed_pixel_variance": Shown("gain_map")},
         spectra={"pooled": (Spectrum("MONO", power, power),)},
         row_spectra={"flat-1": (line,)},
         series={"flat-1": (means,), "dark": (means,)},
@@ -305,6 +306,23 @@ def test_a_fixed_pattern_is_shown_where_it_departs_most() -> None:
         found = pictures(replace(FOUND, mismatches=(one,), unexplained=(), evidence=seen))
         assert [picture.name for picture in found] == [drawn]
         found[0].draw(matplotlib.figure.Figure())
+
+
+@pytest.mark.parametrize(
+    ("z", "first"), [(20.0, "gain_map-smooth"), (4.0, "fixed_smooth_variance")]
+)
+def test_what_departs_most_comes_first(z: float, first: str) -> None:
+    levels = np.array([0.0, 100.0, 300.0])
+    curve = Curve("MONO", "signal_dn", levels, levels / 30, 0 * levels, None, 0 * levels + 1)
+    seen = Evidence(
+        curves={"fixed_smooth_variance": (curve,)},
+        maps={"gain_map": (Map("MONO", "%", np.ones((24, 32))),) * 2},
+        shown_in={"fixed_smooth_variance": Shown("gain_map", z=z)},
+    )
+    one = replace(LINE, statistic="fixed_smooth_variance")
+    found = pictures(replace(FOUND, mismatches=(one,), unexplained=(), evidence=seen))
+    assert found[0].name == first
+    assert len(found) == 2
 
 
 def test_curves_within_chance_stand_aside_for_a_better_picture() -> None:

@@ -23,13 +23,14 @@ from analysis.mismatch.pictures.natural import UNITS, Scale, back
 from analysis.mismatch.recalibrate import layout_of
 from analysis.mismatch.report import figures
 from analysis.mismatch.report.figures import pictures
+from analysis.mismatch.report.words import STATISTICS
 from analysis.mismatch.source import Source
 from analysis.mismatch.split import Split
 from analysis.mismatch.state import Setting, State
 from dsis.camera import BaseNoise, Camera, Segment
 from dsis.cfa import Cfa
 from dsis.effects import Effect, registry
-from dsis.measures import measure_exposure
+from dsis.measures import MEASURES, measure_exposure
 from dsis.recording import read_recording
 
 Array = NDArray[np.float64]
@@ -290,6 +291,11 @@ def test_channels_of_a_mosaic_are_drawn_apart(bare: Evidence) -> None:
     lags = bare.curves["line_correlation along rows"][0].x
     np.testing.assert_array_equal(lags % 2, 0)  # next pixel of a colour: two of the mosaic
     assert [s.channel for s in bare.row_spectra["high"]] == names
+
+
+def test_every_statistic_has_words(mono: Planted, bayer: Planted) -> None:
+    names = {key.statistic for one in (mono, bayer) for key in one.base.null.keys}
+    assert {*names, *MEASURES} <= STATISTICS.keys()
 
 
 @pytest.mark.parametrize("which", ["mono", "bayer"])

@@ -19,6 +19,7 @@ from analysis.mismatch.finding import (
 )
 from analysis.mismatch.name import Named, Search
 from analysis.mismatch.observe import observe
+from analysis.mismatch.pictures import Album, evidence_of
 from analysis.mismatch.recalibrate import layout_of, parameter_errors
 from analysis.mismatch.remarks import remarks_on
 from analysis.mismatch.settle import would_settle
@@ -61,18 +62,28 @@ def find_mismatch(
     layout = layout_of(recording, development, source.frames)
     numbers = {e.name: e.numbers for e in layout.exposures}
     remarks = remarks_on(recording, development, layout)
-    seen = observe(layout, lambda name: source.frames(name, numbers[name]), keep=True)
+    album = Album(layout)
+    seen = observe(layout, lambda name: source.frames(name, numbers[name]), album, keep=True)
     samples = sum(len(e.numbers) for e in layout.exposures) * layout.rows * layout.columns
     nulls, replicates = (8, 2) if samples > _LARGE else (16, 2)
     setting = Setting(layout, seen, split.interpolated, seed, jobs, nulls, replicates)
     base = State.of(setting, camera, step)
     words = VOCABULARY if vocabulary is None else vocabulary & VOCABULARY
-    search = Search(setting, camera, base, words, step)
+    search = Search(
+        setting,
+        camera,
+        base,
+        words,
+        step,
+        frames_of=lambda name: source.frames(name, numbers[name]),
+    )
     final = search.run()
     trial = Trial.of(recording, split, seed)
     final, gains = _proven(search, search.settle(final), trial)
     proof = trial.proof(base, final, step, source)
-    return replace(_finding(camera, base, final, search, gains, proof), remarks=remarks)
+    found = _finding(camera, base, final, search, gains, proof)
+    evidence = evidence_of(base, final, album, split)
+    return replace(found, remarks=(*remarks, *found.remarks), evidence=evidence)
 
 
 def _proven(search: Search, final: State, trial: Trial) -> tuple[State, dict[str, Gain]]:
@@ -113,8 +124,14 @@ def _finding(
         verdict = "parameters"
     tied = {one.kind: other.kind for pair in search.ties for one, other in (pair, pair[::-1])}
     undecided = tuple(
-        Alternative(kind, None, why, would_settle(kind, tied[kind]) if kind in tied else "")
+        Alternative(kind, None, search.refused[kind], would_settle(kind, other))
+        for kind, other in tied.items()
+        if kind in search.refused
+    )
+    considered = tuple(
+        f"Considered and not named: {kind}: {why}."
         for kind, why in search.refused.items()
+        if kind not in tied
     )
     return Finding(
         verdict,
@@ -125,7 +142,7 @@ def _finding(
         undecided,
         proof,
         final.camera,
-        (),
+        considered,
     )
 
 
@@ -134,7 +151,9 @@ def _omitted(named: Named, mismatches: tuple[Mismatch, ...], gain: Gain) -> Omit
     if named.proposal is not None:
         effect = named.proposal.effect
         for name, value in effect.model_dump(exclude={"kind"}).items():
-            if isinstance(value, (int, float)) and not isinstance(value, bool):
+            if isinstance(value, tuple):
+                parameters[name] = FittedParameter(value, 0.0)
+            elif isinstance(value, (int, float)) and not isinstance(value, bool):
                 error = named.errors.get(name, 0.0 if name not in named.proposal.free else np.inf)
                 parameters[name] = FittedParameter(float(value), error)
     else:

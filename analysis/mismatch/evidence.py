@@ -33,6 +33,8 @@ class Curve:
     z_before, z_after
         Departures from each model in standard deviations, as the search judged them; None: what
         `sd` makes of the departures.
+    sd_after
+        The standard deviation when the model with the physics named is right.
     """
 
     channel: str
@@ -45,6 +47,7 @@ class Curve:
     unit: str = ""
     z_before: Array | None = None
     z_after: Array | None = None
+    sd_after: Array | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,10 +72,11 @@ class Map:
 
 @dataclass(frozen=True)
 class Shown:
-    """In which map a statistic of fixed patterns departs most, and along which axis."""
+    """In which map a statistic of fixed patterns departs most, how far, and along which axis."""
 
     map: str
     axis: Literal["", "rows", "columns"] = ""
+    z: float = float("inf")
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,7 +143,10 @@ class Series:
 
 @dataclass(frozen=True, eq=False)
 class Histogram:
-    """How often each code occurs, from `lowest` on; `before`, `after`: as each model has it."""
+    """How often each code occurs, from `lowest` on; `before`, `after`: as each model has it.
+
+    Simulated converters are others of the same statistics.
+    """
 
     channel: str
     lowest: int
@@ -160,7 +167,7 @@ class Evidence:
         By `offset_map`, `gain_map`, `time_map`, `variance_map`; `offset_alone_map` and
         `gain_alone_map`: as if there were no other.
     shown_in
-        Which of them shows a statistic best.
+        Which of them shows a statistic best; absent: none, single exposures do.
     spectra, row_spectra, column_spectra, series, codes
         By exposure, or `pooled` over all; row spectra: of row means along columns.
     signal_dn

@@ -8,7 +8,7 @@ from analysis.mismatch.finding import Finding
 from analysis.mismatch.jsonfile import write_json
 from analysis.mismatch.report import write_page
 from analysis.mismatch.report.sentences import fitted
-from analysis.photon_transfer.files import _tables as camera_tables
+from analysis.photon_transfer.files import camera_tables
 from dsis.camera import camera_values
 from dsis.outdir import UNFINISHED, result_folder
 from dsis.simulate.maps import MAPS, SensorMaps, write_maps

@@ -14,7 +14,7 @@ from analysis.mismatch.vector import Vector
 
 Array = NDArray[np.float64]
 FAMILY = 0.006  # chance of any mismatch in a recording that differs in nothing
-_SUMS = 0.7  # of it, for sums over exposures or channels
+SUMS = 0.7  # of it, for sums over exposures or channels
 _ROOTS = 2e-3  # of a ratio: 0.6 % of the finer mean square
 _FLOORS = {
     "pixel_variance": 1e-3,
@@ -53,8 +53,8 @@ def tested(null: Null, seen: Vector) -> tuple[Array, Array]:
     summed = np.array([not key.exposure and key.scope == "contrast" for key in null.keys])
     weights = np.where(
         summed,
-        _SUMS / max((known & summed).sum(), 1),
-        (1 - _SUMS) / max((known & ~summed).sum(), 1),
+        SUMS / max((known & summed).sum(), 1),
+        (1 - SUMS) / max((known & ~summed).sum(), 1),
     )
     chances[known] = adjusted(null.chances(z[known]), weights[known])
     return z, chances

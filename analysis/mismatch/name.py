@@ -7,6 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.candidates import Proposal
+from analysis.mismatch.observe import Frames
+from analysis.mismatch.phase import keeps_phase
 from analysis.mismatch.polish import polish, with_effects
 from analysis.mismatch.predict import Predictor
 from analysis.mismatch.rank import Ranked, ranked
@@ -20,8 +22,13 @@ Array = NDArray[np.float64]
 Step = Callable[[], None]
 LEAST_GAIN = 5.0  # of log-likelihood, for an effect to be taken in
 _TIE = 2.0  # of log-likelihood: two effects nearer than that cannot be told apart
+_ALIKE = 0.5  # cosine of what two effects change, from which they are rivals
 _MOST_EFFECTS = 5
 _CLEAR = 3.0  # departures below are chance
+_PHASES = {
+    "periodic_noise": "the pattern's phase is the same in all frames but for its sign",
+    "bistable_pattern": "the pattern's phase is another in every frame",
+}
 _RESOLVED = 0.7  # share of what an effect touches that it must explain
 
 
@@ -63,6 +70,7 @@ class Search:
     named: list[Named] = field(default_factory=list)
     refused: dict[str, str] = field(default_factory=dict)
     ties: list[tuple[Ranked, Ranked]] = field(default_factory=list)
+    frames_of: Frames | None = None
 
     def run(self) -> State:
         """Return the final state."""
@@ -118,7 +126,7 @@ class Search:
     def _best(self, state: State) -> tuple[Named, Camera] | None:
         """Return the effect that explains most, and the camera with it."""
         left = self.vocabulary - {n.kind for n in self.named} - set(self.refused)
-        fitted = self._decided(ranked(state, left, self.step))
+        fitted = self._decided(state, ranked(state, left, self.step))
         off = {m.statistic for m in state.mismatches}
         path = second_path(state) if "dual_gain" in left and "pixel_variance" in off else None
         most = fitted[0].gain if fitted else 0.0
@@ -139,15 +147,33 @@ class Search:
         effect = Proposal(best.polished.effects[0], best.proposal.free, best.proposal.signed)
         return Named(best.kind, effect, best.polished.errors[0], best.gain, rivals), camera
 
-    def _decided(self, fitted: list[Ranked]) -> list[Ranked]:
-        """Put aside pairs that tie: neither is claimed."""
-        while len(fitted) > 1 and fitted[1].gain > max(fitted[0].gain - _TIE, LEAST_GAIN):
+    def _decided(self, state: State, fitted: list[Ranked]) -> list[Ranked]:
+        """Put aside pairs that tie over the same numbers: neither is claimed."""
+        fitted = self._phased(fitted)
+        while (
+            len(fitted) > 1
+            and fitted[1].gain > max(fitted[0].gain - _TIE, LEAST_GAIN)
+            and _alike(state, fitted[0], fitted[1])
+        ):
             first, second = fitted[:2]
             self.ties.append((first, second))
             for one, other in ((first, second), (second, first)):
                 self.refused[one.kind] = f"explains the recording no better than {other.kind}"
             fitted = fitted[2:]
         return fitted
+
+    def _phased(self, fitted: list[Ranked]) -> list[Ranked]:
+        """Keep interference or a bistable pattern, alike in power, as the phases say."""
+        patterns = [one for one in fitted if one.kind in _PHASES]
+        if not patterns or self.frames_of is None:
+            return fitted
+        frequency = patterns[0].polished.effects[0].frequency  # type: ignore[attr-defined] # both have one
+        kept = keeps_phase(self.setting.layout, self.frames_of, frequency)
+        if kept is None:
+            return fitted
+        wrong = "periodic_noise" if kept else "bistable_pattern"
+        self.refused[wrong] = _PHASES[wrong]
+        return [one for one in fitted if one.kind != wrong]
 
     def _polished(self, state: State) -> State:
         """Fit the parameters of all effects together, and judge the result once more."""
@@ -189,6 +215,17 @@ class Search:
             if worst is None:
                 return state
             state = self.drop(state, worst[1], worst[2])
+
+
+def _alike(state: State, one: Ranked, other: Ranked) -> bool:
+    """Return whether two effects change the same numbers in the same way."""
+    null = state.null
+    a, b = (
+        np.where(null.known, np.nan_to_num((r.polished.mean - null.mean) / null.sd), 0.0)
+        for r in (one, other)
+    )
+    size = float(np.linalg.norm(a) * np.linalg.norm(b))
+    return size > 0 and float(a @ b) / size > _ALIKE
 
 
 def _bent(base: State, final: State) -> Array:

@@ -13,7 +13,7 @@ from analysis.mismatch.bank.common import common
 from analysis.mismatch.bank.maps import PatternSums, Regressors, parts
 from analysis.mismatch.bank.scalars import Number, scalars
 from dsis.cfa import Cfa, pattern
-from dsis.measures import Accumulator, Measured
+from dsis.measures import Accumulator, Channel, Measured
 
 Array = NDArray[np.float64]
 Frames = Callable[[str], Iterable[NDArray[np.generic]]]
@@ -168,7 +168,7 @@ class Observation:
     common: Mapping[str, Mapping[str, Number]] = field(default_factory=dict)
 
 
-def measure(layout: Layout, exposure: Taken, frames: Iterable[NDArray[np.generic]]) -> Measured:
+def measure(layout: Layout, frames: Iterable[NDArray[np.generic]]) -> Measured:
     """Return the measures of one exposure's frames."""
     sums = Accumulator(layout.rows, layout.columns, layout.cfa, layout.black_dn, layout.white_dn)
     for frame in frames:
@@ -183,6 +183,29 @@ class _Channel:
         self.patterns = PatternSums(regressors, shape)
         self.variances = VarianceSums(shape)
         self.spectra = SpectrumSums(shape)
+
+    def add(
+        self, exposure: str, channel: Channel, frames: int, variance_dn2: float, signal_dn: float
+    ) -> None:
+        """Take one exposure; the variance and signal that are expected weigh it."""
+        pixel = channel.estimates["pixel_variance"].value
+        self.patterns.add(exposure, channel.mean_frame, pixel, frames)
+        if frames > 2:
+            self.variances.add(channel.variance_map, (frames - 1) / variance_dn2)
+        self.spectra.add(channel, frames, variance_dn2, signal_dn)
+
+    def pooled(self) -> dict[str, Number]:
+        """Return the numbers of spectra and persistent variances."""
+        return {**self.variances.numbers(), **self.spectra.numbers()}
+
+    def peaks(self) -> list[tuple[str, Peak]]:
+        """Return where the spectra are largest."""
+        found = (
+            ("spectrum", self.spectra.peak()),
+            ("rows", self.spectra.row_peak("")),
+            ("rows of light", self.spectra.row_peak("signal")),
+        )
+        return [(kind, peak) for kind, peak in found if peak is not None]
 
 
 def observe(
@@ -206,7 +229,7 @@ def observe(
     sums: dict[str, _Channel] = {}
     together: dict[str, Mapping[str, Number]] = {}
     for exposure in layout.uniform:
-        measured = measure(layout, exposure, frames_of(exposure.name))
+        measured = measure(layout, frames_of(exposure.name))
         if watch is not None:
             watch(exposure.name, measured)
         frames = len(exposure.numbers)
@@ -215,29 +238,14 @@ def observe(
             together[exposure.name] = common(measured.channels, signals, frames, layout.sites)
         for name, channel in measured.channels.items():
             place = (exposure.name, name)
-            shape = channel.mean_frame.shape
-            estimates = channel.estimates
-            levels[place] = Level(
-                estimates["level"].value,
-                estimates["level"].null_error,
-                estimates["pixel_variance"].value,
-                (frames - 1) * (shape[0] - 1) * (shape[1] - 1),
-                channel.clipped_low,
-                channel.clipped_high,
-                shape[0] * shape[1],
-            )
+            levels[place] = _level(channel, frames)
             found[place] = scalars(channel, frames)
             if name not in sums:
-                sums[name] = _Channel(layout.regressors(name), (shape[0], shape[1]))
-            own, variance = sums[name], layout.variance_dn2[place]
-            pixel = estimates["pixel_variance"].value
-            own.patterns.add(exposure.name, channel.mean_frame, pixel, frames)
-            if frames > 2:
-                own.variances.add(channel.variance_map, (frames - 1) / variance)
-            own.spectra.add(channel, frames, variance, layout.signal_dn[place])
+                n, m = channel.mean_frame.shape
+                sums[name] = _Channel(layout.regressors(name), (n, m))
+            variance, signal = layout.variance_dn2[place], layout.signal_dn[place]
+            sums[name].add(exposure.name, channel, frames, variance, signal)
     maps: dict[tuple[str, str], Mapping[str, Number]] = {}
-    pooled: dict[str, Mapping[str, Number]] = {}
-    peaks: dict[tuple[str, str], Peak] = {}
     images: dict[tuple[str, str], tuple[Array, float]] = {}
     for name, own in sums.items():
         for kind, (image, noise) in own.patterns.maps().items():
@@ -246,12 +254,26 @@ def observe(
                 images[name, kind] = (image, noise)
         if keep:
             images[name, "variance"] = (own.variances.total, own.variances.squares**0.5)
-        pooled[name] = {**own.variances.numbers(), **own.spectra.numbers()}
-        for kind, peak in (
-            ("spectrum", own.spectra.peak()),
-            ("rows", own.spectra.row_peak("")),
-            ("rows of light", own.spectra.row_peak("signal")),
-        ):
-            if peak is not None:
-                peaks[name, kind] = peak
-    return Observation(levels, found, maps, pooled, peaks, images, together)
+    return Observation(
+        levels,
+        found,
+        maps,
+        {name: own.pooled() for name, own in sums.items()},
+        {(name, kind): peak for name, own in sums.items() for kind, peak in own.peaks()},
+        images,
+        together,
+    )
+
+
+def _level(channel: Channel, frames: int) -> Level:
+    rows, columns = channel.mean_frame.shape
+    estimates = channel.estimates
+    return Level(
+        estimates["level"].value,
+        estimates["level"].null_error,
+        estimates["pixel_variance"].value,
+        (frames - 1) * (rows - 1) * (columns - 1),
+        channel.clipped_low,
+        channel.clipped_high,
+        rows * columns,
+    )

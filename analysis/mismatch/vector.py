@@ -1,6 +1,6 @@
 """The bank's numbers of one observation in one fixed order."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf, log, nan, sqrt
 
@@ -14,6 +14,7 @@ from analysis.mismatch.basefit import CLIPPED_SHARE, BaseFit, colour
 from analysis.mismatch.observe import Layout, Observation, Place
 
 Array = NDArray[np.float64]
+_SAME = 0.98  # cosine from which two shapes are one
 RELATIVE_LIGHT = 3e-5  # light is stated, and a lamp is stable, no better than this
 RELATIVE_RATIO = 3e-5
 
@@ -100,11 +101,11 @@ def _ratio(name: str, seen: Observation, fit: BaseFit) -> Number:
 
 
 SHAPES: Mapping[str, Callable[[float, float], float]] = {
-    "at all levels": lambda s, v: 1.0,
-    "constant": lambda s, v: 1 / v,
+    "at all levels": lambda _s, _v: 1.0,
+    "constant": lambda _s, v: 1 / v,
     "with the signal": lambda s, v: s / v,
     "with the signal squared": lambda s, v: s**2 / v,
-    "with the signal alone": lambda s, v: s,
+    "with the signal alone": lambda s, _v: s,
 }
 
 
@@ -126,41 +127,14 @@ class Contrasts:
 
 def contrasts(layout: Layout, reference: Vector, known: NDArray[np.bool_]) -> Contrasts:
     """Return the contrasts over the numbers of single exposures that are known."""
-    places: dict[tuple[str, str], list[int]] = {}
-    for i, key in enumerate(reference.keys):
-        if key.scope == MOSAIC and known[i]:
-            places.setdefault((key.statistic, MOSAIC), []).append(i)
-        if key.scope == "exposure" and known[i] and key.statistic not in OF_CODES:
-            places.setdefault((key.statistic, ""), []).append(i)
-            if key.statistic in _PAIRS:
-                places.setdefault((_PAIRS[key.statistic], BOTH), []).append(i)
-            if key.channel not in ("", "MONO") and key.statistic in _BY_CHANNEL:
-                places.setdefault((key.statistic, key.channel), []).append(i)
     keys: list[Key] = []
     rows: list[Array] = []
-    for (statistic, channel), which in places.items():
-        if len(which) < 2:
-            continue
-        kept: list[Array] = []
-        for name, shape in SHAPES.items():
-            if channel in (BOTH, MOSAIC) and name == "with the signal alone":
-                continue
-            if statistic in OF_MEAN_FRAMES and name == "with the signal alone":
-                continue
-            row = np.zeros(len(reference.keys))
-            for i in which:
-                place = (reference.keys[i].exposure, reference.keys[i].channel)
-                place = place if place in layout.signal_dn else (place[0], "Gr")
-                s, v = max(layout.signal_dn[place], 0.0), layout.variance_dn2[place]
-                row[i] = shape(s, v) / reference.errors[i]
-            size = float(np.linalg.norm(row))
-            if size == 0:
-                continue
-            row /= size
-            if any(abs(float(row @ other)) > 0.98 for other in kept):
-                continue
-            kept.append(row)
-            joint = channel in (BOTH, MOSAIC)
+    for (statistic, channel), which in _groups(reference, known).items():
+        joint = channel in (BOTH, MOSAIC)
+        shapes = dict(SHAPES)
+        if joint or statistic in OF_MEAN_FRAMES:
+            del shapes["with the signal alone"]
+        for name, row in _shaped(layout, reference, which, shapes):
             detail = f"{name} {channel}" if joint else name
             keys.append(Key(statistic, "contrast", "", "" if joint else channel, detail))
             rows.append(row)
@@ -170,6 +144,48 @@ def contrasts(layout: Layout, reference: Vector, known: NDArray[np.bool_]) -> Co
         keys.append(Key(statistic, "contrast", "", "", f"{scope} {detail}".strip()))
         rows.append(row)
     return Contrasts(tuple(keys), np.array(rows).reshape(len(rows), len(reference.keys)))
+
+
+def _groups(reference: Vector, known: NDArray[np.bool_]) -> dict[tuple[str, str], list[int]]:
+    """Return which numbers are summed: by statistic, and by channel or what is put together."""
+    groups: dict[tuple[str, str], list[int]] = {}
+    for i, key in enumerate(reference.keys):
+        names = []
+        if key.scope == MOSAIC and known[i]:
+            names = [(key.statistic, MOSAIC)]
+        elif key.scope == "exposure" and known[i] and key.statistic not in OF_CODES:
+            names = [(key.statistic, "")]
+            if key.statistic in _PAIRS:
+                names.append((_PAIRS[key.statistic], BOTH))
+            if key.channel not in ("", "MONO") and key.statistic in _BY_CHANNEL:
+                names.append((key.statistic, key.channel))
+        for name in names:
+            groups.setdefault(name, []).append(i)
+    return {name: which for name, which in groups.items() if len(which) > 1}
+
+
+def _shaped(
+    layout: Layout,
+    reference: Vector,
+    which: Sequence[int],
+    shapes: Mapping[str, Callable[[float, float], float]],
+) -> Iterator[tuple[str, Array]]:
+    """Yield unit rows of the shapes that differ from those before."""
+    kept: list[Array] = []
+    for name, shape in shapes.items():
+        row = np.zeros(len(reference.keys))
+        for i in which:
+            place = (reference.keys[i].exposure, reference.keys[i].channel)
+            place = place if place in layout.signal_dn else (place[0], "Gr")
+            s, v = max(layout.signal_dn[place], 0.0), layout.variance_dn2[place]
+            row[i] = shape(s, v) / reference.errors[i]
+        size = float(np.linalg.norm(row))
+        if size == 0:
+            continue
+        row /= size
+        if all(abs(float(row @ other)) <= _SAME for other in kept):
+            kept.append(row)
+            yield name, row
 
 
 def _over_channels(

@@ -82,10 +82,10 @@ def camera_text(fit: Fit, origin: str = "") -> str:
     ]
     comments += fit.remarks
     head = "".join(f"# {line}\n" for line in comments)
-    return head + _tables(camera_values(fit.camera))
+    return head + camera_tables(camera_values(fit.camera))
 
 
-def _tables(values: dict[str, Any]) -> str:
+def camera_tables(values: dict[str, Any]) -> str:
     """Return camera.toml with a table per segment and effect, so that more can be appended.
 
     What a fit cannot know (white balance, matrix) is left out where it is the default.

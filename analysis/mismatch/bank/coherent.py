@@ -62,7 +62,7 @@ class VarianceSums:
 
 @dataclass(frozen=True)
 class Peak:
-    """The largest bin of a spectrum: cycles per pixel of the plane along x and y, and its height."""
+    """The largest bin of a spectrum: cycles per pixel of the plane along x and y, its height."""
 
     fx: float
     fy: float

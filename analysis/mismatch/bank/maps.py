@@ -1,8 +1,8 @@
 """Fixed patterns over all exposures: an offset, a gain and a map that grows with exposure time.
 
 The mean frames of all exposures are regressed, pixel by pixel, on 1, signal and exposure time. The
-noise of each map is known from the pixel variances, so a map in units of its noise has mean square 1
-where the sensor has no pattern; what single exposures hide stands out of the sum.
+noise of each map is known from the pixel variances, so a map in units of its noise has a mean
+square of 1 where the sensor has no pattern; what single exposures hide stands out of the sum.
 """
 
 from collections.abc import Mapping, Sequence

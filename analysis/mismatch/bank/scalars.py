@@ -5,7 +5,7 @@ chi-squared^(1/3) is normal, var 2 / (9 dof)); largest values by the normal scor
 """
 
 from collections.abc import Mapping
-from math import exp, inf, isfinite, log, nan, pi, sqrt
+from math import exp, inf, isfinite, log, log2, nan, pi, sqrt
 
 import numpy as np
 import scipy.special
@@ -76,7 +76,7 @@ def scalars(channel: Channel, frames: int) -> dict[str, Number]:
 
 
 def ratio_root(ratio: float, dof: float, dof_of_finer: float = inf) -> Number:
-    """Return the cube root of a ratio of mean squares, and its standard deviation where both are one."""
+    """Return the cube root of a ratio of mean squares, and its standard deviation about one."""
     if not isfinite(ratio) or dof <= 0:
         return UNKNOWN
     return float(np.cbrt(ratio)), sqrt(2 / (9 * dof) + 2 / (9 * dof_of_finer))
@@ -144,7 +144,7 @@ def _spread(found: Estimate, frames: int) -> Number:
 
 
 def _spacing(found: Estimate) -> Number:
-    return (log(found.value, 2), _CODE_SD) if found.known else UNKNOWN
+    return (log2(found.value), _CODE_SD) if found.known else UNKNOWN
 
 
 def _peak(found: Estimate) -> Number:

@@ -50,6 +50,8 @@ def _scale(squares: Image, other: Image) -> float:
     Huber's second proposal: the cut squares of both, each in its own scale, have equal means.
     """
     size = float(other.mean())
+    if not size > 0:
+        return 1.0  # codes that never move: no scale to compare with
     wanted = float(np.minimum(other, _CUT * size).mean()) / size
     scale = float(squares.mean())
     for _ in range(_ROUNDS):

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from itertools import pairwise
+from math import isfinite
 
 import numpy as np
 
@@ -29,7 +30,7 @@ def verdict(finding: Finding) -> tuple[str, ...]:
             said = ["The physics is complete; its numbers are off."]
         case "omitted_physics":
             names = joined(_effect_in_short(e) for e in finding.omitted_physics)
-            said = [f"The camera model leaves out {names}."]
+            said = [f"The camera model leaves out {names}.", *unproven(finding)]
         case "unexplained":
             said = ["Something differs, and no effect of the vocabulary is proven to explain it."]
     if finding.parameter_errors:
@@ -89,7 +90,29 @@ def gain(found: Gain | None) -> str:
     """Return a held-out gain with its interval, nats per frame."""
     if found is None:
         return plain(None)
+    if not all(map(isfinite, found.ci95)):
+        return f"{plain(found.nats_per_frame)}, not proven"
     return f"{plain(found.nats_per_frame)} ({interval(*found.ci95)})"
+
+
+def unproven(finding: Finding) -> list[str]:
+    """Return sentences on named effects whose gain is not known, or is not sure to be one."""
+    unknown, weak = [], []
+    for effect in finding.omitted_physics:
+        low, high = effect.heldout_gain.ci95
+        if not (isfinite(low) and isfinite(high)):
+            unknown.append(effect_words(effect.effect))
+        elif low <= 0:
+            weak.append(effect_words(effect.effect))
+    said = []
+    if unknown:
+        said.append(f"Not proven, for lack of locked frames that tell: {joined(unknown)}.")
+    if weak:
+        said.append(
+            f"Weakly proven: {joined(weak)}. The 95 % interval of the gain per locked frame "
+            "reaches zero; only the locked frames together speak for it."
+        )
+    return said
 
 
 def because(effect: OmittedEffect) -> str:

@@ -29,6 +29,7 @@ STATISTICS = {
     "frame_correlation": "correlation with the next frame",
     "variance_spread": "spread of the noise over pixels",
     "variance_persistence": "pixels noisy at every exposure",
+    "noisy_pixels": "few pixels far noisier",
     "outlying_pixels": "few pixels far out",
     "one_off_outliers": "single spikes",
     "code_spacing": "step between the codes that occur",

@@ -5,28 +5,43 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TypeVar
+from typing import Literal, TypeVar
 
 import matplotlib as mpl
+import numpy as np
 from matplotlib.figure import Figure
 
 from analysis.figures import STYLE
-from analysis.mismatch.evidence import Evidence
+from analysis.mismatch.evidence import Array, Evidence, Histogram, Map, Shown
 from analysis.mismatch.finding import Finding, Mismatch
-from analysis.mismatch.report.figures import codes, curves, ladder, maps, series, spectra
+from analysis.mismatch.report.figures import (
+    codes,
+    curves,
+    ladder,
+    maps,
+    pixels,
+    profiles,
+    series,
+    spectra,
+)
 from analysis.mismatch.report.sentences import strongest
 from analysis.mismatch.report.words import parted, statistic_words
 
 MOST = 12  # pictures on a page
-OFFSET = frozenset({"dsnu", "row_fpn", "column_fpn"})
-TIME = frozenset({"hot_pixels", "dark_current", "amp_glow"})
-MAPPED = ("fixed_", "half_seam", "parity", "channel_ratio", "pattern_growth", "outlying_pixels")
-NOISY_PIXELS = frozenset({"variance_spread", "variance_persistence", "one_off_outliers"})
+MAPPED = ("fixed_", "half_seam", "parity", "outlying_pixels")
+AXES = {"fixed_row_variance": "rows", "fixed_column_variance": "columns"}
+GROUPS: Mapping[str, profiles.Groups] = {"half_seam": "halves", "parity": "parity"}
+NOISY_PIXELS = frozenset(
+    {"variance_spread", "variance_persistence", "noisy_pixels", "one_off_outliers"}
+)
 OFF_AXIS = frozenset({"spectral_peak", "phase"})
 OF_CODES = frozenset({"code_spacing", "code_imbalance"})
+MANY_PIXELS = frozenset({"fixed_pixel_variance"})
+VARIANCE = "pixel_variance"
 _EXPOSURES = 3  # panels of frame means
 
 Size = tuple[float, float]
+Look = Literal["", "smooth", "pixels"]
 Part = TypeVar("Part")
 
 
@@ -76,6 +91,7 @@ def save(picture: Picture, folder: Path) -> bytes:
         svg, png = (folder / f"{picture.name}.{end}" for end in ("svg", "png"))
         title = picture.title
         figure.savefig(svg, metadata={"Date": None, "Creator": "dsis", "Title": title}, dpi=200)
+        figure.set_layout_engine("none")  # it is laid out
         figure.savefig(png, metadata={"Software": "dsis", "Title": title}, dpi=200)
     return svg.read_bytes()
 
@@ -94,9 +110,54 @@ def _in_turn(finding: Finding) -> Iterator[Mismatch]:
 def _of(m: Mismatch, evidence: Evidence) -> Iterator[Picture]:
     """Yield the pictures that show a mismatch, as far as there is evidence for them."""
     name = parted(m.statistic)[0]
+    beside = [*_patterns(m, name, evidence), *_spectrum(m, name, evidence)]
+    beside += _of_frames(m, name, evidence)
+    drawn, largest = _curves(m, name, evidence, needed=not beside)
+    shown = evidence.shown_in.get(m.statistic)
+    # A pattern of every pixel looks like noise: how it grows says more than its map.
+    first = name in MANY_PIXELS or (shown is not None and largest > shown.z)
+    yield from (*drawn, *beside) if first else (*beside, *drawn)
+
+
+def _curves(
+    m: Mismatch, name: str, evidence: Evidence, *, needed: bool
+) -> tuple[list[Picture], float]:
+    """Return the curves that leave the band of chance; if one is `needed`, at least the best.
+
+    And the largest departure in them.
+    """
+    found = []
+    for stored in _curve_names(m, name, evidence):
+        some = evidence.curves[stored]
+        how = curves.draw_transfer if stored == VARIANCE else curves.draw
+        draw = partial(how, curves=some, threshold_z=evidence.threshold_z)
+        one = Picture(stored, statistic_words(stored), (m,), curves.SIZE_INCHES, draw)
+        found.append((max(curves.largest_z(curve) for curve in some), one))
+    largest = max((z for z, _ in found), default=0.0)
+    least = min(largest, evidence.threshold_z) if needed else evidence.threshold_z
+    return [one for z, one in found if z >= least], largest
+
+
+def _patterns(m: Mismatch, name: str, evidence: Evidence) -> Iterator[Picture]:
+    if name in NOISY_PIXELS:
+        yield from _map(m, "variance_map", evidence, "pixels")
+    elif name.startswith(MAPPED) and m.statistic in evidence.shown_in:
+        yield from _pattern(m, name, evidence.shown_in[m.statistic], evidence)
+
+
+def _of_frames(m: Mismatch, name: str, evidence: Evidence) -> Iterator[Picture]:
     words = statistic_words(m.statistic)
-    if name.startswith(MAPPED) or name in NOISY_PIXELS:
-        yield from _map(m, name, evidence)
+    if name == "frame_variance" and evidence.series:
+        draw = partial(series.draw, shown=_some(m, evidence.series))
+        yield Picture("frame-means", words, (m,), series.SIZE_INCHES, draw)
+    if name in OF_CODES and evidence.codes:
+        key = _oddest(m, evidence.codes)
+        draw = partial(codes.draw, histograms=evidence.codes[key])
+        yield Picture(f"codes-{key}", f"{words}: {key}", (m,), codes.SIZE_INCHES, draw)
+
+
+def _spectrum(m: Mismatch, name: str, evidence: Evidence) -> Iterator[Picture]:
+    words = statistic_words(m.statistic)
     if name in OFF_AXIS and evidence.spectra:
         key, parts = _at(m, evidence.spectra)
         draw = partial(spectra.draw, spectra=parts, where=m.where)
@@ -110,55 +171,82 @@ def _of(m: Mismatch, evidence: Evidence) -> Iterator[Picture]:
             draw = partial(spectra.draw_lines, spectra=lines, where=m.where, axis=axis)
             size = spectra.LINE_SIZE_INCHES
             yield Picture(f"{stem}-spectrum-{key}", words, (m,), size, draw)
-    if name == "frame_variance" and evidence.series:
-        shown = _some(m, evidence.series)
-        stem = "frame-means"
-        yield Picture(stem, words, (m,), series.SIZE_INCHES, partial(series.draw, shown=shown))
-    if name in OF_CODES and evidence.codes:
-        key, counted = _at(m, evidence.codes)
-        draw = partial(codes.draw, histograms=counted)
-        yield Picture(f"codes-{key}", words, (m,), codes.SIZE_INCHES, draw)
-    for stored_name in dict.fromkeys((m.statistic, name)):
-        if evidence.curves.get(stored_name):
-            drawn = evidence.curves[stored_name]
-            draw = partial(curves.draw, curves=drawn, threshold_z=evidence.threshold_z)
-            yield Picture(stored_name, statistic_words(stored_name), (m,), curves.SIZE_INCHES, draw)
-            break
 
 
-def _map(m: Mismatch, name: str, evidence: Evidence) -> Iterator[Picture]:
-    for wanted in _map_names(m, name):
-        parts = evidence.maps.get(wanted, ())
-        channel = m.where.channel
-        parts = tuple(p for p in parts if p.channel == channel) or parts
+def _pattern(m: Mismatch, name: str, shown: Shown, evidence: Evidence) -> Iterator[Picture]:
+    """Yield the picture of a fixed pattern: of lines their means, of a surface a smoothed map."""
+    axis = AXES.get(name) or shown.axis
+    if axis and (name in AXES or name in GROUPS):
+        parts = _parts(m, shown.map, evidence)
         if parts:
-            stem = wanted if len(parts) > 1 or channel is None else f"{wanted}-{channel}"
-            title = f"{statistic_words(m.statistic)}: {wanted.replace('_', ' ')}"
-            draw = partial(maps.draw, maps=parts, where=m.where)
-            yield Picture(stem, title, (m,), maps.size_inches(parts), draw)
+            groups = GROUPS.get(name, "")
+            draw = partial(profiles.draw, maps=parts, axis=axis, groups=groups)
+            stem = "-".join(part for part in (shown.map, axis, groups) if part)
+            yield Picture(stem, _title(m, shown.map), (m,), profiles.size_inches(parts), draw)
+    else:
+        looks: dict[str, Look] = {"fixed_smooth_variance": "smooth"}
+        looks |= dict.fromkeys(MANY_PIXELS | {"outlying_pixels"}, "pixels")
+        yield from _map(m, shown.map, evidence, looks.get(name, ""))
 
 
-def _map_names(m: Mismatch, name: str) -> tuple[str, ...]:
-    """Return which maps may show it: of offsets, gains, growth in time, or noise."""
-    if name in NOISY_PIXELS:
-        return ("variance_map",)
-    detail = parted(m.statistic)[1].split()
-    named = tuple(f"{word}_map" for word in ("offset", "gain", "time") if word in detail)
-    if named:
-        return named
-    if m.explained_by in TIME or m.where.exposure_time_s is not None:
-        return ("time_map",)
-    if m.explained_by in OFFSET or m.where.kind == "dark":
-        return ("offset_map",)
-    known = m.explained_by is not None or m.where.kind == "flat"
-    return ("gain_map",) if known else ("offset_map", "gain_map")
+def _map(m: Mismatch, wanted: str, evidence: Evidence, look: Look) -> Iterator[Picture]:
+    parts = _parts(m, wanted, evidence)
+    if not parts:
+        return
+    alone = m.where.channel if len(parts) == 1 else None
+    stem = "-".join(part for part in (wanted, look, alone) if part)
+    if look == "pixels":
+        size = pixels.size_inches(parts)
+        draw: Callable[[Figure], None] = partial(pixels.draw, maps=parts, where=m.where)
+    else:
+        most = maps.SMOOTH_CELLS if look else maps.MOST_PIXELS
+        size = maps.size_inches(parts)
+        draw = partial(maps.draw, maps=parts, where=m.where, most_pixels=most)
+    yield Picture(stem, _title(m, wanted), (m,), size, draw)
+
+
+def _parts(m: Mismatch, wanted: str, evidence: Evidence) -> tuple[Map, ...]:
+    """Return a map of the channel that a mismatch names, else of all."""
+    parts = evidence.maps.get(wanted, ())
+    return tuple(p for p in parts if p.channel == m.where.channel) or parts
+
+
+def _title(m: Mismatch, wanted: str) -> str:
+    return f"{statistic_words(m.statistic)}: {wanted.replace('_alone', '').replace('_', ' ')}"
+
+
+def _curve_names(m: Mismatch, name: str, evidence: Evidence) -> list[str]:
+    """Return the curves of a statistic: several where it has directions, or kinds of exposure."""
+    if name == "level":
+        levels = {"dark": ["dark_level"], "flat": ["level"]}
+        wanted = levels.get(m.where.kind or "", ["level", "dark_level"])
+        return [stored for stored in wanted if evidence.curves.get(stored)]
+    own = [stored for stored in (m.statistic, name) if evidence.curves.get(stored)][:1]
+    kinds = [s for s, some in evidence.curves.items() if some and s.startswith(f"{name} ")]
+    return [*kinds, *own] if m.statistic == name else own
 
 
 def _at(m: Mismatch, stored: Mapping[str, Sequence[Part]]) -> tuple[str, Sequence[Part]]:
-    """Return the evidence of the exposure that a mismatch names, else of all pooled."""
-    wanted = (*m.where.exposures, "pooled", next(iter(stored)))
+    """Return the evidence of the one exposure that a mismatch names, else of all pooled."""
+    named = m.where.exposures
+    wanted = (*(named if len(named) == 1 else ()), "pooled", *named, next(iter(stored)))
     key = next(name for name in wanted if name in stored)
     return key, stored[key]
+
+
+def _oddest(m: Mismatch, stored: Mapping[str, Sequence[Histogram]]) -> str:
+    """Return the exposure, of those that a mismatch names, whose codes differ most."""
+    names = [name for name in m.where.exposures if name in stored] or list(stored)
+    return max(names, key=lambda name: sum(_distance(one) for one in stored[name]))
+
+
+def _distance(one: Histogram) -> float:
+    """Return how far counts are from those of the base model, relative to their noise."""
+    if one.before is None:
+        return 0.0
+    total = one.counts + one.before
+    apart: Array = np.where(total > 0, (one.counts - one.before) ** 2 / np.maximum(total, 1), 0)
+    return float(apart.sum() / max(int((total > 0).sum()), 1))
 
 
 def _some(m: Mismatch, stored: Mapping[str, Sequence[Part]]) -> dict[str, Sequence[Part]]:

@@ -19,7 +19,10 @@ def draw(figure: Figure, histograms: Sequence[Histogram]) -> None:
         part = _middle(one.counts)
         codes = one.lowest + np.arange(one.counts.size)[part]
         axes.bar(codes, one.counts[part], 0.85, color="#b9c2cb", label="recorded")
-        models = ((one.before, ALARM, "base model"), (one.after, COLOURS[0], "physics named"))
+        models = (
+            (one.before, ALARM, "base model"),
+            (one.after, COLOURS[0], "physics named, another sensor"),
+        )
         for counts, colour, label in models:
             if counts is not None:
                 axes.step(codes, counts[part], where="mid", color=colour, lw=1.2, label=label)

@@ -31,7 +31,10 @@ class Rung:
 
 
 def rungs(finding: Finding) -> list[Rung]:
-    """Return the lines: each named effect, below it what was considered in its place."""
+    """Return the lines: each named effect, below it what was considered in its place.
+
+    A gain that no locked frame tells has no line.
+    """
     found = []
     for effect in finding.omitted_physics:
         found.append(Rung(effect_words(effect.effect), effect.heldout_gain, "named"))
@@ -40,11 +43,12 @@ def rungs(finding: Finding) -> list[Rung]:
             for a in effect.alternatives
             if a.heldout_gain is not None
         ]
-    return found + [
+    found += [
         Rung(effect_words(a.effect), a.heldout_gain, "undecided")
         for a in finding.undecided
         if a.heldout_gain is not None
     ]
+    return [rung for rung in found if math.isfinite(rung.gain.nats_per_frame)]
 
 
 def size_inches(ladder: Sequence[Rung]) -> tuple[float, float]:

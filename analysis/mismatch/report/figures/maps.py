@@ -6,6 +6,7 @@ from math import ceil
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
 
 from analysis.figures import ALARM, INK
 from analysis.mismatch.evidence import Array, Map
@@ -13,8 +14,9 @@ from analysis.mismatch.finding import Where
 
 WIDTH_INCHES = 9.6
 MOST_PIXELS = 320  # a picture is not finer than the page
+SMOOTH_CELLS = 24  # of a smooth surface, that the noise of pixels does not hide
 PIXELS_MARKED = 12
-PANELS = ("recorded", "base model", "with the physics named")
+PANELS = ("recorded", "simulated: base model", "simulated: physics named")
 
 
 def size_inches(maps: Sequence[Map]) -> tuple[float, float]:
@@ -26,32 +28,44 @@ def size_inches(maps: Sequence[Map]) -> tuple[float, float]:
     return width, lines * (height + 0.55)
 
 
-def draw(figure: Figure, maps: Sequence[Map], where: Where) -> None:
+def draw(figure: Figure, maps: Sequence[Map], where: Where, most_pixels: int = MOST_PIXELS) -> None:
     """Draw maps: a line for each channel, one scale a line, what stands out marked in its first.
 
-    Channels of which there is no simulation stand side by side, two a line.
+    Channels of which there is no simulation stand side by side, two a line. `most_pixels`: cells
+    along the longer side; larger maps are shown by the means of blocks.
     """
     grid = figure.subplots(*_shape(maps), squeeze=False)
     alone = len(_panels(maps[0])) == 1
     lines = [[axes] for axes in grid.flat] if alone else [list(line) for line in grid]
     for line, one in zip(lines, maps, strict=False):
-        low, high = _limits(one.recorded)
+        scale = limits(reduced(one.recorded, most_pixels)[0])
+        marks = where
         for axes, (title, image) in zip(line, _panels(one).items(), strict=True):
-            shown, step = reduced(image)
-            rows, columns = image.shape
-            edge = (-0.5, one.pitch_px * columns - 0.5, one.pitch_px * rows - 0.5, -0.5)
-            drawn = axes.imshow(
-                shown, cmap="cividis", vmin=low, vmax=high, extent=edge, interpolation="none"
-            )
+            drawn = draw_map(axes, reduced(image, most_pixels), one, scale, marks)
+            marks = Where()
             of = "" if one.channel in ("", "MONO") else f"{one.channel}, "
             axes.set_title(f"{of}{title}", loc="left")
-            axes.tick_params(labelsize=7)
-            if step > 1:
-                axes.set_xlabel(f"means of {step} x {step} pixels", fontsize=7)
-        _mark(line[0], where)
         figure.colorbar(drawn, ax=line, label=one.unit, shrink=0.85, pad=0.02)
     for line in lines[len(maps) :]:
         line[0].set_axis_off()
+
+
+def draw_map(
+    axes: Axes, shown: tuple[Array, int], one: Map, scale: tuple[float, float], where: Where
+) -> AxesImage:
+    """Draw a map that is `reduced`, in mosaic pixels; what `where` names is marked."""
+    image, step = shown
+    rows, columns = (step * one.pitch_px * size for size in image.shape)
+    edge = (-0.5, columns - 0.5, rows - 0.5, -0.5)
+    low, high = scale
+    drawn = axes.imshow(
+        image, cmap="cividis", vmin=low, vmax=high, extent=edge, interpolation="none"
+    )
+    axes.tick_params(labelsize=7)
+    if step > 1:
+        axes.set_xlabel(f"means of {step} x {step} pixels", fontsize=7)
+    _mark(axes, where)
+    return drawn
 
 
 def _shape(maps: Sequence[Map]) -> tuple[int, int]:
@@ -62,9 +76,9 @@ def _shape(maps: Sequence[Map]) -> tuple[int, int]:
     return ceil(len(maps) / 2), min(len(maps), 2)
 
 
-def reduced(image: Array) -> tuple[Array, int]:
-    """Return an image of at most `MOST_PIXELS` each way, and how many pixels a block has."""
-    step = ceil(max(image.shape) / MOST_PIXELS)
+def reduced(image: Array, most_pixels: int) -> tuple[Array, int]:
+    """Return an image of at most so many cells each way, and how many pixels a cell is wide."""
+    step = ceil(max(image.shape) / most_pixels)
     rows, columns = (size // step for size in image.shape)
     blocks = image[: rows * step, : columns * step].reshape(rows, step, columns, step)
     return blocks.mean((1, 3)), step
@@ -75,10 +89,9 @@ def _panels(one: Map) -> dict[str, Array]:
     return {title: image for title, image in images if image is not None}
 
 
-def _limits(image: Array) -> tuple[float, float]:
+def limits(image: Array) -> tuple[float, float]:
     """Return a scale that a few wild pixels do not stretch."""
-    seen = reduced(image)[0]
-    low, high = np.nanquantile(seen, (0.005, 0.995))
+    low, high = np.nanquantile(image, (0.005, 0.995))
     return (float(low), float(high)) if high > low else (float(low) - 0.5, float(low) + 0.5)
 
 

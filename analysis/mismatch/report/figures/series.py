@@ -15,7 +15,10 @@ _SPREAD = 2.0  # standard deviations: the bands
 
 
 def draw(figure: Figure, shown: Mapping[str, Sequence[Series]]) -> None:
-    """Draw frame means less their mean, a panel per exposure; hollow: locked for the proof."""
+    """Draw frame means less their mean, a panel per exposure; hollow: locked for the proof.
+
+    Frames that were not looked at are left out.
+    """
     panels = np.ravel(figure.subplots(1, len(shown), squeeze=False))
     for axes, (name, channels) in zip(panels, shown.items(), strict=True):
         for one in channels:
@@ -34,12 +37,15 @@ def draw(figure: Figure, shown: Mapping[str, Sequence[Series]]) -> None:
 def _series(axes: Axes, one: Series) -> None:
     mono = one.channel in ("", "MONO")
     colour = INK if mono else CHANNEL_COLOURS.get(one.channel, INK)
-    means = one.frame_means_dn - one.frame_means_dn.mean()
-    numbers = np.arange(means.size)
+    seen = np.isfinite(one.frame_means_dn)
+    numbers = np.flatnonzero(seen)
+    means = one.frame_means_dn[seen] - one.frame_means_dn[seen].mean()
     locked = np.isin(numbers, one.locked)
     axes.plot(numbers, means, color=colour, lw=0.7, alpha=0.6)
     label = "frames searched" if mono else one.channel
     axes.plot(numbers[~locked], means[~locked], "o", color=colour, ms=3.8, label=label)
+    if not locked.any():
+        return
     label = "locked for the proof" if mono else f"_{one.channel}"
     axes.plot(numbers[locked], means[locked], "o", mfc="white", mec=colour, ms=3.8, label=label)
 

@@ -1,0 +1,100 @@
+"""What a diagnosis draws: the recording beside simulations of both models."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import scipy.stats
+
+from analysis.mismatch.evidence import Evidence
+from analysis.mismatch.locate import FAMILY
+from analysis.mismatch.locate import SUMS as SUMS
+from analysis.mismatch.model import in_threads
+from analysis.mismatch.observe import Observation, observe
+from analysis.mismatch.pictures.album import Album
+from analysis.mismatch.pictures.curves import curves
+from analysis.mismatch.pictures.frames import codes, line_spectra, series, spectra
+from analysis.mismatch.pictures.maps import NOISY, map_name, maps, shown_in
+from analysis.mismatch.split import Split
+from analysis.mismatch.state import State
+
+__all__ = ["Album", "evidence_of"]
+
+_REPLICATES = 4  # simulations of each model that are averaged
+_LARGE = 5e6  # samples from which one must do
+
+Simulated = tuple[Album, Observation]
+
+
+def evidence_of(
+    base: State, final: State, album: Album, split: Split, *, seconds: float | None = None
+) -> Evidence:
+    """Return what the pictures show.
+
+    Parameters
+    ----------
+    base, final
+        The recording beside the re-calibrated base model and the model with the physics named.
+    album
+        Has watched the observation of the recording.
+    split
+        Says which frames are locked.
+    seconds
+        Time taken.
+    """
+    layout, seen = base.setting.layout, base.setting.seen
+    named = final.camera != base.camera
+    before, *rest = _simulated([base, final] if named else [base])
+    after = rest[0] if rest else []
+    first, later = ([album for album, _ in some] for some in (before, after))
+    least = threshold_z(base)
+    shown = shown_in([base, final], least)
+    names = {map_name(NOISY), *(one.map for one in shown.values())}
+    return Evidence(
+        curves=curves(base, final if named else None),
+        maps=maps(layout, names, seen, before[0][1], after[0][1] if after else None),
+        shown_in=shown,
+        spectra=spectra(album, first[:1], later[:1]),
+        row_spectra=line_spectra(album, first, later, "rows"),
+        column_spectra=line_spectra(album, first, later, "columns"),
+        series=series(layout, split, album, first, later),
+        codes=codes(album, first, later),
+        signal_dn={
+            e.name: float(np.mean([base.fit.signal_dn[e.name, c] for c in layout.channels]))
+            for e in layout.uniform
+        },
+        tests=int(base.null.known.sum()) + len(base.null.contrasts.keys),
+        simulations=base.setting.nulls,
+        threshold_z=least,
+        familywise_level=FAMILY,
+        seconds=seconds,
+    )
+
+
+def threshold_z(state: State) -> float:
+    """Return from where on the number of a single exposure is certain to depart."""
+    null = state.null
+    single = sum(
+        1
+        for i, key in enumerate(state.vector.keys)
+        if null.known[i] and (key.exposure or key.scope != "contrast")
+    )
+    chance = FAMILY * (1 - SUMS) / max(single, 1)
+    return float(scipy.stats.t.isf(chance / 2, null.degrees))
+
+
+def _simulated(states: Sequence[State]) -> list[list[Simulated]]:
+    """Return the simulated recordings of each state, observed as the recording was."""
+    setting = states[0].setting
+    layout = setting.layout
+    samples = sum(len(e.numbers) for e in layout.uniform) * layout.rows * layout.columns
+    replicates = _REPLICATES if samples <= _LARGE else 1
+
+    def one(job: tuple[State, int]) -> Simulated:
+        state, replicate = job
+        album = Album(layout)
+        frames = state.calibrated.model.frames(layout, replicate, setting.seed)
+        return album, observe(layout, frames, album, keep=True)
+
+    jobs = [(state, replicate) for state in states for replicate in range(replicates)]
+    done = in_threads(one, jobs, setting.jobs)
+    return [done[i : i + replicates] for i in range(0, len(done), replicates)]

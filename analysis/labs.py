@@ -1,13 +1,12 @@
 """Several files of votes as one test: the laboratories of a round robin."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import pandas as pd
 
 from analysis.scale import Description
-from analysis.votes import contradictions
+from analysis.votes import contradictions, scored
 from analysis.votesfile import FAULTS_LISTED, read_test
 from dsis.errors import Fault, InputError
 
@@ -30,8 +29,10 @@ def read_labs(
     Raises
     ------
     InputError
-        A file cannot be used, scales differ, or files contradict one another.
+        A file cannot be used or is given twice, two hold the same votes, scales differ, or files
+        contradict one another.
     """
+    _refuse(_given_twice(files))
     tests = [read_test(file, scale) for file in files]
     if len(tests) == 1:
         return tests[0]
@@ -41,8 +42,7 @@ def read_labs(
         for file, (_, test) in zip(files, tests, strict=True)
         if (test.scale.low, test.scale.high) != (first.scale.low, first.scale.high)
     ]
-    if faults:
-        raise InputError(faults)
+    _refuse(faults)
     names = _names(files)
     tables = [
         votes.assign(lab=votes["lab"].where(votes["lab"] != "", name))
@@ -53,7 +53,39 @@ def read_labs(
         if any(name not in table for table in tables):
             votes[name] = votes[name].fillna("")  # a column that only some files have is text
     _check(votes, files, tables, first)
-    return votes, replace(first, title=first.title)
+    _refuse(_copies(files, tables))
+    return votes, first
+
+
+def _refuse(faults: Sequence[Fault]) -> None:
+    if faults:
+        raise InputError(faults)
+
+
+def _given_twice(files: Sequence[Path]) -> list[Fault]:
+    """Return a fault for each file that is the same as one before it."""
+    places = [file.resolve() for file in files]
+    return [
+        Fault(str(file), "", "is given twice: every vote would count twice")
+        for at, file in enumerate(files)
+        if places[at] in places[:at]
+    ]
+
+
+def _copies(files: Sequence[Path], tables: Sequence[pd.DataFrame]) -> list[Fault]:
+    """Return a fault for each file whose scored votes are those of one before it.
+
+    The laboratory is not compared: a copy under another name is still a copy.
+    """
+    key = ["observer", "stimulus", "repetition", "vote"]
+    cast = [scored(table)[key].sort_values(key, ignore_index=True) for table in tables]
+    faults = []
+    for at, file in enumerate(files):
+        twin = next((i for i in range(at) if len(cast[at]) and cast[i].equals(cast[at])), None)
+        if twin is not None:
+            fact = f"holds the same votes of the same observers as {files[twin]}"
+            faults.append(Fault(str(file), "", fact))
+    return faults
 
 
 def _names(files: Sequence[Path]) -> list[str]:
@@ -83,5 +115,4 @@ def _check(
     faults = [Fault(str(row), column, fact) for row, column, fact in found[:FAULTS_LISTED]]
     if len(found) > len(faults):
         faults.append(Fault("", "", f"and {len(found) - len(faults)} more faults"))
-    if faults:
-        raise InputError(faults)
+    _refuse(faults)

@@ -47,7 +47,16 @@ def propose_rejections(votes: pd.DataFrame) -> pd.DataFrame:
     return table.assign(accept=False)
 
 
-def reject(votes: pd.DataFrame, observers: Iterable[str]) -> tuple[pd.DataFrame, list[Rejected]]:
+def keep_decisions(proposal: pd.DataFrame, decided: Iterable[Rejected]) -> pd.DataFrame:
+    """Return `proposal` after the decisions taken: a report made again keeps them."""
+    rows = [(one.lab, one.observer, "", "left out by decision", True) for one in decided]
+    names = [column.name for column in PROPOSAL_COLUMNS]
+    return pd.concat([pd.DataFrame(rows, columns=names), proposal[names]], ignore_index=True)
+
+
+def reject(
+    votes: pd.DataFrame, observers: Iterable[str], accepted: Iterable[str] = ()
+) -> tuple[pd.DataFrame, list[Rejected]]:
     """Return the votes without those of `observers`, and who was left out.
 
     Parameters
@@ -56,6 +65,8 @@ def reject(votes: pd.DataFrame, observers: Iterable[str]) -> tuple[pd.DataFrame,
         Table of votes.
     observers
         Names; `lab/name` where a name stands in several laboratories.
+    accepted
+        More of them, from a file of decisions (`read_accepted`): faults are named so.
 
     Raises
     ------
@@ -66,7 +77,8 @@ def reject(votes: pd.DataFrame, observers: Iterable[str]) -> tuple[pd.DataFrame,
     people = index_votes(whole).observers[["lab", "observer"]]
     known = [Rejected(lab, name) for lab, name in people.itertuples(index=False, name=None)]
     faults, chosen = [], set()
-    for name in dict.fromkeys(observers):
+    given = dict.fromkeys(accepted, "--accept") | dict.fromkeys(observers, "--reject")
+    for name, option in given.items():
         matches = [one for one in known if name in (one.observer, f"{one.lab}/{one.observer}")]
         exact = [one for one in matches if name == str(one)]
         matches = exact if len(exact) == 1 else matches
@@ -74,11 +86,17 @@ def reject(votes: pd.DataFrame, observers: Iterable[str]) -> tuple[pd.DataFrame,
             chosen.add(matches[0])
         elif matches:
             both = ", ".join(map(str, matches))
-            faults.append(Fault("--reject", name, f"is several observers: give one of {both}"))
+            faults.append(Fault(option, name, f"is several observers: give one of {both}"))
         else:
-            faults.append(Fault("--reject", name, "is no observer who cast a scored vote"))
+            faults.append(Fault(option, name, "is no observer who cast a scored vote"))
     if not faults and len(chosen) == len(known):
-        faults.append(Fault("--reject", "", "leaves nobody: all observers are rejected"))
+        faults.append(
+            Fault(
+                " and ".join(sorted(set(given.values()))),
+                "",
+                "leaves nobody: all observers are rejected",
+            )
+        )
     if faults:
         raise InputError(faults)
     mine = list(zip(whole["lab"], whole["observer"], strict=True))

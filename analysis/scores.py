@@ -32,12 +32,10 @@ MOS_COLUMNS = (
     _score("sd", "sample standard deviation of all scored votes"),
     _score("ci_low", "lower end of the 95 % interval of mos, Student t, n - 1 (see ci_method)"),
     _score("ci_high", "upper end of the same"),
-    Column(
-        "n_removed", Kind.WHOLE, "vote", "votes removed: further than 2 sd from mos, in one pass"
-    ),
+    Column("n_removed", Kind.WHOLE, "vote", "votes removed as outliers of their stimulus"),
     _score("mos_trimmed", "mean of the votes kept"),
     _score("sd_trimmed", "sample standard deviation of the votes kept"),
-    _score("ci_trimmed_low", "lower end of their nominal 95 % interval; too narrow"),
+    _score("ci_trimmed_low", "lower end of their nominal 95 % interval, as ci_low; too narrow"),
     _score("ci_trimmed_high", "upper end of the same"),
     _score("mos_bt500", "mean over the observers that BT.500's screening accepts"),
     _score("mos_p913", "mean after bias removal (P.913, 12.4), then BT.500's screening"),
@@ -115,7 +113,7 @@ def score_table(
     """
     scored = index_votes(votes)
     raw = mos(votes, scale)
-    trimmed = mos(remove_outliers(votes, threshold, passes=passes).kept)
+    trimmed = mos(remove_outliers(votes, threshold, passes=passes).kept, scale)
     rejected = screen_bt500(votes)["rejected"].to_numpy(dtype=np.bool_)
     likelihood = p910(votes).scores
     table = raw.assign(

@@ -29,7 +29,7 @@ REMOVED_COLUMNS = (
     _VOTE["repetition"],
     _VOTE["vote"],
     Column("z", Kind.NUMBER, "sd", "(vote - mean) / sd"),
-    Column("mean", Kind.NUMBER, "grade", "mean of all votes on the stimulus, this one included"),
+    Column("mean", Kind.NUMBER, "grade", "mean of the votes it is judged by, itself included"),
     Column("sd", Kind.NUMBER, "grade", "sample standard deviation of these votes"),
     Column("n", Kind.WHOLE, "vote", "number of these votes"),
     _VOTE["simulated"],

@@ -170,7 +170,7 @@ def _check_shape(
 ) -> None:
     known = ", ".join(header)
     found: _Found = [
-        (at, column.name, f"column is missing; found here: {known}")
+        (at, column.name, f"column is missing; found here: {known}{_other_names(column, header)}")
         for column in COLUMNS
         if column.required and column.name not in header and not is_wide(header)
     ]
@@ -193,6 +193,14 @@ def _check_shape(
     ]
     if found:
         raise InputError(_faults(str(file), found))
+
+
+def _other_names(column: Column, header: list[str]) -> str:
+    """Return what to rename, where a table calls observers subjects."""
+    if column.name != "observer" or "subject" not in header:
+        return ""
+    kind = " (and is_reference to kind: test or reference)" if "is_reference" in header else ""
+    return f"; rename subject to observer{kind}"
 
 
 def _parse_column(

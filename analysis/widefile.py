@@ -7,10 +7,11 @@ import pandas as pd
 
 from analysis.table import to_csv
 from analysis.votes import COLUMNS, CONDITION, scored
-from dsis.errors import InputError
+from dsis.errors import Fault, InputError
 
 ABOUT_STIMULI = ("lab", *CONDITION, "kind", "repetition", "session", "simulated")
 """Columns of a wide table, beside `stimulus`, that are no observers."""
+SUMMARIES = ("mos", "mean", "average", "median", "sd", "std", "stddev", "variance")
 
 
 def is_wide(header: list[str]) -> bool:
@@ -25,6 +26,14 @@ def lengthen(
 ) -> tuple[list[str], list[int], list[list[str]]]:
     """Return header, lines and rows of the same table with one row a vote; blank cells are kept."""
     known = ["stimulus", *ABOUT_STIMULI]
+    others = {column.name for column in COLUMNS} - set(known)
+    faults = [
+        Fault("wide table", name, "is no observer: take this column out")
+        for name in header
+        if name in others or name.lower() in SUMMARIES
+    ]
+    if faults:
+        raise InputError(faults)
     fixed = [at for at, name in enumerate(header) if name in known]
     observers = [at for at, name in enumerate(header) if name not in known]
     long_header = [*(header[at] for at in fixed), "observer", "vote"]

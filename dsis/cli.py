@@ -190,7 +190,8 @@ def report(options: argparse.Namespace) -> None:
         options.votes,
         out,
         tuple(options.scale) if options.scale else None,
-        rejected=[*options.reject, *accepted],
+        rejected=options.reject,
+        accepted=accepted,
         threshold=options.threshold,
         passes=options.passes,
     )
@@ -459,8 +460,8 @@ def _add_report(add: Add) -> None:
     sub.add_argument("votes", type=Path, nargs="+", metavar="VOTES.csv", help=files)
     sub.add_argument("--out", type=Path, metavar="DIR", help="default: VOTES-report")
     _add_scale(sub)
-    reject = "observers to leave out: your decision, never the report's"
-    sub.add_argument("--reject", nargs="+", default=[], metavar="OBSERVER", help=reject)
+    reject = "observer to leave out, may be repeated: your decision, never the report's"
+    sub.add_argument("--reject", action="append", default=[], metavar="OBSERVER", help=reject)
     accept = "an earlier report's rejections.csv, with accept set to true where you agree"
     sub.add_argument("--accept", type=Path, metavar="FILE", help=accept)
     threshold = "standard deviations beyond which votes are removed (default: 2)"

@@ -13,6 +13,7 @@ from statsmodels.stats.multitest import multipletests
 
 import analysis
 from analysis.holm import holm
+from analysis.inference.linear import wald
 from analysis.inference.signedrank import signed_rank
 
 
@@ -174,10 +175,86 @@ def test_the_linear_model_is_the_analysis_of_variance_of_a_balanced_design():
     assert row["difference"] == pytest.approx(expected["difference"])
     # 8 stimuli with weights of a quarter
     assert row["se"] == pytest.approx(np.sqrt(within * 8 / 16 / observers), rel=1e-6)
+    # Wald's: 1.959964 is the normal table's 97.5 %
+    ends = (row["difference"] - 1.959964 * row["se"], row["difference"] + 1.959964 * row["se"])
+    assert (row["ci_low"], row["ci_high"]) == pytest.approx(ends, abs=1e-6)
 
 
-def test_the_linear_model_has_the_likelihood_of_statsmodels_and_reaches_higher():
-    """Votes missing, repetitions: MixedLM gives the same value here, and a lower one at its end."""
+def test_walds_p_is_that_of_a_chi_square_with_one_degree_of_freedom():
+    """z squared is chi-squared: two-sided by nature. 0.05 is where the interval ends at zero."""
+    votes = paper_votes(observers=6, spread=2.5)
+    for row in analysis.fit_linear(votes).contrasts.to_dict("records"):
+        expected = stats.chi2.sf((row["difference"] / row["se"]) ** 2, 1)
+        assert row["p"] == pytest.approx(expected, rel=1e-9)
+        assert (row["p"] < 0.05) == (row["ci_low"] * row["ci_high"] > 0)
+    same = wald(np.array([0.0, 1.959964]), np.array([1.0, 1.0]))
+    assert same["p"] == pytest.approx([1.0, 0.05], abs=1e-6)
+
+
+@pytest.mark.parametrize("column", ["p_t", "p_wilcoxon"])
+def test_holms_family_is_one_question_at_one_grain(column):
+    """Each of the six families (2, 3 or 1 tests wide) is statsmodels' correction of it alone."""
+    table = analysis.test_contrasts(paper_votes(observers=9, spread=2.0))
+    families = list(product(("demosaicking", "noise"), ("cell", "content", "overall")))
+    for question, grain in families:
+        rows = table[(table["question"] == question) & (table["grain"] == grain)]
+        expected = multipletests(rows[column], method="holm")[1]
+        np.testing.assert_allclose(rows[f"{column}_holm"], expected, rtol=1e-12)
+    for question in ("demosaicking", "noise"):  # a wider family would give other values
+        rows = table[table["question"] == question]
+        wider = multipletests(rows[column], method="holm")[1]
+        assert not np.allclose(rows[f"{column}_holm"], wider)
+
+
+def two_levels():
+    """Votes at 0 and 2 stops; each stimulus has a mean of its own, and observers a bias."""
+    rng = np.random.default_rng(3)
+    votes = paper_votes(observers=12)
+    deeper = votes.assign(
+        level=2,
+        stimulus=votes["stimulus"].str.replace("__0", "__2"),
+        vote=votes["vote"] - 1 - (votes["demosaic"] != "none") + rng.normal(0, 0.3, len(votes)),
+    )
+    return pd.concat([votes, deeper], ignore_index=True)
+
+
+def test_pairs_are_of_one_level():
+    """Two levels, contents and factors: 8 pairs a question, each of stimuli of one level."""
+    votes = two_levels()
+    table = analysis.test_contrasts(votes)
+    assert table.groupby(["question", "grain"]).size().to_dict() == {
+        (question, grain): size
+        for question in ("demosaicking", "noise")
+        for grain, size in (("cell", 8), ("content", 2), ("overall", 1))
+    }
+    mean = votes.groupby("stimulus")["vote"].mean()
+    for content, noise, level in product(("city", "landscape"), ("awgn", "sd"), ("0", "2")):
+        row = row_of(
+            table,
+            question="demosaicking",
+            grain="cell",
+            content=content,
+            within=noise,
+            level=level,
+        )
+        first, second = (mean[f"{content}__{noise}__{d}__{level}"] for d in ("bilinear", "none"))
+        assert row["difference"] == pytest.approx(first - second)
+    for content in ("city", "landscape"):
+        row = row_of(table, question="demosaicking", grain="content", content=content)
+        assert row["level"] == "all"
+        with_it, without = (
+            mean.filter(regex=f"^{content}__.*__{d}__") for d in ("bilinear", "none")
+        )
+        assert row["difference"] == pytest.approx(with_it.mean() - without.mean())
+    paired = table.sort_values(["question", "grain", "content", "within", "level"])
+    linear = analysis.fit_linear(votes).contrasts.sort_values(
+        ["question", "grain", "content", "within", "level"]
+    )
+    np.testing.assert_allclose(paired["difference"], linear["difference"])
+
+
+def test_the_linear_model_is_at_the_maximum_of_statsmodels_likelihood():
+    """Votes missing, repetitions: MixedLM gives the same value here, and lower ones beside it."""
     votes = paper_votes(repetitions=2).sample(frac=0.8, random_state=1)
     fit = analysis.fit_linear(votes)
     stimulus, names = pd.factorize(votes["stimulus"], sort=True)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 import analysis
-from analysis.bootstrap import bootstrap_interval
+from analysis.bootstrap import RESAMPLES, SEED, bootstrap_interval, draw_resamples
 from analysis.intervals import binomial_interval, default_interval, student_interval
 from analysis.scale import Scale
 
@@ -95,13 +95,13 @@ def test_binomial_is_conservative():
     assert inside.mean() > 0.95
 
 
-def by_hand(votes, drawn):
+def by_hand(votes, drawn, limit_sd=2.0):
     """Remove and average each resample with plain lists, and take the expanded percentiles."""
     means = []
     for counts in drawn.astype(int):
         resample = np.repeat(votes, counts)
         away = np.abs(resample - resample.mean())
-        means.append(resample[away <= 2 * resample.std(ddof=1) + 1e-9].mean())
+        means.append(resample[away <= limit_sd * resample.std(ddof=1) + 1e-9].mean())
     n = len(votes)
     tail = stats.norm.cdf(np.sqrt(n / (n - 1)) * stats.t.ppf(0.025, n - 1))
     return np.quantile(means, [tail, 1 - tail])
@@ -113,6 +113,21 @@ def test_the_bootstrap_removes_inside_each_resample():
     drawn = rng.multinomial(18, np.full(18, 1 / 18), 400).astype(float)
     got = bootstrap_interval(votes, drawn, 2.0)
     assert (got.low, got.high) == pytest.approx(tuple(by_hand(votes, drawn)), abs=1e-12)
+
+
+def test_the_table_has_the_bootstrap_with_and_without_removal():
+    """One vote of eighteen lies far off: the two intervals differ by more than a tenth."""
+    far = [7, 8, 8, 9] * 4 + [8, 1]
+    votes = table([far])
+    drawn = draw_resamples(18, RESAMPLES, SEED)
+    ordered = np.array(far, dtype=float)  # observers sort as they are numbered
+    (row,) = analysis.score_table(votes, TEN).to_dict("records")
+    trimmed, whole = by_hand(ordered, drawn), by_hand(ordered, drawn, np.inf)
+    assert (row["ci_boot_trimmed_low"], row["ci_boot_trimmed_high"]) == pytest.approx(
+        tuple(trimmed), abs=1e-9
+    )
+    assert (row["ci_boot_low"], row["ci_boot_high"]) == pytest.approx(tuple(whole), abs=1e-9)
+    assert np.abs(trimmed - whole).max() > 0.1
 
 
 def test_the_bootstrap_resamples_observers_not_votes():

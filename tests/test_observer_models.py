@@ -61,6 +61,10 @@ def test_dmos_pairs_observers_with_themselves():
     votes = pd.DataFrame(rows, columns=["observer", "stimulus", "content", "kind", "vote"])
     (row,) = analysis.dmos(votes, Scale(1, 10)).itertuples()
     assert (row.n, row.dmos, row.reference) == (2, (7 + 4) / 2, "r")
+    assert row.sd == pytest.approx(3 / np.sqrt(2))  # of 7 and 4, with n - 1
+    # t(0.975, 1) is tan(0.475 pi)
+    half = np.tan(0.475 * np.pi) * 3 / 2
+    assert (row.ci_low, row.ci_high) == pytest.approx((5.5 - half, 5.5 + half))
     assert analysis.dmos(votes[votes["kind"] == "test"], Scale(1, 10)).empty
     second = votes[votes["kind"] == "reference"].assign(stimulus="r2")
     with pytest.raises(InputError, match="several hidden references: c"):

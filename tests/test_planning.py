@@ -11,7 +11,9 @@ from statsmodels.stats.power import TTestIndPower, TTestPower
 
 import analysis
 from analysis.planning import Plan, observers_needed, power_from_pilot, power_of
+from analysis.planning.pilot import _panel
 from analysis.scale import Scale
+from analysis.votes import index_votes
 from dsis.cli import main
 from dsis.errors import InputError
 from dsis.outdir import UNFINISHED
@@ -110,7 +112,7 @@ def pilot(observers=40, difference=-1.0, spread=1.0, seed=1):
             "e",
             "",
             "",
-            rng.uniform(3, 8) * 0 + 5.5 + bias[o] + rng.normal(0, spread),
+            5.5 + bias[o] + rng.normal(0, spread),
         )
         for s in range(20)
         for o in range(observers)
@@ -134,6 +136,22 @@ def test_a_pilots_power_is_that_of_its_spread():
         # observers differ a little in their spread: not quite a t distribution
         error = STANDARD_ERRORS * np.sqrt(expected * (1 - expected) / runs)
         assert row.power == pytest.approx(expected, abs=error + 0.02)
+
+
+def test_what_a_bias_is_uncertain_by_is_no_difference_between_people():
+    """Planted: biases of sd 0.5; each is known from 20 votes of sd 2, so to 0.45."""
+    rng = np.random.default_rng(4)
+    observers, stimuli = 2000, 20
+    vote = 5 + rng.normal(0, 0.5, (observers, 1)) + rng.normal(0, 2, (observers, stimuli))
+    who, what = np.indices(vote.shape).reshape(2, -1)
+    columns = {"observer": who.astype(str), "stimulus": what.astype(str), "vote": vote.ravel()}
+    panel = _panel(index_votes(pd.DataFrame(columns)), TEN)
+    observed = 0.5**2 + 2**2 / stimuli
+    error = STANDARD_ERRORS * observed * np.sqrt(2 / observers)
+    # maximum likelihood takes the spread of 20 residuals for 1 / 20 too small
+    shortfall = 2**2 / stimuli / stimuli
+    assert panel.bias_sd**2 == pytest.approx(0.5**2, abs=error + shortfall)
+    assert observed - 0.5**2 > error + shortfall  # the test can tell
 
 
 def test_without_a_difference_a_pilot_finds_one_at_the_nominal_rate():
@@ -167,6 +185,8 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
 
     analysis.write_votes(pilot(observers=6).assign(simulated=True), tmp_path / "pilot.csv")
     command = ["plan", "--pilot", str(tmp_path / "pilot.csv"), "--scale", "1", "10"]
+    assert main([*command, "--alpha", "0.001", "--groups"]) == 2
+    assert "--alpha: is not used with --pilot" in capsys.readouterr().err
     assert main([*command, "--observers", "8", "12", "--seed", "2"]) == 0
     out = tmp_path / "pilot-plan"
     assert sorted(p.name for p in out.iterdir()) == ["power.csv", "power.png", "power.svg"]

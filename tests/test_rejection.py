@@ -2,6 +2,7 @@
 
 import csv
 
+import numpy as np
 import pandas as pd
 import pytest
 
@@ -52,6 +53,23 @@ def test_faultless_observers_all_alike_are_not_rejected():
     rows = [(f"o{o}", f"s{s}", s) for o in range(6) for s in range(1, 6)]
     votes = pd.DataFrame(rows, columns=["observer", "stimulus", "vote"])
     assert not analysis.screen_inconsistency(votes)["rejected"].any()
+
+
+def test_the_inconsistency_screen_is_one_sided():
+    """An observer far more consistent than the panel is not to be rejected for that."""
+    rng = np.random.default_rng(8)
+    quality = rng.uniform(2, 9, 60)
+    spread = [0.05, *[1.0] * 18, 5.0]
+    rows = [
+        (f"o{o:02}", f"s{s}", quality[s] + rng.normal(0, sd))
+        for o, sd in enumerate(spread)
+        for s in range(60)
+    ]
+    votes = pd.DataFrame(rows, columns=["observer", "stimulus", "vote"])
+    table = analysis.screen_inconsistency(votes).set_index("observer")
+    assert table["z"]["o00"] < -3
+    assert table["z"]["o19"] > 3
+    assert table.index[table["rejected"]].tolist() == ["o19"]
 
 
 def two_labs():
@@ -113,6 +131,26 @@ def test_the_loop_of_a_lab(shared_data, tmp_path, capsys):
     )
     assert main([*command, "--out", str(second), "--reject", "s99"]) == 2
     assert "--reject: s99: is no observer" in capsys.readouterr().err
+    edited.write_text("observer,accept\ns98,true\n", encoding="utf-8")
+    both = ["report", "--reject", "s99", *command[1:], "--accept", str(edited)]
+    assert main(both) == 2  # the file of votes after --reject is no observer
+    said = capsys.readouterr().err
+    assert "--reject: s99: is no observer" in said
+    assert "--accept: s98: is no observer" in said
+
+
+def test_a_report_made_again_in_place_keeps_the_decisions(shared_data, tmp_path):
+    """`--accept` of the very folder that is written: twice the same command, twice the same."""
+    votes = real_votes(shared_data, "nflx_public_last4outliers")
+    votes = votes[votes["content"].isin(["BigBuckBunny", "CrowdRun"])]
+    analysis.write_votes(votes, tmp_path / "votes.csv")
+    out = tmp_path / "report"
+    command = ["report", str(tmp_path / "votes.csv"), "--scale", "1", "5", "--out", str(out)]
+    assert main([*command, "--reject", "s27", "--reject", "s28"]) == 0
+    for _ in range(2):
+        assert read_accepted(out / "rejections.csv") == ["s27", "s28"]
+        assert main([*command, "--accept", str(out / "rejections.csv")]) == 0
+        assert set(pd.read_csv(out / "mos.csv")["n"]) == {28}
 
 
 def test_a_file_of_decisions_that_is_none_is_refused(tmp_path):

@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from matplotlib.image import imread
+from scipy.stats import beta
 
 import analysis
 from analysis.report import Options, analyse
@@ -359,6 +360,47 @@ def test_methods_say_what_was_done_and_no_more(written):
     for not_done in ("Order", "Test and retest"):
         assert f"<h3>{not_done}</h3>" not in said
     assert "left out by decision" not in said
+    assert "Where observers differ in what they mind, the paired tests are the honest ones" in said
+    assert "As in Seybold et al. (2014), votes further than 2 sample" in said
+    assert "77 to 92 %" in said
+    assert "votes removed: further than 2 sd from mos, in one pass" in text
+    assert "mean of all votes on the stimulus, this one included" in text
+
+
+def test_trimmed_votes_that_all_agree_have_the_binomial_interval_of_their_own():
+    """One vote far off is removed; fifteen equal ones are left, which Student gives no width."""
+    rows = [[8] * 15 + [2], [5, 6, 7, 8] * 4]
+    scores = analysis.score_table(table(rows), Scale(1, 10)).set_index("stimulus")
+    agreed = scores.loc["s0"]
+    assert (agreed["n_removed"], agreed["mos_trimmed"], agreed["sd_trimmed"]) == (1, 8, 0)
+    # 15 votes at 7/9 of the scale: k = 35/3 of 15 in the beta quantiles of Clopper and Pearson
+    k = 15 * 7 / 9
+    expected = (1 + 9 * beta.ppf(0.025, k, 16 - k), 1 + 9 * beta.ppf(0.975, k + 1, 15 - k))
+    assert (agreed["ci_trimmed_low"], agreed["ci_trimmed_high"]) == pytest.approx(expected)
+
+
+def test_how_few_votes_no_rule_can_remove_follows_the_threshold():
+    """Of four votes the farthest lies exactly 1.5 sd off, of five 1.79."""
+    votes = table([[5, 5, 5, 1], [5, 5, 5, 5, 1], *TYPICAL])
+    results = analyse(votes, Description(Scale(1, 5)), Options(threshold=1.5))
+    remark = "The 1.5\u03c3 rule cannot remove anything where there are 4 votes or fewer: s0."
+    assert remark in results.remarks
+    assert results.scores.set_index("stimulus").loc[["s0", "s1"], "n_removed"].tolist() == [0, 1]
+
+
+def test_stimuli_that_share_a_condition_are_named():
+    """Two takes of one condition, or blank contents: no contrast, and never silently."""
+    votes = make_votes()
+    take = votes[votes["stimulus"] == "city__sd__none"].assign(stimulus="city-take-2")
+    results = analyse(pd.concat([votes, take], ignore_index=True), Description(Scale(1, 10)))
+    assert results.contrasts.empty
+    remark = "city-take-2, city__sd__none are the same condition (content city, noise sd, "
+    assert any(remark in one and "No comparison" in one for one in results.remarks)
+    tests = votes[votes["kind"] == "test"].assign(content="")
+    blank = analyse(tests, Description(Scale(1, 10)))
+    assert sum("(content blank, " in one for one in blank.remarks) == 4
+    sound = analyse(votes, Description(Scale(1, 10)))
+    assert not any("No comparison" in one for one in sound.remarks)
 
 
 def test_other_rules_of_removal_are_said(tmp_path):
@@ -369,7 +411,11 @@ def test_other_rules_of_removal_are_said(tmp_path):
     text = page(tmp_path / "report")
     assert "Votes are removed beyond 1.5 sd, not the paper&#39;s 2." in text
     assert "further than 1.5 sample standard deviations" in text
-    assert "in 2 passes" in text
+    assert "in at most 2 passes, not in the paper&#39;s one" in text
+    assert "votes removed: further than 1.5 sd from the mean of those that the pass before" in text
+    assert "mean of the votes on the stimulus before its pass, this one included" in text
+    for of_the_papers_rule in ("As in Seybold", "77 to 92 %", "further than 2 sd", "in one pass"):
+        assert of_the_papers_rule not in text
     removed = pd.read_csv(tmp_path / "report" / "removed_votes.csv")
     kept, expected = analysis.remove_outliers(votes, 1.5, passes=2)
     assert len(removed) == len(expected) == len(votes) - len(kept)
@@ -431,7 +477,9 @@ def test_scripts_to_copy_run(tmp_path, capsys, monkeypatch):
     for lab in ("a", "b"):
         (tmp_path / lab).mkdir()
         files.append(tmp_path / lab / "votes.csv")
-        analysis.write_votes(votes, files[-1])
+        # b's observers are others: a copy of a's would be refused
+        shown = votes if lab == "a" else votes.assign(vote=(votes["vote"] - 1).clip(lower=1))
+        analysis.write_votes(shown, files[-1])
     monkeypatch.setattr(mos_report, "REJECTED", ["b/s3"])
     mos_report.main(files, tmp_path / "report")
     assert set(pd.read_csv(tmp_path / "report" / "mos.csv")["n"]) == {35}

@@ -136,7 +136,7 @@ def test_rows_are_lines_of_the_file_even_where_cells_hold_line_breaks(tmp_path):
         ("\n \n", "", "is empty"),
         ("observer,stimulus,vote\n", "", "no votes"),
         ("observer,stimulus\nann,city\n", "row 1, vote", "missing"),
-        ("subject,stimulus,vote\nann,city,3\n", "row 1, observer", "found here: subject"),
+        ("subject,stimulus,vote\nann,city,3\n", "row 1, observer", "rename subject to observer"),
         ("observer,stimulus,vote,vote\nann,city,3,4\n", "row 1, vote", "2 times"),
         ("observer,stimulus,vote,\nann,city,3,4\n", "row 1, header", "no name"),
         ("observer,stimulus,vote\nann,city\n", "row 2", "has 2 cells, the header 3"),

@@ -73,6 +73,14 @@ def test_faults_in_a_wide_table_name_row_and_observer(tmp_path):
     assert {key for key, _ in faults(file)} == {"row 1, observer", "row 1, vote"}
 
 
+@pytest.mark.parametrize("name", ["presentation", "valid", "MOS", "mean"])
+def test_a_column_that_is_nobodys_is_not_taken_for_an_observer(tmp_path, name):
+    file = tmp_path / "votes.csv"
+    file.write_text(f"stimulus,{name},ann,bob\na,1,5,6\nb,2,7,8\n", encoding="utf-8")
+    with pytest.raises(InputError, match=f"{name}: is no observer"):
+        analysis.read_votes(file, PAPER)
+
+
 def test_wide_tables_of_semicolons_have_decimal_commas(tmp_path):
     file = tmp_path / "votes.csv"
     file.write_text("stimulus;ann;bob\na;7,5;6\n", encoding="utf-8")
@@ -248,9 +256,24 @@ def test_several_files_are_laboratories(tmp_path, capsys):
 def test_files_named_alike_in_folders_named_alike_get_numbers(tmp_path):
     for parent in ("1", "2"):
         (tmp_path / parent).mkdir()
-    text = "observer,stimulus,vote\nann,a,3\n"
-    files = [lab(tmp_path / parent / "lab", text) for parent in ("1", "2")]
+    text = "observer,stimulus,vote\nann,a,{}\n"
+    files = [lab(tmp_path / parent / "lab", text.format(parent)) for parent in ("1", "2")]
     assert set(analysis.read_labs(files)[0]["lab"]) == {"votes-1", "votes-2"}
+
+
+def test_a_file_given_twice_and_a_copy_of_one_are_refused(tmp_path):
+    """Else every observer votes twice, and intervals shrink by the root of two."""
+    rows = ["ann,a,3", "ann,b,5", "bob,a,4"]
+    one = lab(tmp_path / "one", "\n".join(["observer,stimulus,vote", *rows]) + "\n")
+    with pytest.raises(InputError, match=r"is given twice"):
+        analysis.read_labs([one, tmp_path / "two" / ".." / "one" / "votes.csv"])
+    turned = [f"{row},x" for row in reversed(rows)]
+    copy = lab(tmp_path / "copy", "\n".join(["observer,stimulus,vote,lab", *turned]) + "\n")
+    with pytest.raises(InputError, match=f"same votes of the same observers as {one}"):
+        analysis.read_labs([one, copy])
+    turned[0] = "bob,a,5,x"
+    other = lab(tmp_path / "other", "\n".join(["observer,stimulus,vote,lab", *turned]) + "\n")
+    assert len(analysis.read_labs([one, other])[0]) == 6
 
 
 def test_laboratories_that_contradict_one_another_are_refused(tmp_path):

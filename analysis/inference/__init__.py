@@ -1,7 +1,7 @@
 """What noise and demosaicking do to votes: contrasts within observers, and mixed models."""
 
 from analysis.inference.contrasts import CONTRAST_COLUMNS, test_contrasts
-from analysis.inference.design import Contrast, list_contrasts
+from analysis.inference.design import Contrast, list_contrasts, not_comparable
 from analysis.inference.linear import LinearFit, fit_linear
 from analysis.inference.ordinal import Link, OrdinalFit, fit_ordinal
 from analysis.inference.ordinal_contrasts import (
@@ -25,6 +25,7 @@ __all__ = [
     "fit_linear",
     "fit_ordinal",
     "list_contrasts",
+    "not_comparable",
     "ordinal_contrasts",
     "test_contrasts",
 ]

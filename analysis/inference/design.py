@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from analysis.votes import Indexed
+from analysis.votes import CONDITION, Indexed
 
 ALL = "all"
 CELL, CONTENT, OVERALL = "cell", "content", "overall"
@@ -64,16 +64,36 @@ def list_contrasts(scored: Indexed) -> list[Contrast]:
     (signal-dependent against white). For every question and method: each pair, the pairs of each
     content, and all pairs.
     """
-    stimuli = scored.stimuli
-    tests = stimuli[stimuli["kind"] == "test"]
-    tests = tests[(tests["noise"] != "") & (tests["demosaic"] != "")]
-    if tests[["content", "noise", "demosaic", "level"]].duplicated().any():
+    tests = _named(scored)
+    if tests[list(CONDITION)].duplicated().any():
         return []
     methods = [name for name in dict.fromkeys(tests["demosaic"]) if name != UNDEMOSAICKED]
     found: list[Contrast] = []
     for method in methods:
         found += _question("demosaicking", tests, "demosaic", (method, UNDEMOSAICKED), "noise")
     return found + _question("noise", tests, "noise", (CAMERA, WHITE), "demosaic")
+
+
+def not_comparable(scored: Indexed) -> Iterator[str]:
+    """Yield a sentence for each condition that several stimuli share: none can be compared then."""
+    tests = _named(scored)
+    for values, sharing in tests.groupby(list(CONDITION), dropna=False, sort=False):
+        if len(sharing) == 1:
+            continue
+        content, noise, demosaic, level = values
+        stops = f", level {_level(level)}" if _level(level) else ""
+        yield (
+            f"No comparison of conditions: {', '.join(sharing['stimulus'])} are the same condition "
+            f"(content {content or 'blank'}, noise {noise}, demosaicking {demosaic}{stops}), which "
+            "must be one sequence."
+        )
+
+
+def _named(scored: Indexed) -> pd.DataFrame:
+    """Return the test stimuli that name noise and demosaicking."""
+    stimuli = scored.stimuli
+    tests = stimuli[stimuli["kind"] == "test"]
+    return tests[(tests["noise"] != "") & (tests["demosaic"] != "")]
 
 
 def _question(

@@ -2,7 +2,7 @@
 
 With one random intercept the restricted likelihood is a function of one number, the ratio of the
 two variances; it is maximised over that number, everything else has a closed form. (statsmodels'
-MixedLM, the oracle of the tests, reports convergence away from the maximum.)
+MixedLM, the oracle of the tests, may report convergence of lbfgs at an infinite likelihood.)
 """
 
 from dataclasses import dataclass

@@ -8,7 +8,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from analysis.figures import COLOURS, INK, MARKS, STYLE, save
-from analysis.planning.pilot import OBSERVERS, POWER_COLUMNS, power_from_pilot
+from analysis.planning.pilot import ALPHA, OBSERVERS, POWER_COLUMNS, power_from_pilot
 from analysis.planning.samplesize import Plan, observers_needed, power_of
 from analysis.report.remarks import count_votes
 from analysis.table import to_csv
@@ -56,6 +56,12 @@ def describe_plan(options: argparse.Namespace) -> str:
 
 def write_power(options: argparse.Namespace) -> str:
     """Write the power curves of a pilot as table and figure, and return them as text."""
+    given = {"sd": None, "comparisons": 1, "correction": "bonferroni", "groups": False}
+    unused = [name for name, default in {**given, "alpha": ALPHA}.items()
+              if getattr(options, name) != default]  # fmt: skip
+    if unused:
+        fact = f"is not used with --pilot (its own spread, its own pairs, Holm at {ALPHA:g})"
+        raise InputError(Fault(f"--{name}", "", fact) for name in unused)
     scale = tuple(options.scale) if options.scale else None
     votes, test = read_test(options.pilot, scale)
     sizes = tuple(options.observers or OBSERVERS)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.stats import t
 
 from analysis.holm import holm
-from analysis.inference.design import CELL, Contrast, list_contrasts
+from analysis.inference.design import CELL, Contrast, list_contrasts, not_comparable
 from analysis.models import fit_p910
 from analysis.scale import Scale
 from analysis.table import Column, Kind
@@ -115,8 +115,8 @@ def _panel(scored: Indexed, scale: Scale) -> _Panel:
 def _own_pairs(scored: Indexed) -> _Pairs:
     cells = [c for c in list_contrasts(scored) if c.grain == CELL]
     if not cells:
-        fact = "names no conditions to compare (noise, demosaic): give --difference"
-        raise InputError.of("--pilot", "", fact)
+        why = " ".join(not_comparable(scored)) or "names no conditions to compare (noise, demosaic)"
+        raise InputError.of("--pilot", "", f"{why.rstrip('.')}: give --difference")
     score = fit_p910(scored).scores["score"].to_numpy(dtype=np.float64)
     plus = [cell.plus[0] for cell in cells]
     minus = [cell.minus[0] for cell in cells]

@@ -30,6 +30,7 @@ def write_report(
     scale: tuple[float, float] | None = None,
     *,
     rejected: Iterable[str] = (),
+    accepted: Iterable[str] = (),
     threshold: float = THRESHOLD_SD,
     passes: int = 1,
 ) -> None:
@@ -47,8 +48,9 @@ def write_report(
     scale
         Lowest and highest grade; None: as the `datapackage.json` beside the votes, or the store,
         says.
-    rejected
-        Observers to leave out (`analysis.reject`): a decision, never taken by the report itself.
+    rejected, accepted
+        Observers to leave out, named by hand and in a file of decisions (`analysis.reject`): never
+        decided by the report itself.
     threshold, passes
         Of the removal of votes: standard deviations, and how often.
 
@@ -64,7 +66,7 @@ def write_report(
         raise InputError.of(
             ", ".join(map(str, files)), "", "holds no valid vote on a test sequence"
         )
-    votes, gone = reject(votes, rejected)
+    votes, gone = reject(votes, rejected, accepted)
     results = analyse(votes, test, Options(threshold, passes, tuple(gone)))
     results = replace(results, stimuli=tuple(shown_stimuli(files[0])))
     with result_folder(out, "mos.csv", keep=_not_ours) as partial:

@@ -14,7 +14,7 @@ from analysis.inference.design import CELL
 from analysis.report.methods import methods
 from analysis.report.remarks import observer_name
 from analysis.report.results import Results
-from analysis.report.tables import TABLES
+from analysis.report.tables import columns_of
 from analysis.scale import Description
 from analysis.table import codebook
 from dsis import __version__
@@ -69,7 +69,7 @@ def render(
         removed=_with_names(results.removed)[:REMOVED_SHOWN],
         methods=paragraphs,
         references=references,
-        tables={name: codebook(columns) for name, columns in TABLES.items()},
+        tables={name: codebook(columns) for name, columns in columns_of(results.options).items()},
         version=__version__,
     )
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
+from analysis.inference.sentences import SIGNIFICANT
 from analysis.models import p910
 from analysis.rejection import Rejected
 from analysis.repeatability import Retest
@@ -14,13 +15,10 @@ from analysis.screening import THRESHOLD_SD
 from analysis.sos import SUSPICIOUS, SosFit
 from analysis.votes import SCORED_KINDS, complete, index_votes
 
-SIGNIFICANT = 0.05
 FEW_OBSERVERS = 15  # BT.500: fewer make an informal test
 MANY_REMOVED = 0.10
 FEW_SEQUENCES = 20  # below, the standard error of a correlation of 0.7 is over 0.11
 NAMES_LISTED = 6
-# The 2-sigma rule: with the sample sd, |z| is at most (n - 1) / sqrt(n), below 2 up to n = 5.
-REMOVABLE_FROM = 6
 ALL_TOO_CONSISTENT = 1e-3  # inconsistency over the scale's width: the fit leans on one observer
 
 
@@ -34,6 +32,7 @@ class Findings:
     models: tuple[str, ...]
     rejected: tuple[Rejected, ...]
     threshold: float
+    passes: int
 
 
 @dataclass(frozen=True)
@@ -106,7 +105,7 @@ def remarks(
             f"Left out by decision: {_names(gone)}. Every number of this report is "
             "without the votes of these observers."
         )
-    yield from _about_the_removal(counts, scores, findings.threshold)
+    yield from _about_the_removal(counts, scores, findings)
     yield from _about_intervals(scale, scores)
     yield from _about_the_screens(observers, counts)
     yield from _about_the_model(votes, scale)
@@ -142,20 +141,24 @@ def _about_the_test(votes: pd.DataFrame, scale: Scale, counts: Counts) -> Iterat
         yield "Not all sequences have the same number of votes: see n."
 
 
-def _about_the_removal(counts: Counts, scores: pd.DataFrame, threshold: float) -> Iterator[str]:
-    removed = int(scores["n_removed"].sum())
+def _about_the_removal(counts: Counts, scores: pd.DataFrame, findings: Findings) -> Iterator[str]:
+    threshold, removed = findings.threshold, int(scores["n_removed"].sum())
     if threshold != THRESHOLD_SD:
         yield f"Votes are removed beyond {threshold:g} sd, not the paper's {THRESHOLD_SD:g}."
+    if findings.passes != 1:
+        yield f"Votes are removed in at most {findings.passes} passes, not in the paper's one."
     if removed > MANY_REMOVED * counts.scored:
         yield (
             f"The {threshold:g}\u03c3 rule removes {100 * removed / counts.scored:.1f} % of the "
             f"votes, more than {100 * MANY_REMOVED:.0f} %: the votes are far from normal, or "
             "observers did not agree on what to judge."
         )
-    small = scores[scores["n"] < REMOVABLE_FROM]
-    if len(small) and threshold == THRESHOLD_SD:
+    # With the sample sd, |z| is at most (n - 1) / sqrt(n): below 2 up to n = 5.
+    small = scores[(scores["n"] - 1) / np.sqrt(scores["n"]) <= threshold]
+    if len(small):
+        least = int(np.floor((threshold / 2 + np.sqrt(threshold**2 / 4 + 1)) ** 2 + 1e-9))
         yield (
-            f"The 2\u03c3 rule cannot remove anything where there are {REMOVABLE_FROM - 1} votes "
+            f"The {threshold:g}\u03c3 rule cannot remove anything where there are {least} votes "
             f"or fewer: {_names(small['stimulus'])}."
         )
 

@@ -12,6 +12,7 @@ from analysis.inference import (
     conclusions,
     effect_table,
     fit_linear,
+    not_comparable,
     ordinal_contrasts,
     test_contrasts,
 )
@@ -25,7 +26,7 @@ from analysis.scores import observer_table, score_table
 from analysis.screening import THRESHOLD_SD, remove_outliers, screen_bt500, screen_correlation
 from analysis.screens import compare_screens
 from analysis.sos import SosFit, sos_parameter
-from analysis.votes import scored
+from analysis.votes import index_votes, scored
 
 MODELLED_STIMULI = 60
 """More are not put into the mixed models, which have a parameter for each."""
@@ -97,7 +98,15 @@ def analyse(votes: pd.DataFrame, test: Description, options: Options = Options()
     sos, repeated = sos_parameter(votes, test.scale), retest(votes)
     order, contrasts = order_effects(votes), test_contrasts(votes)
     modelled = _model(votes, contrasts)
-    findings = Findings(sos, repeated, order, modelled.remarks, options.rejected, options.threshold)
+    findings = Findings(
+        sos,
+        repeated,
+        order,
+        modelled.remarks,
+        options.rejected,
+        options.threshold,
+        options.passes,
+    )
     return Results(
         counts=counts,
         options=options,
@@ -124,7 +133,7 @@ def _model(votes: pd.DataFrame, contrasts: pd.DataFrame) -> Modelled:
     """Fit the mixed models, where there is something to compare and not too much."""
     nothing = pd.DataFrame(columns=[column.name for column in EFFECT_COLUMNS])
     if contrasts.empty:
-        return Modelled(nothing)
+        return Modelled(nothing, tuple(not_comparable(index_votes(votes))))
     counts = count_votes(votes)
     if counts.stimuli > MODELLED_STIMULI:
         fact = f"No mixed models: {counts.stimuli} sequences are more than {MODELLED_STIMULI}."

@@ -1,13 +1,15 @@
 """The tables of a report as CSV: which file has which columns."""
 
+from dataclasses import replace
+
 import pandas as pd
 
 from analysis.hidden_reference import DMOS_COLUMNS
 from analysis.inference import CONTRAST_COLUMNS, EFFECT_COLUMNS
 from analysis.likelihood import MODEL_COLUMNS
 from analysis.order import ORDER_COLUMNS
-from analysis.rejection import PROPOSAL_COLUMNS
-from analysis.report.results import Results
+from analysis.rejection import PROPOSAL_COLUMNS, keep_decisions
+from analysis.report.results import Options, Results
 from analysis.scores import MOS_COLUMNS, OBSERVER_COLUMNS
 from analysis.screening import REMOVED_COLUMNS
 from analysis.screens import SCREEN_COLUMNS
@@ -27,6 +29,25 @@ TABLES: dict[str, tuple[Column, ...]] = {
 }
 
 
+def columns_of(options: Options) -> dict[str, tuple[Column, ...]]:
+    """Return `TABLES`, in the words that hold for the removal of votes by `options`."""
+    once = options.passes == 1
+    how = "in one pass" if once else f"in at most {options.passes} passes"
+    centre = "mos" if once else "the mean of those that the pass before kept"
+    judged = "all votes on the stimulus" if once else "the votes on the stimulus before its pass"
+    meanings = {
+        "n_removed": f"votes removed: further than {options.threshold:g} sd from {centre}, {how}",
+        "mean": f"mean of {judged}, this one included",
+    }
+    return TABLES | {
+        name: tuple(
+            replace(column, meaning=meanings.get(column.name, column.meaning))
+            for column in TABLES[name]
+        )
+        for name in ("mos.csv", "removed_votes.csv")
+    }
+
+
 def tables_of(results: Results) -> dict[str, pd.DataFrame]:
     """Return the table of each file of `TABLES`."""
     return {
@@ -38,6 +59,6 @@ def tables_of(results: Results) -> dict[str, pd.DataFrame]:
         "effects.csv": results.modelled.effects,
         "models.csv": results.models,
         "screens.csv": results.screens,
-        "rejections.csv": results.proposal,
+        "rejections.csv": keep_decisions(results.proposal, results.options.rejected),
         "order.csv": results.order,
     }

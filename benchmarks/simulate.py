@@ -5,7 +5,7 @@ folder inside FOLDER). Prints megapixels per second of the base model; reading a
 timed on the written files, which the system may still hold in memory.
 """
 
-import sys
+import argparse
 import tempfile
 import time
 from collections.abc import Callable, Iterable
@@ -56,6 +56,11 @@ def streamed(recording: Recording, ahead: int) -> None:
 
 
 def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("folder", nargs="?", help="where to write 1.8 GB for a while")
+    folder = parser.parse_args().folder
     grid = PixelGrid(ROWS, COLUMNS, CAMERA.cfa)
     drain(simulated_frames(CAMERA, SHOTS[:1], grid))  # compiles
     for jobs in (1, 2):
@@ -63,7 +68,6 @@ def main() -> None:
             f"simulate, no files, {jobs} job(s)",
             lambda n=jobs: drain(simulated_frames(CAMERA, SHOTS, grid, jobs=n)),
         )
-    folder = sys.argv[1] if len(sys.argv) > 1 else None
     with tempfile.TemporaryDirectory(dir=folder) as scratch:
         out, made = Path(scratch) / "recording", []
         timed(

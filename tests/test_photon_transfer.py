@@ -97,7 +97,10 @@ def record(
             np.float32
         )
         draw = Draw(seed, (f"{number}",))
-        codes = [made.expose(clean, draw, Draw(sensor_seed), t, grid) for t in range(frames)]
+        codes = [
+            made.expose(clean, draw, Draw(sensor_seed), t, grid, exposure_time_s=seconds)
+            for t in range(frames)
+        ]
         stack = (np.stack(codes) + made.black_level).astype(np.uint16)
         kind = "flat" if level else "dark"
         exposures.append(Exposure(f"{kind}-{number:02}", kind, seconds, level or None, stack))

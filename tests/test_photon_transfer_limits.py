@@ -161,3 +161,12 @@ def test_the_sums_of_whole_numbers_agree_with_the_measures(cfa: Cfa) -> None:
         pairs = channel.pair_variance
         assert found.pair_variance_dn2 == pytest.approx(pairs.uncorrected.value, rel=1e-6)
         assert found.removed_dn2 == pytest.approx(pairs.removed.value, rel=1e-6)
+
+
+@pytest.mark.parametrize("black", [256.1, 256.25, 256.4])
+def test_a_black_level_that_rounding_hides_has_rounding_in_its_error(black: float) -> None:
+    """Noise of 0.15 codes: the mean code is up to a quarter off, whatever the number of samples."""
+    quiet = camera((None, 0.02, 0.0225), black_level=black)
+    fit = fit_camera(record(quiet, 1, size=(96, 128)))
+    assert fit.black_noise_se_dn is not None
+    assert abs(fit.black_dn - black) < 3 * fit.black_noise_se_dn

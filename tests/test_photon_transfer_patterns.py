@@ -18,6 +18,7 @@ from dsis.camera import Camera
 from dsis.cfa import Cfa
 from dsis.draw import Draw
 from dsis.effects import registry
+from dsis.errors import InputError
 from dsis.grid import PixelGrid
 from dsis.simulate.maps import with_maps
 
@@ -221,3 +222,16 @@ def test_the_error_of_this_sensors_black_level_leaves_its_pattern_out() -> None:
     assert fit.segments.lines[0].intercept_se_dn2 == pytest.approx(
         plain.segments.lines[0].intercept_se_dn2, rel=0.3
     )
+
+
+def test_flats_of_which_most_pixels_are_dark_are_no_camera() -> None:
+    recording = record(ONE, 1, levels=(0.0, 0.0, 500.0, 1100.0, 3000.0), size=(N, M))
+    lit = np.random.default_rng(1).random((N, M)) < 0.3
+    dark = recording.exposures[0].stack
+    masked = tuple(
+        e if e.kind == "dark" else replace(e, stack=np.where(lit, e.stack, dark + e.stack % 3))
+        for e in recording.exposures
+    )
+    fit = fit_camera(replace(recording, exposures=masked))
+    with pytest.raises(InputError, match=r"prnu\.sigma_percent: was measured as 1\d\d"):
+        _ = fit.camera

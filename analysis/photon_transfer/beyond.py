@@ -4,11 +4,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from pydantic import ValidationError
 
 from analysis.photon_transfer.black import DarkLine
 from analysis.photon_transfer.parts import P_SEEN, Component
 from analysis.photon_transfer.patterns import FixedPatterns
 from dsis.effects import Effect, registry
+from dsis.errors import InputError
 
 LEAST_Z = 3.0  # standard errors from which a growth is taken for real
 
@@ -32,8 +34,13 @@ class FittedEffect:
 
     @property
     def effect(self) -> Effect:
-        """The link of a camera's chain."""
-        return registry()[self.kind].model_validate({self.parameter: self.value})
+        """The link of a camera's chain; raises `InputError` where no sensor is like that."""
+        try:
+            return registry()[self.kind].model_validate({self.parameter: self.value})
+        except ValidationError as error:
+            fact = f"was measured as {self.value:.4g}: {error.errors()[0]['msg'].lower()}; are the "
+            fact += "flats lit all over, and is cfa right?"
+            raise InputError.of("the fitted model", f"{self.kind}.{self.parameter}", fact) from None
 
 
 def effects_of(

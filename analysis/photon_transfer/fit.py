@@ -204,7 +204,7 @@ def fit_camera(
     sums.without(recording, {v.statistics.exposure for v in levels if v.left_out})
     current = pooled_current(darks)
     patterns = sums.patterns(recording, levels, 0.0 if current is None else current.value)
-    black = black_level(recording.sensor.black_level, darks, patterns.dark, remarks)
+    black = black_level(recording.sensor.black_level, darks, patterns.dark, remarks, patterns.why)
     points = points_of(levels)
     found = _fit(recording, levels, points, segments, black.noise_se_dn or 0.0)
     levels = [with_residual(level, found) for level in levels]

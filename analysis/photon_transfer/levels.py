@@ -66,18 +66,23 @@ def dark_of(measured: Sequence[LevelStatistics], channel: str, step_dn: int = 1)
     ]
     if not usable:
         return None
-    times, levels, errors = [], [], []
+    times, levels, errors, hidden = [], [], [], False
     for s in usable:
         plain = unrounded(
             s.level_dn, s.level_se_dn, s.variance_dn2, s.variance_se_dn2, s.fixed_dn2, step_dn
         )
+        hidden |= not plain.recovered
         # A frame offset that wanders moves the mean more than the pixels' noise does.
         wanders = stats.f.sf(s.wander, s.frames - 1, 1e6) < WANDER_P
         error = plain.level_se_dn * (np.sqrt(s.wander) if wanders else 1.0)
         times.append(s.exposure_time_s)
         levels.append(plain.level_dn)
         errors.append(float(error))
-    return dark_line(times, levels, errors)
+    line = dark_line(times, levels, errors)
+    if not hidden:
+        return line
+    # Codes hide where between two of them the mean lies: alike in all darks, so nothing averages.
+    return replace(line, black_se_dn=float(np.hypot(line.black_se_dn, step_dn / np.sqrt(12))))
 
 
 def levels_of(

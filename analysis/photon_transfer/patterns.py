@@ -35,6 +35,8 @@ class FixedPatterns:
         The best linear estimates, pixel by pixel; None with fewer than four darks or flats of use.
     dead
         Pixels with less than a thousandth of the mean gain.
+    why
+        Why `dark` is empty; empty where it is not.
     """
 
     dark: Mapping[str, Pattern]
@@ -42,6 +44,7 @@ class FixedPatterns:
     falloff: tuple[float, float] | None
     maps: SensorMaps | None
     dead: int
+    why: str = ""
 
 
 class PatternSums:
@@ -80,8 +83,13 @@ class PatternSums:
         darks = _Stack.of([s for s in of_use if s.kind == "dark"])
         flats = _Stack.of([s for s in of_use if s.kind == "flat"])
         sites = _sites(recording)
-        if darks is None or min(n // (1 + (len(sites) > 1)) for n in self._shape) < LEAST_LINES:
-            return FixedPatterns({}, {}, None, None, 0)
+        if darks is None:
+            why = "no dark is of use in all channels"
+            return FixedPatterns({}, {}, None, None, 0, why)
+        lines = min(n // (1 + (len(sites) > 1)) for n in self._shape)
+        if lines < LEAST_LINES:
+            why = f"a channel has {lines} rows or columns, {LEAST_LINES} are needed"
+            return FixedPatterns({}, {}, None, None, 0, why)
         dark = self._total["dark"] / darks.frames
         parts = {name: Pattern.of(dark[site], darks.noise[name]) for name, site in sites.items()}
         if flats is None or min(darks.frames, flats.frames) < LEAST_FRAMES:

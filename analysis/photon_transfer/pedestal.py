@@ -38,6 +38,7 @@ def black_level(
     darks: Mapping[str, DarkLine | None],
     patterns: Mapping[str, Pattern],
     remarks: list[str],
+    why: str = "",
 ) -> BlackLevel:
     """Return the black level; what limits it is added to `remarks`.
 
@@ -52,6 +53,8 @@ def black_level(
         current differs by pixel, it makes the error an upper bound.
     remarks
         What is to be said.
+    why
+        Why there is no pattern, where there is none.
     """
     known = {name: dark for name, dark in darks.items() if dark is not None}
     if not known:
@@ -62,8 +65,8 @@ def black_level(
         return BlackLevel(nominal_dn, None, None)
     if set(known) - set(patterns):
         remarks.append(
-            "The fixed pattern of the darks was not measured: the black level's error is temporal "
-            "noise alone."
+            f"The fixed pattern of the darks was not measured ({why}): the black level's error is "
+            "temporal noise alone."
         )
         fixed = dict.fromkeys(known, 0.0)
     else:

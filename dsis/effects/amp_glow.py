@@ -56,6 +56,7 @@ class AmpGlow(Effect):
             "fixed_smooth_variance",
             "fixed_correlation_0_1",
             "fixed_correlation_1_0",
+            "code_imbalance",
         }
     )
     grows_with_time: ClassVar[bool] = True

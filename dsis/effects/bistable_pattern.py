@@ -45,6 +45,8 @@ class BistablePattern(Effect):
             "frame_correlation",
             "spectral_peak",
             "row_spectrum_peak",
+            "variance_spread",
+            "code_imbalance",
         }
     )
     confounders: ClassVar[str] = (

@@ -42,6 +42,7 @@ class BrighterFatter(Effect):
             "correlation_2_0",
             "spectral_peak",
             "row_spectrum_peak",
+            "variance_spread",
         }
     )
     confounders: ClassVar[str] = (

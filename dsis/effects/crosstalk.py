@@ -41,6 +41,7 @@ class Crosstalk(Effect):
             "correlation_2_0",
             "spectral_peak",
             "row_spectrum_peak",
+            "variance_spread",
         }
     )
     confounders: ClassVar[str] = (

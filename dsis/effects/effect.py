@@ -188,7 +188,7 @@ class OperatingPoint:
             column += both * c * (h - abs(dy)) / h**2 * (dx == 0)
             frame += both * c * (h - abs(dy)) * (w - abs(dx)) / (h * w) ** 2
         found = self.components(pixel, row, column, frame)
-        total = self.variance_dn2 + pixel
+        total = self.variance_dn2 + found["pixel_variance"]  # what is left beside rows and columns
         for dy, dx in ((0, 1), (1, 0), (1, 1), (0, 2), (2, 0)):
             found[f"correlation_{dy}_{dx}"] = covariance_dn2.get((dy, dx), 0.0) / total
         return found
@@ -199,7 +199,8 @@ class OperatingPoint:
         """Return the contributions of a linear kernel that acts on white noise of a variance.
 
         Weights by (row, column) from the pixel itself; covariances are the kernel's correlation
-        with itself.
+        with itself. Pixels at the border, whose neighbours are fewer, count as any other: on 96 x
+        64 pixels that is an error of 0.5 % of a correlation for weights of 0.05, 2 % for 0.2.
         """
         change = {(0, 0): -variance_dn2}
         for (y, x), a in kernel.items():

@@ -31,11 +31,9 @@ class HotPixels(Effect):
             "level",
             "pixel_variance",
             "fixed_pixel_variance",
-            "fixed_row_variance",
-            "fixed_column_variance",
-            "fixed_smooth_variance",
             "variance_spread",
             "kurtosis",
+            "code_imbalance",
         }
     )
     grows_with_time: ClassVar[bool] = True

@@ -42,6 +42,8 @@ class PeriodicNoise(Effect):
             "frame_correlation",
             "spectral_peak",
             "row_spectrum_peak",
+            "variance_spread",
+            "code_imbalance",
         }
     )
     confounders: ClassVar[str] = (

@@ -40,6 +40,7 @@ class PinkNoise(Effect):
             "correlation_0_2",
             "spectral_peak",
             "row_spectrum_peak",
+            "variance_spread",
         }
     )
     confounders: ClassVar[str] = (

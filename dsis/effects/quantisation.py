@@ -24,7 +24,15 @@ class Quantisation(Effect):
     rank: ClassVar[int] = 60
     reference: ClassVar[str] = "Widrow & Kollar, Quantization Noise, Cambridge, 2008"
     measures: ClassVar[frozenset[str]] = frozenset(
-        {"level", "pixel_variance", "kurtosis", "skewness", "code_spacing", "code_imbalance"}
+        {
+            "level",
+            "pixel_variance",
+            "kurtosis",
+            "skewness",
+            "code_spacing",
+            "code_imbalance",
+            "variance_spread",
+        }
     )
     confounders: ClassVar[str] = (
         "Every moment of narrow noise: judge codes first. adc_dnl uses all codes, unequally."

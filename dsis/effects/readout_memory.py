@@ -45,6 +45,7 @@ class ReadoutMemory(Effect):
             "correlation_2_0",
             "spectral_peak",
             "row_spectrum_peak",
+            "variance_spread",
         }
     )
     confounders: ClassVar[str] = (

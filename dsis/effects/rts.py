@@ -33,10 +33,12 @@ class Rts(Effect):
         {
             "pixel_variance",
             "kurtosis",
-            "skewness",
             "variance_spread",
             "frame_correlation",
             "fixed_pixel_variance",
+            "spectral_peak",
+            "row_spectrum_peak",
+            "code_imbalance",
         }
     )
     confounders: ClassVar[str] = (

@@ -37,6 +37,7 @@ class SpatialFiltering(Effect):
             "correlation_2_0",
             "spectral_peak",
             "row_spectrum_peak",
+            "variance_spread",
         }
     )
     confounders: ClassVar[str] = (

@@ -1,8 +1,9 @@
 """Plain grey PNG frames: inflated in one piece, in half the time that reading row by row takes.
 
-What is not plain (colours, transparency, interlacing, fewer than 8 bits) or not sound (a checksum,
-a length) is left to the library of all formats, whose word on it counts. Format: W3C
-Recommendation "Portable Network Graphics", second edition, sections 5, 7 and 9.
+What is not plain (colours, transparency, interlacing, fewer than 8 bits) or not sound in its length
+is left to the library of all formats, whose word on it counts. A wrong checksum is refused here:
+that library's own would also print it. Format: W3C Recommendation "Portable Network Graphics",
+second edition, sections 5, 7 and 9.
 """
 
 import struct
@@ -10,11 +11,13 @@ import zlib
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dsis.compiled import inlined, kernel
+from dsis.errors import InputError
 
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _UNDERSTOOD = {b"IHDR", b"IDAT", b"IEND"}
@@ -22,21 +25,27 @@ _PLAIN = [0, 0, 0, 0]  # grey, the one compression, the one filtering, not inter
 _MAX_BYTES = 2**31
 
 
-def _inflate() -> tuple[Callable[..., bytes], type[Exception]]:
+def _inflate() -> tuple[Callable[[], Any], type[Exception]]:
     """Return what unpacks, and its error; isal does in half of zlib's time where it is there."""
     try:
         fast = import_module("isal.isal_zlib")
     except ImportError:
-        return zlib.decompress, zlib.error
-    return fast.decompress, fast.error
+        return zlib.decompressobj, zlib.error
+    return fast.decompressobj, fast.error
 
 
-_DECOMPRESS, _DAMAGED = _inflate()
+_DECOMPRESSOR, _DAMAGED = _inflate()
 
 
 def plain_codes(path: Path) -> NDArray[np.unsignedinteger] | None:
-    """Return the codes of a sound grey PNG of 8 or 16 bits, (row, column); None for any other."""
-    content = chunks(path.read_bytes())
+    """Return the codes of a sound grey PNG of 8 or 16 bits, (row, column); None for any other.
+
+    Raises `InputError` where a checksum or the packed lines are damaged.
+    """
+    try:
+        content = chunks(path.read_bytes())
+    except zlib.error as error:
+        raise InputError.of(path, "", f"is damaged: {error}") from None
     if content is None:
         return None
     (columns, rows, bits, *kind), packed = content
@@ -44,12 +53,13 @@ def plain_codes(path: Path) -> NDArray[np.unsignedinteger] | None:
     expected = rows * (1 + columns * size)
     if bits not in (8, 16) or kind != _PLAIN or not 0 < expected < _MAX_BYTES:
         return None
+    unpacking = _DECOMPRESSOR()
     try:
-        # One byte of room beyond the end, or the buffer is grown to look for more.
-        lines = np.frombuffer(_DECOMPRESS(packed, bufsize=expected + 1), np.uint8)
+        # One byte of room beyond the end shows lines too many, however far they would swell.
+        lines = np.frombuffer(unpacking.decompress(packed, expected + 1), np.uint8)
     except _DAMAGED:
-        return None
-    if lines.size != expected:
+        raise InputError.of(path, "", "is damaged: its packed lines cannot be unpacked") from None
+    if lines.size != expected or not unpacking.eof:  # the end has the checksum of all lines
         return None
     codes: NDArray[np.unsignedinteger] = np.empty((rows, columns), np.uint8 if size == 1 else ">u2")
     out = codes.view(np.uint8).reshape(rows, columns * size)
@@ -58,7 +68,10 @@ def plain_codes(path: Path) -> NDArray[np.unsignedinteger] | None:
 
 
 def chunks(content: bytes) -> tuple[tuple[int, ...], bytes] | None:
-    """Return the fields of the header and the packed lines; None where a chunk is not sound."""
+    """Return the fields of the header and the packed lines; None where it is no whole plain PNG.
+
+    Raises `zlib.error` where the checksum of a chunk that is needed is wrong.
+    """
     if not content.startswith(_SIGNATURE):
         return None
     view, at = memoryview(content), len(_SIGNATURE)
@@ -70,6 +83,9 @@ def chunks(content: bytes) -> tuple[tuple[int, ...], bytes] | None:
         if end + 4 > len(content):
             return None
         if zlib.crc32(view[at + 4 : end]) != struct.unpack_from(">I", content, end)[0]:
+            if kind in _UNDERSTOOD:
+                message = f"the checksum of a chunk {kind.decode()} is wrong"
+                raise zlib.error(message)
             return None
         critical = kind[:1].isupper()
         if (critical and kind not in _UNDERSTOOD) or kind == b"tRNS":

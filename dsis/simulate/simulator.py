@@ -1,5 +1,6 @@
 """A camera model's recording: frames by threads, written in order; the seed fixes every byte."""
 
+import zlib
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
@@ -70,10 +71,10 @@ def simulate_like(
     if faults:
         raise InputError(faults)
     used = camera if maps is None else with_maps(camera, maps, recording.grid)
-    shots = Imitation(used, recording, _sensor(seed), maps, jobs).shots()
-    return simulate(
-        used, shots, recording.rows, recording.columns, out, seed=seed, jobs=jobs, progress=progress
-    )
+    draw = _draw(seed, recording, maps)
+    shots = Imitation(used, recording, draw.within("sensor"), maps, jobs).shots()
+    frames = simulated_frames(used, shots, recording.grid, jobs=jobs, draw=draw)
+    return _written(used, shots, frames, out, seed, progress)
 
 
 def simulate(
@@ -91,6 +92,19 @@ def simulate(
     faults = _faults(camera)
     if faults:
         raise InputError(faults)
+    grid = PixelGrid(rows, columns, camera.cfa)
+    frames = simulated_frames(camera, shots, grid, seed=seed, jobs=jobs)
+    return _written(camera, shots, frames, out, seed, progress)
+
+
+def _written(
+    camera: Camera,
+    shots: Sequence[Shot],
+    frames: Iterator[NDArray[np.uint16]],
+    out: Path,
+    seed: int,
+    progress: Progress | None,
+) -> Recording:
     sensor = Sensor(
         name=camera.name,
         cfa=camera.cfa,
@@ -98,27 +112,32 @@ def simulate(
         white_level=camera.white_level,
         bit_depth=camera.bit_depth,
     )
-    grid = PixelGrid(rows, columns, camera.cfa)
-    frames = simulated_frames(camera, shots, grid, seed=seed, jobs=jobs)
     origin = f"simulated from camera model {camera.name!r}, seed {seed}"
     plans = [shot.plan for shot in shots]
     return write_recording(out, sensor, plans, frames, origin=origin, progress=progress)
 
 
 def simulated_frames(
-    camera: Camera, shots: Sequence[Shot], grid: PixelGrid, *, seed: int = 0, jobs: int = 1
+    camera: Camera,
+    shots: Sequence[Shot],
+    grid: PixelGrid,
+    *,
+    seed: int = 0,
+    jobs: int = 1,
+    draw: Draw | None = None,
 ) -> Iterator[NDArray[np.uint16]]:
     """Yield the codes of every frame, exposure after exposure: uint16 (row, column).
 
     One sensor serves the whole recording; each exposure has temporal noise of its own, by name.
     """
-    sensor = _sensor(seed)
+    draws = Draw(seed) if draw is None else draw
+    sensor = draws.within("sensor")
     # Codes come less black and, where black is a fraction, are no whole numbers: round to nearest.
     offset = np.float32(camera.black_level + 0.5)
 
     def expose(work: tuple[Shot, Image, int]) -> NDArray[np.uint16]:
         shot, clean, frame = work
-        temporal = Draw(seed).within("exposure", shot.plan.name)
+        temporal = draws.within("exposure", shot.plan.name)
         image = camera.expose(
             clean, temporal, sensor, frame, grid, exposure_time_s=shot.plan.exposure_time_s
         )
@@ -135,8 +154,19 @@ def _work(shots: Sequence[Shot], grid: PixelGrid) -> Iterator[tuple[Shot, Image,
             yield shot, clean, frame
 
 
-def _sensor(seed: int) -> Draw:
-    return Draw(seed).within("sensor")
+def _draw(seed: int, recording: Recording, maps: SensorMaps | None) -> Draw:
+    """Return the fields of an imitation: none that made the recording or the maps.
+
+    A recording simulated with the same seed would meet its own sensor and noise again: as a new
+    sensor it would be the old one; with maps, its noise, part of which is in them, and its pattern,
+    part of which they miss, would come a second time and add up.
+    """
+    content = 0
+    for exposure in recording.exposures:
+        content = zlib.crc32(recording.frame(exposure, 0).astype("<u2").tobytes(), content)
+    if maps is not None:
+        content = zlib.crc32(maps.prnu_gain.tobytes(), zlib.crc32(maps.dsnu_dn.tobytes(), content))
+    return Draw(seed).within("like", f"{content}")
 
 
 def _faults(camera: Camera) -> list[Fault]:

@@ -114,7 +114,7 @@ def fill_observer(page):
         "colour_vision": "normal",
     }.items():
         page.select_option(f"{form} [name={name}]", value)
-    for name, value in {"acuity": "1.25", "colour_plates": "14", "colour_read": "14"}.items():
+    for name, value in {"acuity": "0.63", "colour_plates": "14", "colour_read": "14"}.items():
         page.fill(f"{form} [name={name}]", value)
     page.press(f"{form} [name=note]", "Enter")
 

@@ -6,6 +6,7 @@ import json
 import re
 import shlex
 import shutil
+import sqlite3
 import subprocess
 from pathlib import Path
 
@@ -31,7 +32,7 @@ from dsis.session.memory import available_memory_bytes, check_memory, clips_kept
 from dsis.session.panel import enrol, held
 from dsis.session.plan import draw_plan
 from dsis.session.setup import Setup, current_setup, put_in_force
-from dsis.session.store import Vote, open_store, read_store
+from dsis.session.store import STORE, Vote, open_store, read_store
 from dsis.spec import Sequence, Session
 
 SIZE = Sequence(width=16, height=12, fps=25.0, seconds=0.16)  # 4 frames
@@ -180,6 +181,8 @@ def test_sheets_show_the_observer_no_stimulus_and_votes_are_typed_in(folder, tmp
         (("P99", 1, 4), "row 3: presentation: '1' is not in the plan of 'P99'"),
         (("robot-001", 1, 4), "row 3: observer: 'robot-001' is a simulated observer"),
         (("P02", 1, 5), "row 3: presentation: 1 of P02 is in row 2 already"),
+        (("P02", "01", 7), "row 3: presentation: 01 of P02 is in row 2 already"),
+        (("P01", 1, "--5"), "row 3: vote: is '--5'"),
         (("P03", 1, 9), "row 3: vote: is 9, but 4 is stored already"),
     ],
 )
@@ -482,3 +485,17 @@ def test_consent_and_hidden_references_come_from_the_spec_where_no_set_up_says()
     assert Setup(lab="TUM").completed(session).hidden_references
     own = Setup(consent="Ours.", hidden_references=False).completed(session)
     assert (own.consent, own.hidden_references) == ("Ours.", False)
+
+
+def test_votes_that_were_altered_are_not_exported(folder, tmp_path):
+    plan_panel(folder, seed=5)
+    with open_store(folder, read_manifest(folder)) as store:
+        store.record_vote(store.rows("P01")[0].id, Vote(4, None, NOW, True, None, False))
+    export_votes(folder, tmp_path / "votes")
+    db = sqlite3.connect(folder / STORE)
+    db.execute("DROP TRIGGER votes_no_UPDATE")
+    db.execute("UPDATE votes SET vote = 9")
+    db.commit()
+    db.close()
+    with pytest.raises(DamagedError, match="not those in the log"):
+        export_votes(folder, tmp_path / "votes")

@@ -414,6 +414,14 @@ def test_a_dropped_last_frame_counts_too(sitting):
     assert "1 frames dropped" in sitting.said[-1]
 
 
+def test_a_last_frame_that_freezes_counts_too(sitting):
+    presentation = sitting.next()
+    form = sitting.form(presentation, sitting.watch(presentation), 7)
+    form["clips"][-1]["longest_interval_ms"] = 540.0  # 40 ms were due
+    sitting.vote(presentation, form)
+    assert "12 frames dropped" in sitting.said[-1]
+
+
 def test_a_reload_shows_the_presentation_again_and_the_old_page_is_stale(folder, sitting):
     presentation = sitting.next()
     old = sitting.watch(presentation)
@@ -739,6 +747,34 @@ def test_another_player_shows_the_clips_and_counts_the_frames(folder):
         assert [vote.dropped_frames for vote in votes] == [4, 0, 0, 0, 0]
         assert [vote.valid for vote in votes] == [False, True, True, True, True]
         assert store.events("display")[0]["player"] == {"player": "none", "version": "1"}
+
+
+def test_a_player_shows_one_thing_at_a_time_however_often_a_page_is_reloaded(folder):
+    class Slow(Program):
+        now = most = 0
+
+        def show(self, steps, clips):
+            self.now += 1
+            self.most = max(self.most, self.now)
+            time.sleep(0.2)
+            self.now -= 1
+            return super().show(steps, clips)
+
+    program = Slow()
+    with Sitting(folder, write_test(folder, training=0, dummies=0), player=program) as sitting:
+        presentation = sitting.next()
+        url = f"/api/presentations/{presentation['id']}/show"
+        first = sitting.start(presentation)
+        left = threading.Thread(
+            target=sitting.http.post, args=(f"{url}/{first}",), kwargs={"json": {}}
+        )
+        left.start()
+        time.sleep(0.1)
+        second = sitting.start(presentation)  # the page was reloaded
+        assert sitting.http.post(f"{url}/{second}", json={}).status_code == 200
+        left.join()
+    assert program.most == 1
+    assert len(program.shown) == 2
 
 
 def test_a_page_cannot_state_its_own_count_of_dropped_frames(sitting):

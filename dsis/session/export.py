@@ -62,9 +62,12 @@ def export_votes(folder: Path, out: Path, *, personal: bool = False) -> None:
     ------
     InputError
         There is no vote, or `out` holds something else.
+    DamagedError
+        The store is damaged, or votes or log were altered.
     """
     manifest = read_manifest(folder)
     with read_store(folder) as store:
+        store.check()
         logs = list(frame_log(store))
         shown = list(_shown(store, manifest, logs))
         tables = _tables(store, manifest, shown)

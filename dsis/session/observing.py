@@ -7,6 +7,7 @@ player shows what `presentation` describes, between `start` and `vote`.
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from threading import Lock
 from typing import Annotated, Any
 
 from pydantic import Field
@@ -75,6 +76,7 @@ class Observation:
         self._clips: dict[str, PlayerClip] = {}
         self._showing: tuple[int, int, float] | None = None  # row, number, start in seconds
         self._shown: tuple[ClipLog, ...] = ()  # by a player of the server's
+        self._playing = Lock()  # a page that is reloaded leaves its showing running
         self._display_confirmed = self._filled = False
 
     def describe(self) -> dict[str, Any]:
@@ -219,9 +221,12 @@ class Observation:
         row = self._current_is(row_id)
         if self._player is None or self._showing is None or self._showing[:2] != (row.id, showing):
             raise InputError.of("presentation", "", f"{row.id} was not started in this window")
-        shown = self._player.show(steps(self._manifest.session), self._pair(row))
-        if self._showing[:2] == (row.id, showing):  # a reloaded page may have started it again
-            self._shown = shown
+        with self._playing:
+            if self._showing[:2] != (row.id, showing):  # a reloaded page has started it again
+                return
+            shown = self._player.show(steps(self._manifest.session), self._pair(row))
+            if self._showing[:2] == (row.id, showing):
+                self._shown = shown
 
     def vote(self, row_id: int, form: Mapping[str, Any]) -> int | None:
         """Store a vote and return the vote that stands; the same vote twice is one vote.
@@ -283,13 +288,17 @@ class Observation:
         return logs
 
     def _dropped(self, log: ClipLog, step: Step) -> int:
-        """Return the frames of a clip that were not painted."""
+        """Return the frames of a clip that were not painted, or stood through after the last."""
         if log.dropped is not None:
             return log.dropped
         painted = [number for number, _ in log.frames]
         if painted != sorted(set(painted)) or (painted and painted[-1] >= self._frames(step)):
             raise InputError.of("vote", "clips", f"{log.show}: frames are not in order")
-        return self._frames(step) - len(painted)
+        missing = self._frames(step) - len(painted)
+        # Between two frames that were painted a gap of d missing ones lasts less than d + 2 frames:
+        # whatever stays longer is the last one, frozen when the grey should have come.
+        stayed = int((log.longest_interval_ms or 0.0) * self._manifest.sequence.fps / 1000)
+        return max(missing, stayed - 1)
 
     def _clip_steps(self) -> list[Step]:
         return [step for step in steps(self._manifest.session) if step.show != "grey"]

@@ -149,7 +149,7 @@ def _checked(
         return fault("observer", f"{observer!r} is a simulated observer")
     if not text:
         return None
-    grade = int(text) if text.lstrip("-").isdecimal() else None
+    grade = int(text) if text.removeprefix("-").isdecimal() else None
     if grade is None or not scale[0] <= grade <= scale[1]:
         fact = f"is {text!r}, must be a whole number from {scale[0]} to {scale[1]}"
         return fault("vote", fact)
@@ -159,9 +159,10 @@ def _checked(
 
 
 def _twice(lines: list[_Line], path: Path) -> Iterator[Fault]:
-    seen: dict[tuple[str, str], int] = {}
+    seen: dict[tuple[str, int | str], int] = {}
     for number, observer, place, _ in lines:
-        first = seen.setdefault((observer, place), number)
+        same = int(place) if place.isdecimal() else place  # 01 is 1
+        first = seen.setdefault((observer, same), number)
         if first != number:
             fact = f"{place} of {observer} is in row {first} already"
             yield Fault(str(path), f"row {number}: presentation", fact)

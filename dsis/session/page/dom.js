@@ -21,6 +21,10 @@ export function element(tag, properties, ...children) {
 export function pressedButton(button) {
   return new Promise((resolve) => {
     button.onclick = resolve;
+    // A key that is held down belongs to the screen before: it must not agree to this one.
+    button.onkeydown = (event) => {
+      if (event.repeat) event.preventDefault();
+    };
     button.focus();
   });
 }

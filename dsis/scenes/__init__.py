@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsis.errors import Fault, InputError
-from dsis.scenes import city, landscape
+from dsis.scenes import painted_city, painted_landscape
 
-_PAINTERS = {"city": city.paint, "landscape": landscape.paint}
+_PAINTERS = {"city": painted_city.paint, "landscape": painted_landscape.paint}
 SCENES: Final = tuple(_PAINTERS)
 FEWEST_ROWS = 32
 

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from dsis.scenes import sky
+from dsis.scenes import painted_sky
 from dsis.scenes.block import BLOCK_M, GRID_RAD, ROW_M, Block, Thing
 from dsis.scenes.light import rgb
 from dsis.scenes.surfaces import STREET_M
@@ -21,7 +21,7 @@ def paint(image: Field, seed: int) -> None:
     rows = image.shape[0]
     view = View(image, focal_px=2.75 * rows, horizon_row=0.28 * rows, eye_m=EYE_M, air=1.0)
     texture = Texture.of(seed)
-    sky.paint(view, texture, cover=0.38)
+    painted_sky.paint(view, texture, cover=0.38)
     _hills(view, texture)
     _ground(view, texture)
     things = list(_visible(view, _layout(view, seed)))
@@ -69,8 +69,8 @@ def _ground(view: View, texture: Texture) -> None:
     azimuth = view.azimuths()
     sin, cos = np.sin(azimuth + np.float32(GRID_RAD)), np.cos(azimuth + np.float32(GRID_RAD))
     start = math.ceil(view.horizon_row + view.focal_px * EYE_M / 9000)
-    for first in range(start, view.image.shape[0], sky.ROWS_AT_ONCE):
-        distance = EYE_M / -view.slopes(first, first + sky.ROWS_AT_ONCE)
+    for first in range(start, view.image.shape[0], painted_sky.ROWS_AT_ONCE):
+        distance = EYE_M / -view.slopes(first, first + painted_sky.ROWS_AT_ONCE)
         a, b = distance * sin / np.float32(BLOCK_M), distance * cos / np.float32(ROW_M)
         deep = distance * distance / np.float32(EYE_M * view.focal_px)  # a pixel, along the view
         wide = distance / np.float32(view.focal_px)

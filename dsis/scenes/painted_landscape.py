@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from dsis.scenes import sky
+from dsis.scenes import painted_sky
 from dsis.scenes.building import Building
 from dsis.scenes.groundcover import country, meadow, water
 from dsis.scenes.light import AMBIENT, SUN, hazed
@@ -26,7 +26,7 @@ def paint(image: Field, seed: int) -> None:
     rows, columns = image.shape[:2]
     view = View(image, focal_px=2.1 * rows, horizon_row=0.31 * rows, eye_m=EYE_M, air=0.35)
     texture = Texture.of(seed)
-    sky.paint(view, texture, cover=0.44)
+    painted_sky.paint(view, texture, cover=0.44)
     for first in range(0, columns, STRIP):
         azimuth = view.azimuths(first, first + STRIP)
         _strip(view, texture, land_at(view, texture, azimuth), first, azimuth)

@@ -123,7 +123,7 @@ def planted(folder: Path, cfa: Cfa) -> Planted:
     numbers = {e.name: e.numbers for e in layout.exposures}
     album = Album(layout)
     seen = observe(layout, lambda name: source.frames(name, numbers[name]), album, keep=True)
-    setting = Setting(layout, seen, split.interpolated, 3, 1, REPEATS, 2)
+    setting = Setting(layout, seen, split.interpolated, 3, 1, REPEATS, REPEATS, 2, 4)
     base = State.of(setting, base_camera(cfa), nothing)
     return Planted(frames, gain, split, album, setting, base)
 
@@ -267,7 +267,7 @@ def test_threshold_is_that_of_the_search(mono: Planted, found: Evidence) -> None
     for factor, certain in ((0.99, False), (1.01, True)):
         values = null.mean.copy()
         values[at] += factor * found.threshold_z * null.sd[at]
-        _, chances = locate.tested(null, replace(own, values=values))
+        _, chances = locate.tested(mono.base.setting.layout, null, replace(own, values=values))
         assert (chances[at] < locate.FAMILY) is np.bool_(certain)
     assert found.tests == null.known.sum() + len(null.contrasts.keys)
     assert found.simulations == REPEATS

@@ -65,8 +65,8 @@ def find_mismatch(
     album = Album(layout)
     seen = observe(layout, lambda name: source.frames(name, numbers[name]), album, keep=True)
     samples = sum(len(e.numbers) for e in layout.exposures) * layout.rows * layout.columns
-    nulls, replicates = (8, 2) if samples > _LARGE else (16, 2)
-    setting = Setting(layout, seen, split.interpolated, seed, jobs, nulls, replicates)
+    counts = (8, 4, 2, 2) if samples > _LARGE else (16, 16, 2, 4)
+    setting = Setting(layout, seen, split.interpolated, seed, jobs, *counts)
     base = State.of(setting, camera, step)
     words = VOCABULARY if vocabulary is None else vocabulary & VOCABULARY
     search = Search(
@@ -78,7 +78,7 @@ def find_mismatch(
         frames_of=lambda name: source.frames(name, numbers[name]),
     )
     final = search.run()
-    trial = Trial.of(recording, split, seed)
+    trial = Trial.of(recording, split, source, setting)
     final, gains = _proven(search, search.settle(final), trial)
     proof = trial.proof(base, final, step, source)
     found = _finding(camera, base, final, search, gains, proof)
@@ -94,7 +94,7 @@ def _proven(search: Search, final: State, trial: Trial) -> tuple[State, dict[str
         weak = [named for named in search.named if not gained[named.kind].certain]
         if not weak:
             return final, {kind: one.gain for kind, one in gained.items()}
-        worst = min(weak, key=lambda named: gained[named.kind].total_nats)
+        worst = min(weak, key=lambda named: gained[named.kind].gain.nats_per_frame)
         nats = gained[worst.kind].gain.nats_per_frame
         why = f"gains {nats:.3g} nats per locked frame, no more than chance"
         final = search.drop(final, worst, why)

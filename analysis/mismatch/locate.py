@@ -37,7 +37,7 @@ def floor(key: Key) -> float:
     return _FLOORS.get(key.statistic, 0.0)
 
 
-def tested(null: Null, seen: Vector) -> tuple[Array, Array]:
+def tested(layout: Layout, null: Null, seen: Vector) -> tuple[Array, Array]:
     """Return departures and adjusted chances; departures too small to matter are 0."""
     z = null.departures(seen)
     size = len(seen.keys)
@@ -49,15 +49,35 @@ def tested(null: Null, seen: Vector) -> tuple[Array, Array]:
             z[size + i] = 0.0
     known = np.concatenate([null.known, np.ones(len(null.contrasts.keys), bool)])
     chances = np.ones(len(z))
-    # Sums over exposures and channels, where an effect shows best, share most of the error rate.
-    summed = np.array([not key.exposure and key.scope == "contrast" for key in null.keys])
-    weights = np.where(
-        summed,
-        SUMS / max((known & summed).sum(), 1),
-        (1 - SUMS) / max((known & ~summed).sum(), 1),
-    )
+    weights = shares(layout, null)
     chances[known] = adjusted(null.chances(z[known]), weights[known])
     return z, chances
+
+
+def shares(layout: Layout, null: Null) -> Array:
+    """Return the share of the error rate of each number and contrast; 0 where it is unknown.
+
+    Sums over exposures and channels, where an effect shows best, have most of it.
+    """
+    known = np.concatenate([null.known, np.ones(len(null.contrasts.keys), bool)])
+    single = len(layout.channels) == 1
+    summed = np.array(
+        [
+            not key.exposure
+            and (key.scope == "contrast" or key.channel == "" or single)
+            and key.statistic != "line_correlation"
+            for key in null.keys
+        ]
+    )
+    return np.where(
+        known,
+        np.where(
+            summed,
+            SUMS / max((known & summed).sum(), 1),
+            (1 - SUMS) / max((known & ~summed).sum(), 1),
+        ),
+        0.0,
+    )
 
 
 def located(

@@ -11,7 +11,7 @@ from analysis.mismatch.observe import Frames
 from analysis.mismatch.phase import keeps_phase
 from analysis.mismatch.polish import polish, with_effects
 from analysis.mismatch.predict import Predictor
-from analysis.mismatch.rank import Ranked, ranked
+from analysis.mismatch.rank import Memory, Ranked, ranked
 from analysis.mismatch.segments import second_path
 from analysis.mismatch.state import Setting, State
 from analysis.mismatch.uncertainty import settled
@@ -29,6 +29,8 @@ _PHASES = {
     "periodic_noise": "the pattern's phase is the same in all frames but for its sign",
     "bistable_pattern": "the pattern's phase is another in every frame",
 }
+_SPIKY = 10.0  # standard errors from which tails bend the variances
+_TAILS = frozenset({"kurtosis", "kurtosis_within_pixels", "one_off_outliers"})
 _RESOLVED = 0.7  # share of what an effect touches that it must explain
 
 
@@ -71,6 +73,7 @@ class Search:
     refused: dict[str, str] = field(default_factory=dict)
     ties: list[tuple[Ranked, Ranked]] = field(default_factory=list)
     frames_of: Frames | None = None
+    memory: Memory = field(default_factory=Memory)
 
     def run(self) -> State:
         """Return the final state."""
@@ -80,7 +83,7 @@ class Search:
             if added is None:
                 break
             self.named.append(added[0])
-            state = State.of(self.setting, added[1], self.step)
+            state = State.of(self.setting, added[1], self.step, draft=True)
         return self._pruned(self._polished(state))
 
     def settle(self, state: State) -> State:
@@ -126,10 +129,13 @@ class Search:
     def _best(self, state: State) -> tuple[Named, Camera] | None:
         """Return the effect that explains most, and the camera with it."""
         left = self.vocabulary - {n.kind for n in self.named} - set(self.refused)
-        fitted = self._decided(state, ranked(state, left, self.step))
+        fitted = self._decided(state, ranked(state, left, self.memory, self.step))
         off = {m.statistic for m in state.mismatches}
         path = second_path(state) if "dual_gain" in left and "pixel_variance" in off else None
         most = fitted[0].gain if fitted else 0.0
+        spiky = {m.statistic for m in state.mismatches if abs(m.z) > _SPIKY} & _TAILS
+        if path is not None and fitted and spiky:
+            path = None  # variances of spiky noise say nothing yet
         if path is not None and path.gain > max(LEAST_GAIN, most):
             rivals = tuple((one.kind, path.gain - one.gain) for one in fitted[:3])
             error = {"switch_dn": path.error_dn}
@@ -181,7 +187,7 @@ class Search:
         if not mine:
             return state
         bare = _without(state.camera, [p.effect for _, p in mine], self.camera)
-        predictor = state.predictor(2 * self.setting.replicates)
+        predictor = state.predictor(self.setting.polishing)
         polished = polish(predictor, bare, [p for _, p in mine], rounds=2)
         if polished is None:
             return state

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from analysis.mismatch.bank.coherent import Peak, SpectrumSums, VarianceSums
 from analysis.mismatch.bank.common import common
-from analysis.mismatch.bank.maps import PatternSums, Regressors, parts
+from analysis.mismatch.bank.maps import Parts, PatternSums, Regressors, parts
 from analysis.mismatch.bank.scalars import Number, scalars
+from analysis.mismatch.bank.together import together
 from dsis.cfa import Cfa, pattern
 from dsis.measures import Accumulator, Channel, Measured
 
@@ -147,7 +148,8 @@ class Observation:
     scalars
         Transformed measures, by exposure and channel.
     maps
-        Statistics of the maps over all exposures: by channel, map and name.
+        Statistics of the maps over all exposures: by channel ("": what all have in common), map
+        and name.
     pooled
         Statistics of spectra and persistent variances: by channel and name.
     peaks
@@ -227,7 +229,7 @@ def observe(
     levels: dict[Place, Level] = {}
     found: dict[Place, Mapping[str, Number]] = {}
     sums: dict[str, _Channel] = {}
-    together: dict[str, Mapping[str, Number]] = {}
+    shared: dict[str, Mapping[str, Number]] = {}
     for exposure in layout.uniform:
         measured = measure(layout, frames_of(exposure.name))
         if watch is not None:
@@ -235,7 +237,7 @@ def observe(
         frames = len(exposure.numbers)
         if len(measured.channels) > 1:
             signals = {name: layout.signal_dn[exposure.name, name] for name in measured.channels}
-            together[exposure.name] = common(measured.channels, signals, frames, layout.sites)
+            shared[exposure.name] = common(measured.channels, signals, frames, layout.sites)
         for name, channel in measured.channels.items():
             place = (exposure.name, name)
             levels[place] = _level(channel, frames)
@@ -245,24 +247,40 @@ def observe(
                 sums[name] = _Channel(layout.regressors(name), (n, m))
             variance, signal = layout.variance_dn2[place], layout.signal_dn[place]
             sums[name].add(exposure.name, channel, frames, variance, signal)
-    maps: dict[tuple[str, str], Mapping[str, Number]] = {}
-    images: dict[tuple[str, str], tuple[Array, float]] = {}
-    for name, own in sums.items():
-        for kind, (image, noise) in own.patterns.maps().items():
-            maps[name, kind] = parts(image, noise).numbers
-            if keep:
-                images[name, kind] = (image, noise)
-        if keep:
-            images[name, "variance"] = (own.variances.total, own.variances.squares**0.5)
+    maps, images = _maps(layout, sums)
     return Observation(
         levels,
         found,
         maps,
         {name: own.pooled() for name, own in sums.items()},
         {(name, kind): peak for name, own in sums.items() for kind, peak in own.peaks()},
-        images,
-        together,
+        images if keep else {},
+        shared,
     )
+
+
+def _maps(
+    layout: Layout, sums: Mapping[str, _Channel]
+) -> tuple[dict[tuple[str, str], Mapping[str, Number]], dict[tuple[str, str], tuple[Array, float]]]:
+    """Return the statistics of all maps, and the maps with their noise."""
+    numbers: dict[tuple[str, str], Mapping[str, Number]] = {}
+    images: dict[tuple[str, str], tuple[Array, float]] = {}
+    split: dict[str, dict[str, Parts]] = {}
+    sharp: dict[str, dict[str, float]] = {}
+    for name, own in sums.items():
+        for kind, (image, noise) in own.patterns.maps().items():
+            images[name, kind] = (image, noise)
+            part = parts(image, noise)
+            numbers[name, kind] = part.numbers
+            split.setdefault(kind, {})[name] = part
+            # What is common: a relative gain, or DN (alike, or per second).
+            scale = own.patterns.regressors.scales["gain"] if "gain" in kind else 1.0
+            sharp.setdefault(kind, {})[name] = scale / noise
+        images[name, "variance"] = (own.variances.total, own.variances.squares**0.5)
+    for kind, by_channel in split.items():
+        if len(by_channel) == len(layout.sites) > 1:
+            numbers["", kind] = together(by_channel, sharp[kind], layout.sites)
+    return numbers, images
 
 
 def _level(channel: Channel, frames: int) -> Level:

@@ -1,15 +1,63 @@
 """Effects that could explain what is off, each with fitted parameters, the best first."""
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
 
 from analysis.mismatch.candidates import CANDIDATES, Proposal
 from analysis.mismatch.polish import Polished, polish, with_effects
 from analysis.mismatch.predict import Predictor
 from analysis.mismatch.state import State
+from dsis.effects import Effect
 
+Array = NDArray[np.float64]
 _MOST = 4  # kinds that are fitted, after all were tried as proposed
 _FAR = 15.0  # of log-likelihood behind the best as proposed: fitting does not make up for it
+_ALIKE = 0.05  # relative difference of parameters up to which a proposal is an earlier one
+_SHARED = 0.1  # share of an effect's change that may lie where the model moved since
+
+
+@dataclass
+class Memory:
+    """What proposals changed beside earlier models: contributions of different physics add.
+
+    Attributes
+    ----------
+    changes
+        Effect, the numbers' means then, and its change of them.
+    """
+
+    changes: list[tuple[Effect, Array, Array]] = field(default_factory=list)
+
+    def mean(self, effect: Effect, state: State, predictor: Predictor) -> Array:
+        """Return the numbers predicted with an effect added: as remembered, or else simulated."""
+        null = state.null
+        for known, means, change in self.changes:
+            if not _near(known, effect):
+                continue
+            size = np.where(null.known, np.abs(change) / null.sd, 0.0)
+            moved = np.where(null.known, np.abs(null.mean - means) / null.sd, 0.0) > 1.0
+            if size[moved].sum() <= _SHARED * size.sum():
+                return null.mean + change
+        built = with_effects(state.camera, [effect])
+        if built is None:
+            return np.full_like(null.mean, np.nan)
+        mean = predictor.mean(built)
+        self.changes.append((effect, null.mean, np.nan_to_num(mean - null.mean)))
+        return mean
+
+
+def _near(one: Effect, other: Effect) -> bool:
+    if type(one) is not type(other):
+        return False
+    a, b = one.model_dump(), other.model_dump()
+    return all(
+        abs(a[name] - b[name]) <= _ALIKE * abs(a[name]) if isinstance(a[name], float)
+        else a[name] == b[name]
+        for name in a
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -22,11 +70,13 @@ class Ranked:
     polished: Polished
 
 
-def ranked(state: State, kinds: Iterable[str], step: Callable[[], None]) -> list[Ranked]:
+def ranked(
+    state: State, kinds: Iterable[str], memory: Memory, step: Callable[[], None]
+) -> list[Ranked]:
     """Return the effects among `kinds` that mismatches call for, fitted one at a time."""
     predictor = state.predictor()
     before = predictor.loglik(state.null.mean)
-    tried = _tried(state, predictor, kinds, step)
+    tried = _tried(state, predictor, kinds, memory, step)
     best = max((value for value, _, _ in tried), default=0.0)
     found = []
     for value, kind, proposal in tried[:_MOST]:
@@ -41,7 +91,11 @@ def ranked(state: State, kinds: Iterable[str], step: Callable[[], None]) -> list
 
 
 def _tried(
-    state: State, predictor: Predictor, kinds: Iterable[str], step: Callable[[], None]
+    state: State,
+    predictor: Predictor,
+    kinds: Iterable[str],
+    memory: Memory,
+    step: Callable[[], None],
 ) -> list[tuple[float, str, Proposal]]:
     """Return the best proposal of each kind as it is proposed, the most likely first."""
     off = {m.statistic for m in state.mismatches}
@@ -53,9 +107,9 @@ def _tried(
             continue
         own = []
         for proposal in candidate.propose(clues):
-            built = with_effects(state.camera, [proposal.effect])
-            if built is not None:
-                own.append((predictor.loglik(predictor.mean(built)), kind, proposal))
+            mean = memory.mean(proposal.effect, state, predictor)
+            if np.isfinite(mean).any():
+                own.append((predictor.loglik(mean), kind, proposal))
         if own:
             tried.append(max(own, key=lambda one: one[0]))
         step()

@@ -11,8 +11,9 @@ import scipy.stats
 from numpy.typing import NDArray
 
 from analysis.mismatch.basefit import CLIPPED_SHARE, BaseFit, Offsets, colour, fit_base
+from analysis.mismatch.bending import bending_offsets, bends
 from analysis.mismatch.finding import ParameterError
-from analysis.mismatch.model import Model, Sites, simulate
+from analysis.mismatch.model import Model, Sites
 from analysis.mismatch.observe import Layout, Level, Observation, Place, Taken, sites
 from analysis.mismatch.rounding import rounded, unrounded
 from dsis.camera import BaseNoise, Camera, Segment
@@ -23,7 +24,7 @@ from dsis.recording import Recording
 
 _ROUNDS = 3
 _LEAST_FRAMES = 2
-_REPLICATES = 3
+_SAME = 0.05  # of an error: the fit has settled
 P_PARAMETERS = 0.004  # chance that numbers without error are called wrong
 _SWITCH_DEVIANCE = 12.0  # by which another gap must fit better before the switch is moved
 
@@ -151,16 +152,34 @@ def calibrate(
             layout, seen.levels, at, offsets, black_dn=start, left_out=left_out, slopes=slopes
         )
 
-    for _ in range(_ROUNDS if _bends(camera) else 1):
+    before: BaseFit | None = None
+    for _ in range(_ROUNDS if bends(camera) else 1):
         recorded = _sum(undone, effects)
         fit = fitted(recorded, switches)
+        if before is not None and _same(before, fit):
+            break
+        before = fit
         if len(switches) == 1:
             switches = _moved(seen.levels, left_out, switches, fit, partial(fitted, recorded))
             fit = fitted(recorded, switches)
         model = Model(with_numbers(camera, fit, switches, layout.black_dn), signals_of(layout, fit))
-        effects = _effects(model, layout, seed, jobs)
+        effects = bending_offsets(model, layout, seed + 1, jobs)
     offsets = _sum(_rounding(model, layout, fit), effects)
     return Calibrated(model, fit, fitted(offsets, switches), offsets, switches, left_out)
+
+
+def _same(one: BaseFit, other: BaseFit) -> bool:
+    """Return whether two fits differ by little of their errors."""
+
+    def near(a: float, b: float, error: float) -> bool:
+        return not isfinite(error) or abs(a - b) <= _SAME * error
+
+    return all(
+        near(a.slope, b.slope, a.slope_error) and near(a.intercept, b.intercept, a.intercept_error)
+        for a, b in zip(one.pieces, other.pieces, strict=True)
+    ) and all(
+        near(value, other.black_dn[c], one.black_error_dn[c]) for c, value in one.black_dn.items()
+    )
 
 
 def with_numbers(
@@ -234,39 +253,6 @@ def _rounding(model: Model, layout: Layout, fit: BaseFit) -> Offsets:
                 mean, line, layout.white_dn, code_step(model.camera)
             )
     return Offsets(level, variance)
-
-
-def _bends(camera: Camera) -> bool:
-    """Return whether effects change levels or variances; of coarse codes that is known exactly."""
-    return any(
-        e.measures & {"level", "pixel_variance"}
-        for e in camera.effect
-        if not isinstance(e, Quantisation)
-    )
-
-
-def _effects(model: Model, layout: Layout, seed: int, jobs: int) -> Offsets:
-    """Return what the camera's own effects add to level and variance, by simulation."""
-    if not _bends(model.camera):
-        return Offsets()
-    codes = tuple(e for e in model.camera.effect if isinstance(e, Quantisation))
-    plain = model.with_camera(model.camera.model_copy(update={"effect": codes}))
-    replicates = range(_REPLICATES)
-    pairs = list(
-        zip(
-            simulate(model, layout, replicates, seed + 1, jobs),
-            simulate(plain, layout, replicates, seed + 1, jobs),
-            strict=True,
-        )
-    )
-
-    def change(of: Callable[[Level], float]) -> dict[Place, float]:
-        return {
-            place: float(np.mean([of(a.levels[place]) - of(b.levels[place]) for a, b in pairs]))
-            for place in pairs[0][0].levels
-        }
-
-    return Offsets(change(lambda v: v.level_dn), change(lambda v: v.variance_dn2))
 
 
 def _sum(first: Offsets, second: Offsets) -> Offsets:

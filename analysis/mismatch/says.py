@@ -24,6 +24,7 @@ _WORDS = {
     "correlation_0_2": "the noise two pixels apart along a row is correlated",
     "correlation_2_0": "the noise two pixels apart along a column is correlated",
     "line_correlation": "the noise is correlated over some distance along a line",
+    "alternation_variance": "the noise alternates from pixel to pixel, or from line to line",
     "spectral_peak": "the noise has a periodic component",
     "row_spectrum_peak": "row means have a periodic component",
     "column_spectrum_peak": "column means have a periodic component",

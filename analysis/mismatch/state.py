@@ -33,8 +33,9 @@ class Setting:
         The exposure that the re-calibration leaves out.
     seed, jobs
         Of the simulations.
-    nulls, replicates
-        Simulations for a null, and for the comparison of candidates.
+    nulls, drafts, replicates, polishing
+        Simulations for a null, for that of a model on the way, for the comparison of candidates
+        and for the parameters of all effects together.
     """
 
     layout: Layout
@@ -43,7 +44,9 @@ class Setting:
     seed: int
     jobs: int
     nulls: int
+    drafts: int
     replicates: int
+    polishing: int
 
 
 @dataclass(frozen=True)
@@ -79,22 +82,30 @@ class State:
     mismatches: tuple[Mismatch, ...]
 
     @classmethod
-    def of(cls, setting: Setting, camera: Camera, progress: Callable[[], None]) -> "State":
+    def of(
+        cls,
+        setting: Setting,
+        camera: Camera,
+        progress: Callable[[], None],
+        *,
+        draft: bool = False,
+    ) -> "State":
         """Return the state of a camera after its base numbers were fitted again."""
+        nulls = setting.drafts if draft else setting.nulls
         layout, seen = setting.layout, setting.seen
         calibrated = calibrate(
             camera, layout, seen, setting.interpolated, seed=setting.seed, jobs=setting.jobs
         )
         vectors, fits = [], []
-        for first in range(0, setting.nulls, setting.jobs):
-            batch = range(first, min(first + setting.jobs, setting.nulls))
+        for first in range(0, nulls, setting.jobs):
+            batch = range(first, min(first + setting.jobs, nulls))
             for one in simulate(calibrated.model, layout, batch, setting.seed, setting.jobs):
                 fits.append(calibrated.refit(layout, one.levels))
                 vectors.append(vector(layout, one, fits[-1]))
             progress()
         own = vector(layout, seen, calibrated.residual)
         null = null_of(layout, vectors, own)
-        z, chances = tested(null, own)
+        z, chances = tested(layout, null, own)
         return cls(
             setting,
             calibrated,

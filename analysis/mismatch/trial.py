@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.finding import Change, Gain, Proof
+from analysis.mismatch.heldnumbers import HeldNumbers
 from analysis.mismatch.model import simulate
 from analysis.mismatch.observe import Observation, observe
 from analysis.mismatch.prove.gain import heldout_gain
@@ -16,7 +17,7 @@ from analysis.mismatch.prove.proof import loglik_of, prove_held
 from analysis.mismatch.recalibrate import Calibrated, layout_of
 from analysis.mismatch.source import Source
 from analysis.mismatch.split import Split
-from analysis.mismatch.state import State
+from analysis.mismatch.state import Setting, State
 from analysis.mismatch.vector import vector
 from dsis.camera import Camera
 from dsis.errors import InputError
@@ -30,22 +31,22 @@ _ERRORS = 2.2  # standard errors from a gain to the end of its interval, of few 
 
 @dataclass(frozen=True)
 class Gained:
-    """A gain per locked frame with its interval, and in all of them together."""
+    """A gain per locked frame with its interval, and whether chance is ruled out."""
 
     gain: Gain
-    total_nats: float
+    certain: bool
 
-    @property
-    def certain(self) -> bool:
-        """Whether chance is ruled out.
 
-        The gain exceeds its own uncertainty, and either its interval is above zero or the ratio of
-        likelihoods is above 100: of a model fixed before, chance exceeds that in 1 % of recordings
-        at most (Markov's inequality).
-        """
-        own = self.gain.nats_per_frame
-        above = own > (own - self.gain.ci95[0]) / _ERRORS
-        return above and (self.gain.ci95[0] > 0 or self.total_nats > _TOTAL)
+def _of_pixels(gain: Gain, frames: int) -> Gained:
+    """Return the gain of the locked frames' pixels.
+
+    Chance is ruled out where the gain exceeds its own uncertainty, and either its interval is above
+    zero or the ratio of likelihoods is above 100: of a model fixed before, chance exceeds that in
+    1 % of recordings at most (Markov's inequality).
+    """
+    own = gain.nats_per_frame
+    above = own > (own - gain.ci95[0]) / _ERRORS
+    return Gained(gain, above and (gain.ci95[0] > 0 or own * frames > _TOTAL))
 
 
 @dataclass(frozen=True)
@@ -58,6 +59,8 @@ class Trial:
         The frames.
     held
         What the likelihood reads of them; None where no frame is locked.
+    numbers
+        The bank's numbers of all frames: a witness where single pixels see too little.
     seed
         Of everything random.
     """
@@ -65,19 +68,21 @@ class Trial:
     recording: Recording
     split: Split
     held: Held | None
+    numbers: HeldNumbers
     seed: int
 
     @classmethod
-    def of(cls, recording: Recording, split: Split, seed: int) -> "Trial":
+    def of(cls, recording: Recording, split: Split, source: Source, setting: Setting) -> "Trial":
         """Return the trial of a recording."""
         held = hold(recording, split.development, split.locked) if split.locked else None
-        return cls(recording, split, held, seed)
+        numbers = HeldNumbers(recording, split, source, setting)
+        return cls(recording, split, held, numbers, setting.seed)
 
     def gains(self, final: State, without: Mapping[str, Camera]) -> dict[str, Gained]:
         """Return what the final model gains over cameras without an effect, by effect."""
         if self.held is None:
             nothing = Gain(float("nan"), (float("-inf"), float("inf")))
-            return {kind: Gained(nothing, float("nan")) for kind in without}
+            return {kind: Gained(nothing, certain=False) for kind in without}
         if not without:
             return {}
         signals = final.calibrated.model.signals
@@ -86,8 +91,11 @@ class Trial:
         found = {}
         for kind, camera in without.items():
             less = loglik_of(self.held, camera, signals, seed=self.seed)
-            gain = heldout_gain(less, whole, seed=self.seed)
-            found[kind] = Gained(gain, gain.nats_per_frame * frames)
+            found[kind] = _of_pixels(heldout_gain(less, whole, seed=self.seed), frames)
+            if not found[kind].certain:
+                gain, error = self.numbers.gain(final, camera)
+                if gain.nats_per_frame > error:
+                    found[kind] = Gained(gain, certain=True)
         return found
 
     def proof(self, base: State, final: State, step: Callable[[], None], source: Source) -> Proof:

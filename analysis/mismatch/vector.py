@@ -130,7 +130,7 @@ def contrasts(layout: Layout, reference: Vector, known: NDArray[np.bool_]) -> Co
     keys: list[Key] = []
     rows: list[Array] = []
     for (statistic, channel), which in _groups(reference, known).items():
-        joint = channel in (BOTH, MOSAIC)
+        joint = channel == BOTH or channel.startswith(MOSAIC)
         shapes = dict(SHAPES)
         if joint or statistic in OF_MEAN_FRAMES:
             del shapes["with the signal alone"]
@@ -152,7 +152,8 @@ def _groups(reference: Vector, known: NDArray[np.bool_]) -> dict[tuple[str, str]
     for i, key in enumerate(reference.keys):
         names = []
         if key.scope == MOSAIC and known[i]:
-            names = [(key.statistic, MOSAIC)]
+            odd = f"{MOSAIC}, {key.detail}" if key.statistic == "alternation_variance" else MOSAIC
+            names = [(key.statistic, odd)]
         elif key.scope == "exposure" and known[i] and key.statistic not in OF_CODES:
             names = [(key.statistic, "")]
             if key.statistic in _PAIRS:
@@ -196,7 +197,7 @@ def _over_channels(
     for i, key in enumerate(reference.keys):
         if not key.exposure and known[i] and key.statistic != "line_correlation":
             groups.setdefault((key.statistic, key.scope, key.detail), []).append(i)
-    return groups
+    return {name: which for name, which in groups.items() if len(which) > 1}
 
 
 BOTH = "along rows and columns"

@@ -7,7 +7,7 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.mismatch.bank.scalars import UNKNOWN, Number, gumbel_score
+from analysis.mismatch.bank.scalars import UNKNOWN, Number, gumbel_score, ratio_root
 from dsis.measures import Channel, Estimate
 from dsis.measures.spectra import line_peak, spectral_peak
 
@@ -62,12 +62,16 @@ class VarianceSums:
 
 @dataclass(frozen=True)
 class Peak:
-    """The largest bin of a spectrum: cycles per pixel of the plane along x and y, its height."""
+    """The largest bin of a spectrum: cycles per pixel of the plane along x and y, its height.
+
+    `off` says where in the bin the frequency lies, -0.5 to 0.5 of a bin along y, by the larger
+    neighbour: a sinusoid of bin k + d has (d / (1 - d))^2 as much power in bin k + 1 as in k.
+    """
 
     fx: float
     fy: float
     power: float
-    amplitude_dn2: float
+    off: float = 0.0
 
 
 class SpectrumSums:
@@ -113,6 +117,7 @@ class SpectrumSums:
             found["spectral_peak"] = _peak(spectral_peak(self.power / total, m, degrees))
             found["column_spectrum_peak"] = _peak(line_peak(self.columns / total, m, degrees))
             found |= self._lags(degrees)
+            found |= self._corners(degrees)
         for key, label in (("", "row_spectrum_peak"), ("signal", "row_spectrum_peak of light")):
             if self.weight[key][0]:
                 degrees = max(round(self.degrees(key)), 1)
@@ -128,15 +133,31 @@ class SpectrumSums:
         inner = power[1:, 1:]
         y, x = np.unravel_index(int(inner.argmax()), inner.shape)
         fy = np.fft.fftfreq(n)[y + 1]
-        return Peak(float((x + 1) / m), float(fy), float(inner.max()), 0.0)
+        return Peak(float((x + 1) / m), float(fy), float(inner.max()))
 
     def row_peak(self, key: str) -> Peak | None:
         """Return where the spectrum of row means is largest."""
         if not self.weight[key][0]:
             return None
         power = self.rows[key][1:] / self.weight[key][0]
-        place = int(power.argmax()) + 1
-        return Peak(0.0, place / self.shape[0], float(power.max()), 0.0)
+        place = int(power.argmax())
+        off = _within_bin(power, place)
+        return Peak(0.0, (place + 1) / self.shape[0], float(power.max()), off)
+
+    def _corners(self, degrees: int) -> dict[str, Number]:
+        """Return the power of what alternates from pixel to pixel: real, one square a frame."""
+        n, m = self.shape
+        found: dict[str, Number] = {}
+        if n % 2 or m % 2:
+            return found
+        total = self.weight[""][0]
+        for name, power in (
+            ("checkerboard", self.power[n // 2, m // 2]),
+            ("rows", self.rows[""][n // 2]),
+            ("columns", self.columns[m // 2]),
+        ):
+            found[f"alternation_variance of {name}"] = ratio_root(float(power) / total, degrees)
+        return found
 
     def _lags(self, degrees: int) -> dict[str, Number]:
         n, m = self.shape
@@ -148,6 +169,15 @@ class SpectrumSums:
             for lag in range(1, min(LAGS, line.size // 2 - 1) + 1):
                 found[f"line_correlation along {axis} {lag}"] = (float(line[lag] / line[0]), sd)
         return found
+
+
+def _within_bin(power: Array, place: int) -> float:
+    """Return where between bins a sinusoid in white noise of power 1 lies, -0.5 to 0.5."""
+    excess = sqrt(max(float(power[place]) - 1, 0.0))
+    below = sqrt(max(float(power[place - 1]) - 1, 0.0)) if place else 0.0
+    above = sqrt(max(float(power[place + 1]) - 1, 0.0)) if place + 1 < power.size else 0.0
+    side, larger = (1.0, above) if above >= below else (-1.0, below)
+    return side * larger / (excess + larger) if excess > 0 else 0.0
 
 
 def _peak(found: Estimate) -> Number:

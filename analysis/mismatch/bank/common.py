@@ -4,7 +4,7 @@ Each channel measures a common offset by itself; their mean, weighted by the inv
 white noise, measures it best. A mean square of 1 is white noise.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,18 @@ from analysis.mismatch.bank.scalars import UNKNOWN, Number, ratio_root
 from dsis.measures import Channel
 
 Array = NDArray[np.float64]
-COMMON = ("row_variance", "column_variance", "frame_variance", "frame_variance of light")
+SIGNS: Mapping[str, Callable[[int, int], int]] = {
+    "checkerboard": lambda y, x: (y + x) % 2,
+    "rows": lambda y, _x: y % 2,
+    "columns": lambda _y, x: x % 2,
+}
+COMMON = (
+    "row_variance",
+    "column_variance",
+    "frame_variance",
+    "frame_variance of light",
+    *(f"alternation_variance of {name}" for name in SIGNS),
+)
 
 
 def common(
@@ -49,6 +60,10 @@ def common(
         "frame_variance": _frames(channels, pixel, alike, still, frames),
         "frame_variance of light": UNKNOWN,
     }
+    # What alternates from site to site is constant in every plane, but for its sign.
+    for name, odd in SIGNS.items():
+        signs = {channel: 1.0 - 2.0 * odd(*sites[channel]) for channel in channels}
+        found[f"alternation_variance of {name}"] = _frames(channels, pixel, signs, still, frames)
     if all(value > 0 for value in signal_dn.values()):
         top = max(signal_dn.values())
         shares = {name: signal_dn[name] / top for name in channels}

@@ -21,6 +21,7 @@ from dsis.measures.residuals import pixel_residuals
 Array = NDArray[np.float64]
 MAPS = ("offset", "gain", "time")
 ALONE = ("offset", "gain")
+LOW = "low order"
 _LEAST_SPREAD = 0.02  # share of a regressor that the others leave, to be told from them
 
 
@@ -133,6 +134,8 @@ class Parts:
         Line means beyond smooth ones: (row), (column).
     square
         Mean square of the pixels per degree of freedom.
+    coefficients
+        Of smooth polynomials (row degree, column degree), in units of the map's noise.
     numbers
         The statistics.
     """
@@ -141,6 +144,7 @@ class Parts:
     rows: Array
     columns: Array
     square: float
+    coefficients: Array
     numbers: Mapping[str, Number]
 
 
@@ -160,22 +164,45 @@ def parts(image: Array, noise: float) -> Parts:
     degree = smooth.degree
     row = m * float(rows @ rows) / (n - 1 - degree)
     column = n * float(columns @ columns) / (m - 1 - degree)
-    power = coefficients**2
-    surface = float(power[smooth.mixed].sum())
-    lines = float(power[1:, 0].sum()) * square / max(row, square)
-    lines += float(power[0, 1:].sum()) * square / max(column, square)
-    kinds = smooth.kinds + 2 * degree
     mean_square = squares / pixels.size
     numbers = {
         "fixed_pixel_variance": ratio_root(square, dof),
         "fixed_row_variance": ratio_root(row / square, n - 1 - degree, dof),
         "fixed_column_variance": ratio_root(column / square, m - 1 - degree, dof),
-        "fixed_smooth_variance": ratio_root((surface + lines) / kinds / square, kinds, dof),
+        **surfaces(coefficients, (row, column, square), dof),
         **_correlations(pixels, mean_square),
         "outlying_pixels": _outlying(scatter + mean_square**2, square, pixels.size),
         **_seams(by_row, by_column, (row, column)),
     }
-    return Parts(pixels, rows, columns, square, numbers)
+    return Parts(pixels, rows, columns, square, coefficients, numbers)
+
+
+def surfaces(
+    coefficients: Array, squares: tuple[float, float, float], dof: float
+) -> dict[str, Number]:
+    """Return the power of smooth surfaces: of all, and of those of second degree at most.
+
+    Parameters
+    ----------
+    coefficients
+        (row degree, column degree), in units of the map's noise.
+    squares
+        Mean squares of rows, columns and pixels: lines that differ make polynomials along one axis.
+    dof
+        Of the pixels' mean square.
+    """
+    row, column, square = squares
+    size = len(coefficients)
+    order = np.arange(size)[:, None] + np.arange(size)
+    share = np.ones_like(coefficients)
+    share[:, 0], share[0, :] = square / max(row, square), square / max(column, square)
+    power = coefficients**2 * share
+    found = {}
+    for name, most in (("fixed_smooth_variance", size - 1), (f"fixed_smooth_variance of {LOW}", 2)):
+        taken = (order > 0) & (order <= most)
+        kinds = int(taken.sum())
+        found[name] = ratio_root(float(power[taken].sum()) / kinds / square, kinds, dof)
+    return found
 
 
 def _correlations(pixels: Array, square: float) -> dict[str, Number]:

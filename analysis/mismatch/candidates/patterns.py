@@ -6,6 +6,7 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.mismatch.bank.together import TOGETHER
 from analysis.mismatch.candidates.candidate import Candidate, Proposal, proposals
 from analysis.mismatch.clues import Clues, alike
 from analysis.mismatch.observe import Place
@@ -52,9 +53,11 @@ def _taps(clues: Clues) -> Sequence[Proposal]:
         ("even_odd_columns", "parity", "columns"),
         ("even_odd_rows", "parity", "rows"),
     ):
-        if abs(clues.number(statistic, "gain", axis)) < 3 and not (
-            statistic == "parity" and len(clues.layout.channels) > 1
-        ):
+        clear = max(
+            abs(clues.number(statistic, "gain", axis)),
+            abs(clues.number(statistic, "gain", f"{axis}, {TOGETHER}")),
+        )
+        if clear < 3 and not (statistic == "parity" and len(clues.layout.channels) > 1):
             continue
         gain = 100 * _step(clues, regions)
         if gain:

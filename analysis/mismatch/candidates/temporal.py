@@ -40,18 +40,17 @@ def _line_flicker(clues: Clues) -> Sequence[Proposal]:
         if clear is None:
             continue
         channel, peak = clear
-        cycles = peak.fy * clues.shape(channel)[0]
-        for off in (0.0, 0.35, -0.35):
-            if cycles + off > 0 and not any(
-                abs(p.effect.cycles_per_frame - cycles - off) < 0.2  # type: ignore[attr-defined] # its own kind
-                for p in found
-            ):
-                found += proposals(
-                    "line_flicker",
-                    ["depth_percent", "cycles_per_frame"],
-                    depth_percent=100 * sqrt(2 * variance),
-                    cycles_per_frame=cycles + off,
-                )
+        cycles = peak.fy * clues.shape(channel)[0] + peak.off
+        if cycles > 0 and not any(
+            abs(p.effect.cycles_per_frame - cycles) < 0.2  # type: ignore[attr-defined] # its own kind
+            for p in found
+        ):
+            found += proposals(
+                "line_flicker",
+                ["depth_percent", "cycles_per_frame"],
+                depth_percent=100 * sqrt(2 * variance),
+                cycles_per_frame=cycles,
+            )
     return found
 
 
@@ -74,7 +73,7 @@ def _patterns(kind: str) -> Candidate:
     return Candidate(
         kind,
         ("spectral_peak", "row_spectrum_peak", "column_spectrum_peak", "correlation_0_1",
-         "frame_variance"),
+         "frame_variance", "alternation_variance"),
         propose,
     )  # fmt: skip
 

@@ -6,8 +6,7 @@ import numpy as np
 import scipy.stats
 
 from analysis.mismatch.evidence import Evidence
-from analysis.mismatch.locate import FAMILY
-from analysis.mismatch.locate import SUMS as SUMS
+from analysis.mismatch.locate import FAMILY, shares
 from analysis.mismatch.model import in_threads
 from analysis.mismatch.observe import Observation, observe
 from analysis.mismatch.pictures.album import Album
@@ -73,12 +72,8 @@ def evidence_of(
 def threshold_z(state: State) -> float:
     """Return from where on the number of a single exposure is certain to depart."""
     null = state.null
-    single = sum(
-        1
-        for i, key in enumerate(state.vector.keys)
-        if null.known[i] and (key.exposure or key.scope != "contrast")
-    )
-    chance = FAMILY * (1 - SUMS) / max(single, 1)
+    least = float(min(share for share in shares(state.setting.layout, null) if share > 0))
+    chance = FAMILY * least
     return float(scipy.stats.t.isf(chance / 2, null.degrees))
 
 

@@ -95,7 +95,7 @@ def patch_features(
             (z[:, 2:] * z[:, :-2]).mean((1, 2)),
             low,
             corner,
-            np.log(power[:, 1:].max((1, 2))),
+            np.log(np.maximum(power[:, 1:].max((1, 2)), 1e-12)),
             odd * SIDE**2,
             np.asarray(fours) * SIDE**2,
             memory,

@@ -25,6 +25,8 @@ from analysis.mismatch.prove.virtual import Signals, Stack, base_of, clean_signa
 from dsis.camera import Camera
 from dsis.effects import Image
 
+_LEAST_DN2 = 0.01  # codes are whole: less noise cannot be seen
+
 
 def law_of(camera: Camera, held: Held, signals: Signals, seed: int) -> Law:
     """Return the predictive law of a camera model for the exposures held.
@@ -57,7 +59,7 @@ def _base_law(base: Camera, held: Held, exposure: HeldExposure, signals: Signals
     sites = len(site_places(held.cfa))
     scene = exposure.kind == "scene"  # the pattern that is used is a mean with an error
     return ExposureLaw(
-        np.maximum(variance, 1e-6),
+        np.maximum(variance, _LEAST_DN2),
         np.full(sites, 1 + 1 / max(exposure.trained, 1) if scene else 1.0),
         np.zeros(sites),
         (NORMAL,) * sites,

@@ -22,6 +22,7 @@ STATISTICS = {
     "correlation_2_0": "correlation with the second pixel of the column",
     "correlation_growth": "growth of the correlation with signal",
     "line_correlation": "correlation along a line",
+    "alternation_variance": "power that alternates from pixel to pixel or line to line",
     "spectral_peak": "strongest line of the noise spectrum",
     "row_spectrum_peak": "strongest line of the spectrum of row means",
     "column_spectrum_peak": "strongest line of the spectrum of column means",

@@ -34,7 +34,7 @@ GROUPS: Mapping[str, profiles.Groups] = {"half_seam": "halves", "parity": "parit
 NOISY_PIXELS = frozenset(
     {"variance_spread", "variance_persistence", "noisy_pixels", "one_off_outliers"}
 )
-OFF_AXIS = frozenset({"spectral_peak", "phase"})
+OFF_AXIS = frozenset({"spectral_peak", "phase", "alternation_variance"})
 OF_CODES = frozenset({"code_spacing", "code_imbalance"})
 MANY_PIXELS = frozenset({"fixed_pixel_variance"})
 VARIANCE = "pixel_variance"

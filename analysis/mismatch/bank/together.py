@@ -1,0 +1,80 @@
+"""What the maps of a mosaic's channels have in common: lines and surfaces across all colours.
+
+A row of the sensor crosses two channels, a surface all four: each channel sees it by itself, their
+mean, weighted by the inverse variance of its noise, sees it best.
+"""
+
+from collections.abc import Mapping, Sequence
+from math import sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.mismatch.bank.maps import Parts, surfaces
+from analysis.mismatch.bank.scalars import Number, ratio_root
+
+Array = NDArray[np.float64]
+TOGETHER = "all channels"
+
+
+def together(
+    parts: Mapping[str, Parts],
+    sharpness: Mapping[str, float],
+    sites: Mapping[str, tuple[int, int]],
+) -> dict[str, Number]:
+    """Return the numbers of lines and surfaces that channels share.
+
+    Parameters
+    ----------
+    parts
+        A map's parts by channel, in units of its noise.
+    sharpness
+        By channel: what is common (an offset in DN, a relative gain) in units of a map's noise.
+    sites
+        First row and column of each channel.
+    """
+    names = list(parts)
+    squares = [parts[name].square for name in names]
+    square = float(np.mean(squares))
+    sizes = {name: parts[name].pixels.shape for name in names}
+    dof = sum((n - 1) * (m - 1) for n, m in sizes.values())
+    found = {}
+    lines = {}
+    for axis, label in ((0, "fixed_row_variance"), (1, "fixed_column_variance")):
+        top = bottom = 0.0
+        for side in (0, 1):
+            own = [name for name in names if sites[name][axis] == side]
+            means = [parts[name].rows if axis == 0 else parts[name].columns for name in own]
+            # A mean over a line has the noise of a pixel over the root of the line's length.
+            moved = _mean(means, [sharpness[name] for name in own])
+            degree = len(parts[own[0]].coefficients) - 1
+            across = float(np.mean([sizes[name][1 - axis] for name in own]))
+            top += across * float(moved @ moved)
+            bottom += moved.size - 1 - degree
+        lines[axis] = top / bottom
+        found[f"{label} of {TOGETHER}"] = ratio_root(top / bottom / square, bottom, dof)
+    for axis_name in ("rows", "columns"):
+        steps = [np.array([parts[n].numbers[f"half_seam of {axis_name}"][0]]) for n in names]
+        step = float(_mean(steps, [sharpness[n] for n in names])[0])
+        found[f"half_seam of {axis_name}, {TOGETHER}"] = (step, 1.0)
+    least = min(len(parts[name].coefficients) for name in names)
+    surface = _mean(
+        [parts[name].coefficients[:least, :least] for name in names],
+        [sharpness[name] for name in names],
+    )
+    for name, number in surfaces(surface, (lines[0], lines[1], square), dof).items():
+        joined = name.replace(" of ", ", ", 1) if " of " in name else name
+        statistic, _, order = joined.partition(", ")
+        detail = f"{order}, {TOGETHER}" if order else TOGETHER
+        found[f"{statistic} of {detail}"] = number
+    return found
+
+
+def _mean(values: Sequence[Array], sharpness: Sequence[float]) -> Array:
+    """Return the best mean of values, each of noise 1, in units of its own noise."""
+    size = min(len(v) for v in values)
+    total = sum(
+        (w * v[:size] for v, w in zip(values, sharpness, strict=True)),
+        np.zeros_like(values[0][:size]),
+    )
+    return np.asarray(total / sqrt(sum(w**2 for w in sharpness)))

@@ -1,0 +1,108 @@
+"""What a camera's own effects add to the level and the variance of every exposure."""
+
+from collections.abc import Iterable, Mapping
+from itertools import islice
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.mismatch.basefit import Offsets
+from analysis.mismatch.model import Model, in_threads
+from analysis.mismatch.observe import Layout, Place
+from dsis.camera import Camera
+from dsis.compiled import kernel
+from dsis.effects.quantisation import Quantisation
+
+_BENT = frozenset({"level", "pixel_variance"})
+_SAMPLES = 6e6  # of which both are known well enough, in all replicates
+_REPLICATES = 3
+_FRAMES = 8  # of an exposure: more show neither better
+Pair = tuple[float, float]
+"""Level and variance."""
+
+
+def bends(camera: Camera) -> bool:
+    """Return whether effects change levels or variances; of coarse codes that is known exactly."""
+    return any(e.measures & _BENT for e in camera.effect if not isinstance(e, Quantisation))
+
+
+def bending_offsets(model: Model, layout: Layout, seed: int, jobs: int) -> Offsets:
+    """Return what the camera's own effects add to level and variance, by simulation.
+
+    Only effects that change either are simulated, with and without: the draws are the same.
+    """
+    if not bends(model.camera):
+        return Offsets()
+    codes = [e for e in model.camera.effect if isinstance(e, Quantisation)]
+    bent = [e for e in model.camera.effect if isinstance(e, Quantisation) or e.measures & _BENT]
+    cameras = [model.camera.model_copy(update={"effect": tuple(own)}) for own in (bent, codes)]
+    samples = sum(min(len(e.numbers), _FRAMES) for e in layout.uniform)
+    samples *= layout.rows * layout.columns
+    replicates = min(_REPLICATES, 1 + int(_SAMPLES // samples))
+
+    def one(work: tuple[Camera, int]) -> Mapping[Place, Pair]:
+        camera, replicate = work
+        frames_of = model.with_camera(camera).frames(layout, replicate, seed)
+        found: dict[Place, Pair] = {}
+        for e in layout.uniform:
+            for channel, pair in _pairs(layout, islice(frames_of(e.name), _FRAMES)).items():
+                found[e.name, channel] = pair
+        return found
+
+    work = [(camera, replicate) for replicate in range(replicates) for camera in cameras]
+    made = in_threads(one, work, jobs)
+    with_them, without = made[::2], made[1::2]
+
+    def change(which: int) -> dict[Place, float]:
+        return {
+            place: float(
+                np.mean(
+                    [
+                        a[place][which] - b[place][which]
+                        for a, b in zip(with_them, without, strict=True)
+                    ]
+                )
+            )
+            for place in with_them[0]
+        }
+
+    return Offsets(change(0), change(1))
+
+
+def _pairs(layout: Layout, frames: Iterable[NDArray[np.float32]]) -> dict[str, Pair]:
+    """Return level and pixel variance (means of lines taken off) of each channel."""
+    stack = list(frames)
+    step = 1 if len(layout.sites) == 1 else 2
+    found = {}
+    for channel, (y, x) in layout.sites.items():
+        planes = [np.ascontiguousarray(f[y::step, x::step], np.float32) for f in stack]
+        mean = sum((p.astype(np.float64) for p in planes), np.zeros(planes[0].shape)) / len(planes)
+        squares = sum(_squares_within(plane, mean) for plane in planes)
+        n, m = mean.shape
+        dof = (len(stack) - 1) * (n - 1) * (m - 1)
+        found[channel] = (float(mean.mean()) - layout.black_dn, squares / dof)
+    return found
+
+
+@kernel
+def _squares_within(frame: NDArray[np.float32], mean: NDArray[np.float64]) -> float:
+    """Return the sum of squares of a frame less the mean frame, means of lines taken off."""
+    rows, columns = frame.shape
+    by_column = np.zeros(columns)
+    squares, by_row, whole = 0.0, 0.0, 0.0
+    for y in range(rows):
+        line, means = frame[y], mean[y]
+        total, own = 0.0, 0.0
+        for x in range(columns):
+            d = line[x] - means[x]
+            own += d * d
+            total += d
+            by_column[x] += d
+        squares += own
+        by_row += total * total
+        whole += total
+    across = 0.0
+    for x in range(columns):
+        across += by_column[x] * by_column[x]
+    squares += float(whole) * whole / (rows * columns) - by_row / columns - across / rows
+    return float(squares)

@@ -20,7 +20,7 @@ import os
 import shutil
 import tempfile
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from filelock import FileLock, Timeout
@@ -139,9 +139,13 @@ def _first_line(journal: Path) -> str | None:
 
 @contextmanager
 def _held(out: Path) -> Iterator[None]:
-    """Hold `out` for this process; the lock lies in the system's folder for temporary files."""
+    """Hold `out` for this process; locks lie in one folder beside other temporary files."""
+    folder = Path(tempfile.gettempdir()) / "dsis-locks"
+    folder.mkdir(exist_ok=True)
+    with suppress(PermissionError):  # another user's: it is open to all already
+        folder.chmod(0o1777)
     name = hashlib.blake2b(os.fsencode(out), digest_size=8).hexdigest()
-    lock = FileLock(Path(tempfile.gettempdir()) / f"dsis-{name}.lock", mode=0o666)
+    lock = FileLock(folder / f"{name}.lock", mode=0o666)
     try:
         lock.acquire(blocking=False)
     except Timeout:

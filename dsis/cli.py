@@ -111,7 +111,9 @@ def stimuli(options: argparse.Namespace) -> None:
         print(estimate(test, out, options.jobs))
         return
     with _progress("stimuli") as progress:
-        manifest = build_stimuli(test, out, jobs=options.jobs, progress=progress)
+        manifest = build_stimuli(
+            test, out, jobs=options.jobs, scheduler=options.scheduler, progress=progress
+        )
     print(summary(manifest))
     print(f"{len(manifest.clips)} clips in {out}")
 
@@ -199,6 +201,24 @@ def report(options: argparse.Namespace) -> None:
     print(f"report in {out / 'report.html'}")
 
 
+def scenes(options: argparse.Namespace) -> None:
+    """Render City or Landscape into a file."""
+    from dsis.imagefile import LIGHT_FORMATS, write_light
+    from dsis.scenes import panorama, preset_strip
+
+    out: Path = options.out
+    seed = 1 if options.seed is None else options.seed
+    strip = preset_strip(options.preset, options.name, seed)
+    if out.is_dir() or out.suffix.lower() not in LIGHT_FORMATS:
+        fact = f"must be a file that ends in one of: {', '.join(LIGHT_FORMATS)}"
+        raise InputError.of("--out", "", f"is {str(out)!r}, {fact}")
+    out.parent.mkdir(parents=True, exist_ok=True)
+    with _progress(strip.scene) as progress:
+        light = panorama(strip, threads=options.jobs, progress=progress)
+    write_light(out, light, f"{strip}; linear light, Rec.709 primaries, D65, 1.0 a sunlit white")
+    print(f"{strip} in {out}: linear light, Rec.709 primaries, 1.0 a sunlit white")
+
+
 def plan(options: argparse.Namespace) -> None:
     """Say how many observers a test needs, or what power a pilot promises."""
     from analysis.planning.command import describe_plan, write_power
@@ -258,6 +278,7 @@ def mismatch(options: argparse.Namespace) -> None:
             seed=options.seed or 0,
             jobs=options.jobs,
             without=options.without,
+            scheduler=options.scheduler,
             progress=progress,
         )
     for one in found:
@@ -266,6 +287,26 @@ def mismatch(options: argparse.Namespace) -> None:
         print(comparison({one.name: one.finding for one in found}))
     for one in found:
         print(f"report in {one.folder / 'report.html'}, model in {one.folder / 'camera.toml'}")
+
+
+def paper(options: argparse.Namespace) -> None:
+    """Recompute the tables and figures of the paper."""
+    from analysis.paper import Setting, kodak_images, real_recording, write_paper
+
+    setting = Setting(
+        kodak=kodak_images(options.kodak),
+        recording=real_recording(options.recording),
+        votes=options.votes,
+        scale=tuple(options.scale) if options.scale else None,
+        full=options.full,
+        seed=1 if options.seed is None else options.seed,
+        jobs=options.jobs,
+    )
+    with _progress("paper") as progress:
+        parts = write_paper(options.out, setting, options.names, progress)
+    for part in parts:
+        print(f"{part.title}: {len(part.pictures)} figures, {len(part.all_tables())} tables")
+    print(f"page in {options.out / 'paper.html'}")
 
 
 @contextmanager
@@ -343,6 +384,11 @@ def _add_jobs(sub: argparse.ArgumentParser) -> None:
     )
 
 
+def _add_scheduler(sub: argparse.ArgumentParser) -> None:
+    cluster = "of a Dask cluster that does the work instead: tcp://HOST:8786 (extra dsis[cluster])"
+    sub.add_argument("--scheduler", metavar="ADDRESS", help=cluster)
+
+
 def _add_seed(sub: argparse.ArgumentParser, default: str) -> None:
     sub.add_argument(
         "--seed", type=_whole(0), metavar="N", help=f"fixes every random number ({default})"
@@ -364,9 +410,11 @@ def _parser() -> argparse.ArgumentParser:
     _add_session(add)
     _add_votes(add)
     _add_report(add)
+    _add_scenes(add)
     _add_plan(add)
     _add_camera(commands)
     _add_mismatch(add)
+    _add_paper(add)
     return parser
 
 
@@ -399,6 +447,7 @@ def _add_stimuli(add: Add) -> None:
     check = "verify every frame against the manifest"
     sub.add_argument("--check", type=Path, metavar="DIR", help=check)
     _add_jobs(sub)
+    _add_scheduler(sub)
     _add_seed(sub, "default: the spec's")
 
 
@@ -473,6 +522,24 @@ def _add_report(add: Add) -> None:
 def _add_scale(sub: argparse.ArgumentParser) -> None:
     ends = "ends of the scale, worst first; default: datapackage.json"
     sub.add_argument("--scale", nargs=2, type=_number(), metavar=("LOW", "HIGH"), help=ends)
+
+
+def _add_scenes(add: Add) -> None:
+    sub = add(
+        "scenes",
+        scenes,
+        "Render the panorama of City or Landscape, in linear light, at twice the preset's size. It "
+        "is kept: in $DSIS_CACHE/scenes if that is set, else in dsis/scenes of the user's cache "
+        "folder ($XDG_CACHE_HOME or ~/.cache; ~/Library/Caches; LOCALAPPDATA).",
+        "scenes city --preset lab --out city.exr",
+    )
+    sub.add_argument("name", metavar="NAME", help="city or landscape")
+    preset = "of clips: quick (480x270), standard (960x540, the default) or lab (1920x1080)"
+    sub.add_argument("--preset", default="standard", metavar="P", help=preset)
+    out = "float32: .exr, .tif"
+    sub.add_argument("--out", type=Path, required=True, metavar="FILE.exr", help=out)
+    _add_jobs(sub)
+    _add_seed(sub, "default: 1")
 
 
 def _add_plan(add: Add) -> None:
@@ -563,7 +630,33 @@ def _add_mismatch(add: Add) -> None:
         "--without", nargs="+", action="extend", default=[], metavar="EFFECT", help=without
     )
     _add_jobs(sub)
+    _add_scheduler(sub)
     _add_seed(sub, "default: 0")
+
+
+def _add_paper(add: Add) -> None:
+    sub = add(
+        "paper",
+        paper,
+        "Recompute the paper's tables and figures, printed beside the published numbers.",
+        "paper table1 --kodak kodak/ --out paper",
+    )
+    names = (
+        "of claims, fig1, fig2, table1, equation5, fig3, fig4, fig5, fig6, table2 (default: all)"
+    )
+    sub.add_argument("names", nargs="*", metavar="NAME", help=names)
+    sub.add_argument("--out", type=Path, default=Path("dsis-paper"), metavar="DIR")
+    full = "20 frames of 1920 x 1080, hours; default: 1 frame of 480 x 270, minutes"
+    sub.add_argument("--full", action="store_true", help=full)
+    kodak = "folder of the 24 Kodak images (default: $DSIS_SHARED_DATA/kodak, else City)"
+    sub.add_argument("--kodak", type=Path, metavar="FOLDER", help=kodak)
+    votes = "votes of a test with the paper's conditions, for Fig. 6 (default: robots)"
+    sub.add_argument("--votes", type=Path, metavar="FILE", help=votes)
+    _add_scale(sub)
+    recording = "a real camera's recording for Fig. 2 (default: that of $DSIS_SHARED_DATA)"
+    sub.add_argument("--recording", type=Path, metavar="RECORDING", help=recording)
+    _add_jobs(sub)
+    _add_seed(sub, "default: 1")
 
 
 if __name__ == "__main__":

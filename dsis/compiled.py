@@ -6,21 +6,78 @@ called from any thread (numba's own parallel back ends may not). No fast-math: t
 every processor that rounds as IEEE 754 says.
 """
 
+import hashlib
+import os
+import shutil
+import sys
+import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from functools import lru_cache
+from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba
+from numba.core import event
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 ROWS_PER_BLOCK = 64
+_UNUSED_S = 86400.0  # from when on no process can still write there
+
+
+class _Word(event.Listener):
+    """Says once, on a terminal, why the first use of a command takes longer."""
+
+    def on_start(self, event: object) -> None:
+        del event
+        global _said  # noqa: PLW0603 - once for the whole program
+        if not _said and sys.stderr.isatty():
+            print("dsis: compiling once for this machine, some seconds ...", file=sys.stderr)  # noqa: T201 - for the terminal only
+        _said = True
+
+    def on_end(self, event: object) -> None:
+        del event
+
+
+_said = False
+event.register("numba:compile", _Word())  # type: ignore[no-untyped-call] # numba has no types; not sent where the cache on disk holds the kernel
 
 
 def kernel(function: F) -> F:
-    """Compile `function` on its first call; cached on disk, releases the interpreter lock."""
-    compiled = numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=False)(function)
+    """Compile `function` on its first call; cached on disk, releases the interpreter lock.
+
+    Kernels may call kernels of other files of their folder: all are compiled anew when one changes.
+    """
+    settings: Any = numba.config
+    default = settings.CACHE_DIR
+    folder = _cache(Path(function.__code__.co_filename).parent)
+    if not default and os.access(folder.parent, os.W_OK):
+        settings.CACHE_DIR = str(folder)
+    try:
+        compiled = numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=False)(function)
+    finally:
+        settings.CACHE_DIR = default
     return cast("F", compiled)
+
+
+@lru_cache(maxsize=64)
+def _cache(package: Path) -> Path:
+    """Return where the compiled kernels of a folder lie; old ones are removed.
+
+    The compiler's own cache looks at the file of a kernel only, and would keep what calls another.
+    """
+    stamp = hashlib.blake2b(digest_size=6)
+    for file in sorted(package.glob("*.py")):
+        stat = file.stat()
+        stamp.update(f"{file.name} {stat.st_size} {stat.st_mtime_ns}\n".encode())
+    caches = package / "__pycache__"
+    wanted = caches / f"kernels-{stamp.hexdigest()}"
+    if not wanted.exists():
+        for earlier in caches.glob("kernels-*"):
+            if time.time() - earlier.stat().st_mtime > _UNUSED_S:
+                shutil.rmtree(earlier, ignore_errors=True)
+    return wanted
 
 
 def inlined(function: F) -> F:
@@ -51,5 +108,9 @@ def over_rows(work: Callable[[int, int], None], rows: int, threads: int = 1) -> 
         return
     blocks = [(r, min(r + ROWS_PER_BLOCK, rows)) for r in range(0, rows, ROWS_PER_BLOCK)]
     with ThreadPoolExecutor(threads) as pool:
-        for done in [pool.submit(work, first, last) for first, last in blocks]:
-            done.result()
+        try:
+            for done in [pool.submit(work, first, last) for first, last in blocks]:
+                done.result()
+        except BaseException:
+            pool.shutdown(cancel_futures=True)  # who interrupts does not wait for every block
+            raise

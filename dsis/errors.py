@@ -5,6 +5,7 @@
     DsisError
     |-- InputError        what the user gave is wrong: file, key, value, what was allowed
     |-- DamagedError      what lies on disk is not what its manifest says
+    |-- WorkersLostError  workers died again and again before the work was done (dsis.workers)
 
 The command line prints the message of either, without a traceback, and leaves with status 2 and 1.
 Inner code states the bare fact; the boundary that knows the file adds it as a `Fault`.

@@ -3,19 +3,25 @@
 import errno
 import glob
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 import OpenImageIO as oiio  # noqa: N813 - the name that its own examples use
 from numpy.typing import NDArray
 
+from dsis.compiled import kernel
 from dsis.errors import InputError
 
 EXTENSIONS = {"png8": "png", "tiff16": "tif", "dpx16": "dpx", "exr": "exr"}
+LIGHT_FORMATS = (".exr", ".tif", ".tiff")
 READABLE = (".png", ".tif", ".tiff", ".dpx", ".exr", ".jpg", ".jpeg", ".cin", ".hdr")
+
+# x and y of red, green, blue and white (ITU-R BT.709-6, items 1.3 and 1.4).
+REC709_CHROMATICITIES = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
 
 # Writers stamp the time of writing into some formats; the same frame must give the same bytes.
 _NO_DATE = "2000:01:01 00:00:00"
@@ -204,19 +210,45 @@ def write(path: Path, display: NDArray[np.float32], form: str) -> None:
     if form == "exr":
         pixels: NDArray[np.generic] = display.astype(np.float16)
     elif form == "png8":
-        pixels = codes(display, 255).astype(np.uint8)
+        pixels = codes(display, 255)
     else:
-        pixels = codes(display, 65535).astype(np.uint16)
+        pixels = codes(display, 65535)
     write_codes(path, pixels)
 
 
-def write_codes(path: Path, pixels: NDArray[np.generic]) -> None:
-    """Write pixels as they are (uint8, uint16 or float16), whole or not at all."""
+def write_light(path: Path, light: NDArray[np.float32], says: str) -> None:
+    """Write linear light with Rec.709 primaries as EXR or TIFF of float32, whole or not at all.
+
+    Parameters
+    ----------
+    path
+        Where to; its ending decides the format.
+    light
+        float32 (row, column, 3).
+    says
+        What it is; goes into the file's description.
+    """
+    write_codes(path, light, {"ImageDescription": says, "oiio:ColorSpace": "lin_rec709_scene"})
+
+
+def write_codes(
+    path: Path, pixels: NDArray[np.generic], attributes: Mapping[str, str] = MappingProxyType({})
+) -> None:
+    """Write pixels as they are (uint8, uint16, float16 or float32), whole or not at all."""
     rows, columns, channels = pixels.shape
-    kinds = {"uint8": oiio.UINT8, "uint16": oiio.UINT16, "float16": oiio.HALF}
+    kinds = {
+        "uint8": oiio.UINT8,
+        "uint16": oiio.UINT16,
+        "float16": oiio.HALF,
+        "float32": oiio.FLOAT,
+    }
     spec = oiio.ImageSpec(columns, rows, channels, kinds[pixels.dtype.name])
+    for name, value in attributes.items():
+        spec.attribute(name, value)
+    if pixels.dtype == np.float32 and path.suffix.lower() == ".exr":
+        spec.attribute("chromaticities", oiio.TypeDesc("float[8]"), REC709_CHROMATICITIES)
     spec.attribute("DateTime", _NO_DATE)
-    spec.attribute("compression", "zip" if path.suffix == ".exr" else "none")
+    spec.attribute("compression", "zip" if path.suffix.lower() == ".exr" else "none")
     if path.suffix == ".png":
         spec.attribute("png:compressionLevel", 1)
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -244,7 +276,21 @@ def _holds(path: Path, pixels: NDArray[np.generic]) -> bool:
     return not error and found is not None and np.array_equal(found, pixels)
 
 
-def codes(display: NDArray[np.float32], top: int) -> NDArray[np.float32]:
-    """Return display values 0..1 as whole codes 0..top, rounded half up, clipped."""
-    scaled: NDArray[np.float32] = np.clip(display, 0, 1) * np.float32(top) + np.float32(0.5)
-    return np.floor(scaled)
+def codes(display: NDArray[np.float32], top: int) -> NDArray[np.uint8 | np.uint16]:
+    """Return display values 0..1 as whole codes 0..top (255 or 65535), rounded half up, clipped.
+
+    What is not a number becomes 0.
+    """
+    whole = np.empty(display.shape, np.uint8 if top == 255 else np.uint16)
+    _round(display.reshape(-1), np.float32(top), whole.reshape(-1))
+    return whole
+
+
+@kernel
+def _round(
+    display: NDArray[np.float32], top: np.float32, whole: NDArray[np.uint8 | np.uint16]
+) -> None:
+    zero, one, half = np.float32(0), np.float32(1), np.float32(0.5)
+    for i in range(display.size):
+        x = min(one, max(zero, display[i]))  # in this order NaN becomes 0
+        whole[i] = np.int32(x * top + half)

@@ -6,7 +6,7 @@ It is drawn as what it is made of: shot noise of variance m x and read noise of 
 from a field of its own, so that physics between the two finds its place in the chain.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 from dsis.compiled import kernel, over_rows
 from dsis.draw import Draw
 from dsis.grid import PixelGrid
+
+_SAMPLES_IN_CACHE = 1 << 16  # with the signal beside them they fit a core's second-level cache
 
 
 @dataclass(frozen=True)
@@ -60,7 +62,15 @@ def awgn(
     image: NDArray[np.float32], sigma: float, draw: Draw, grid: PixelGrid, frame: int
 ) -> NDArray[np.float32]:
     """Return image + N(0, sigma), equation (4); `sigma` in the unit of `image` (`grid.shape`)."""
-    return image + np.float32(sigma) * draw.normal("awgn", grid, frame)
+    out = np.empty(image.shape, np.float32)
+    for top, end in _spans(0, grid.rows, out):
+        _add_white(
+            image[top:end].reshape(-1),
+            draw.normal_rows("awgn", grid, frame, top, end).reshape(-1),
+            out[top:end].reshape(-1),
+            np.float32(sigma),
+        )
+    return out
 
 
 def shot_noise(
@@ -75,15 +85,15 @@ def shot_noise(
     out = np.empty(expected_dn.shape, np.float32)  # rows of it are filled as flat views
 
     def block(first: int, last: int) -> None:
-        deviates = draw.normal_rows("shot_noise", grid, frame, first, last)
-        _add_shot(
-            expected_dn[first:last].reshape(-1),
-            deviates.reshape(-1),
-            out[first:last].reshape(-1),
-            segments.lower_dn,
-            segments.slope_dn,
-            segments.intercept_dn2,
-        )
+        for top, end in _spans(first, last, out):
+            _add_shot(
+                expected_dn[top:end].reshape(-1),
+                draw.normal_rows("shot_noise", grid, frame, top, end).reshape(-1),
+                out[top:end].reshape(-1),
+                segments.lower_dn,
+                segments.slope_dn,
+                segments.intercept_dn2,
+            )
 
     over_rows(block, grid.rows, threads)
     return out
@@ -103,15 +113,15 @@ def read_noise(
     sigma = np.sqrt(np.maximum(segments.intercept_dn2, np.float32(0)))
 
     def block(first: int, last: int) -> None:
-        deviates = draw.normal_rows("read_noise", grid, frame, first, last)
-        _add_read(
-            signal_dn[first:last].reshape(-1),
-            expected_dn[first:last].reshape(-1),
-            deviates.reshape(-1),
-            out[first:last].reshape(-1),
-            segments.lower_dn,
-            sigma,
-        )
+        for top, end in _spans(first, last, out):
+            _add_read(
+                signal_dn[top:end].reshape(-1),
+                expected_dn[top:end].reshape(-1),
+                draw.normal_rows("read_noise", grid, frame, top, end).reshape(-1),
+                out[top:end].reshape(-1),
+                segments.lower_dn,
+                sigma,
+            )
 
     over_rows(block, grid.rows, threads)
     return out
@@ -133,6 +143,13 @@ def camera_noise(
     return read_noise(shot, clean_dn, segments, draw, grid, frame, threads)
 
 
+def _spans(first: int, last: int, field: NDArray[np.float32]) -> Iterator[tuple[int, int]]:
+    """Yield (first, end) of runs of rows whose deviates stay in the cache until they are used."""
+    rows = max(1, _SAMPLES_IN_CACHE * len(field) // max(1, field.size))
+    for top in range(first, last, rows):
+        yield top, min(top + rows, last)
+
+
 @kernel
 def _add_shot(
     expected: NDArray[np.float32],
@@ -143,14 +160,14 @@ def _add_shot(
     intercept: NDArray[np.float32],
 ) -> None:
     zero = np.float32(0)
-    for i in range(expected.size):
-        x = expected[i]
-        m, t = slope[0], intercept[0]
-        for s in range(1, lower.size):
-            if x >= lower[s]:
-                m, t = slope[s], intercept[s]
+    # Segment by segment, each overwriting where it holds: such loops become vector instructions.
+    for s in range(lower.size):
         # A negative intercept cannot be read noise: shot noise carries it.
-        out[i] = x + np.sqrt(max(m * x + min(t, zero), zero)) * deviates[i]
+        begins, m, t = lower[s], slope[s], min(intercept[s], zero)
+        for i in range(expected.size):
+            x = expected[i]
+            noisy = x + np.sqrt(max(m * x + t, zero)) * deviates[i]
+            out[i] = noisy if s == 0 or x >= begins else out[i]
 
 
 @kernel
@@ -162,10 +179,19 @@ def _add_read(
     lower: NDArray[np.float32],
     sigma: NDArray[np.float32],
 ) -> None:
-    for i in range(signal.size):
-        x = expected[i]
-        s = sigma[0]
-        for k in range(1, lower.size):
-            if x >= lower[k]:
-                s = sigma[k]
-        out[i] = signal[i] + s * deviates[i]
+    for k in range(lower.size):
+        begins, s = lower[k], sigma[k]
+        for i in range(signal.size):
+            noisy = signal[i] + s * deviates[i]
+            out[i] = noisy if k == 0 or expected[i] >= begins else out[i]
+
+
+@kernel
+def _add_white(
+    image: NDArray[np.float32],
+    deviates: NDArray[np.float32],
+    out: NDArray[np.float32],
+    sigma: np.float32,
+) -> None:
+    for i in range(image.size):
+        out[i] = image[i] + sigma * deviates[i]

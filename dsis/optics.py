@@ -5,6 +5,7 @@ aliasing comes afterwards, with the slicing. Everything acts on linear light.
 """
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,8 @@ from pydantic import Field
 from scipy import fft
 
 from dsis.model import Model
+
+_ROWS_AT_ONCE = 128  # of the OTF, in double precision: bounds the memory
 
 
 class Optics(Model):
@@ -133,25 +136,125 @@ def through_optics(
         message = f"shift_px is {shift_px}, must be at most margin_px = {margin_px}"
         raise ValueError(message)
     rows, columns = image.shape[:2]
-    margin = margin_px * oversampling
-    height, width = (fft.next_fast_len(n + 2 * margin, real=True) for n in (rows, columns))
-    fy = fft.fftfreq(height)[:, np.newaxis] * oversampling
-    fx = fft.rfftfreq(width)[np.newaxis, :] * oversampling
-    gain = transfer(optics, fy, fx).astype(np.float32)
-    phase_y = _shift_phase(fy, shift_px[0], oversampling)
-    phase_x = _shift_phase(fx, shift_px[1], oversampling)
-    padding = ((margin, height - rows - margin), (margin, width - columns - margin))
+    field = _Field.of(rows, columns, oversampling, margin_px)
+    gain = field.gain(optics)
+    phase_y, phase_x = field.phase_y(shift_px[0]), field.phase_x(shift_px[1])
     out = np.empty(image.shape, np.float32)
     for channel in range(image.shape[2]):
-        padded = np.pad(image[:, :, channel], padding, mode="reflect")
-        spectrum = fft.rfft2(padded, workers=workers)
+        spectrum = fft.rfft2(field.padded(image[:, :, channel]), workers=workers)
         spectrum *= gain
         if shift_px != (0.0, 0.0):
             spectrum *= phase_y
             spectrum *= phase_x
-        light = fft.irfft2(spectrum, s=(height, width), workers=workers, overwrite_x=True)
-        out[:, :, channel] = light[margin : margin + rows, margin : margin + columns]
+        size = (field.height, field.width)
+        light = fft.irfft2(spectrum, s=size, workers=workers, overwrite_x=True)
+        out[:, :, channel] = light[field.margin :, field.margin :][:rows, :columns]
     return out
+
+
+@dataclass(frozen=True)
+class Pan:
+    """Light after the optics that may be looked at from any place along its rows.
+
+    Holds the sampled rows as spectra along the row, so a window at any part of a pixel is a phase
+    ramp and the way back, in one dimension. At a whole place it is a slice of `through_optics`.
+
+    Attributes
+    ----------
+    spectra
+        complex64 (channel, row of the sensor, frequency), after the optics.
+    """
+
+    spectra: NDArray[np.complex64]
+    _field: "_Field"
+
+    @classmethod
+    def of(
+        cls,
+        image: NDArray[np.float32],
+        optics: Optics,
+        oversampling: int = 1,
+        *,
+        first_row: int = 0,
+        margin_px: int = 32,
+    ) -> "Pan":
+        """Return the light of `image`, float32 (row, column, channel), in the sensor's rows.
+
+        Sensor row i is centred on row first_row + i * oversampling; see `through_optics`.
+        """
+        rows, columns, channels = image.shape
+        field = _Field.of(rows, columns, oversampling, margin_px)
+        gain = field.gain(optics)
+        first = field.margin + first_row
+        sampled = slice(first, field.margin + rows, oversampling)
+        kept = len(range(*sampled.indices(field.height)))
+        spectra = np.empty((channels, kept, field.width // 2 + 1), np.complex64)
+        for channel in range(channels):
+            spectrum = fft.rfft2(field.padded(image[:, :, channel]))
+            spectrum *= gain
+            spectra[channel] = fft.ifft(spectrum, axis=0, overwrite_x=True)[sampled]
+        return cls(spectra, field)
+
+    def window(self, column: float, rows: int, columns: int) -> NDArray[np.float32]:
+        """Return (rows, columns, channel) of the sensor, the first column centred on `column`.
+
+        Parameters
+        ----------
+        column
+            Place on the grid of the image, any fraction; the window must lie within the image.
+        """
+        field = self._field
+        ramp = field.phase_x(-column / field.oversampling)
+        first, step = field.margin, field.oversampling
+        out = np.empty((rows, columns, len(self.spectra)), np.float32)
+        for channel, spectra in enumerate(self.spectra):
+            light = fft.irfft(spectra[:rows] * ramp, n=field.width, overwrite_x=True)
+            out[:, :, channel] = light[:, first : first + step * columns : step]
+        return out
+
+
+@dataclass(frozen=True)
+class _Field:
+    """A picture with its reflected margin, as the Fourier transform sees it."""
+
+    height: int
+    width: int
+    padding: tuple[tuple[int, int], tuple[int, int]]
+    oversampling: int
+
+    @classmethod
+    def of(cls, rows: int, columns: int, oversampling: int, margin_px: int) -> "_Field":
+        margin = margin_px * oversampling
+        height, width = (fft.next_fast_len(n + 2 * margin, real=True) for n in (rows, columns))
+        padding = ((margin, height - rows - margin), (margin, width - columns - margin))
+        return cls(height, width, padding, oversampling)
+
+    @property
+    def margin(self) -> int:
+        return self.padding[0][0]
+
+    def padded(self, plane: NDArray[np.float32]) -> NDArray[np.float32]:
+        return np.pad(plane, self.padding, mode="reflect")
+
+    def gain(self, optics: Optics) -> NDArray[np.float32]:
+        fy, fx = self._fy(), self._fx()
+        out = np.empty((self.height, fx.size), np.float32)
+        for first in range(0, self.height, _ROWS_AT_ONCE):
+            rows = slice(first, first + _ROWS_AT_ONCE)
+            out[rows] = transfer(optics, fy[rows], fx)
+        return out
+
+    def phase_y(self, shift_px: float) -> NDArray[np.complex64]:
+        return _shift_phase(self._fy(), shift_px, self.oversampling)
+
+    def phase_x(self, shift_px: float) -> NDArray[np.complex64]:
+        return _shift_phase(self._fx(), shift_px, self.oversampling)
+
+    def _fy(self) -> NDArray[np.float64]:
+        return np.asarray(fft.fftfreq(self.height)[:, np.newaxis] * self.oversampling)
+
+    def _fx(self) -> NDArray[np.float64]:
+        return np.asarray(fft.rfftfreq(self.width)[np.newaxis, :] * self.oversampling)
 
 
 def _shift_phase(

@@ -11,6 +11,12 @@ settings.register_profile("dsis", deadline=None, derandomize=True)
 settings.load_profile("dsis")
 
 
+def pytest_configure(config: pytest.Config) -> None:
+    """Keep panoramas with pytest's cache, not among the user's: rendered once for many runs."""
+    if hasattr(config, "cache"):  # absent with `-p no:cacheprovider`
+        os.environ.setdefault("DSIS_CACHE", str(config.cache.mkdir("panoramas")))
+
+
 @pytest.fixture(scope="session")
 def shared_data() -> Path:
     """Folder of real images, recordings and votes; tests that need it skip where it is absent."""

@@ -92,8 +92,33 @@ def test_uniform_distribution() -> None:
     assert stats.kstest(field.ravel().astype(np.float64), "uniform").pvalue > 1e-4
 
 
-@pytest.mark.parametrize("lag", [(0, 1), (0, 2), (0, 4), (0, 8), (1, 0), (2, 0), (1, 1), (64, 0)])
-def test_no_correlation_between_neighbours(field: np.ndarray, lag: tuple[int, int]) -> None:
+def test_tails_to_five_sigma() -> None:
+    """Frame after frame: of 134 million deviates some 77 lie beyond 5 sigma."""
+    frames, beyond = 128, {4.0: 0, 4.5: 0, 5.0: 0}
+    grid = PixelGrid(1024, 1024, Cfa.MONO)
+    for frame in range(frames):
+        size = np.abs(Draw(11).normal("tails", grid, frame))
+        for sigma in beyond:
+            beyond[sigma] += int(np.count_nonzero(size > sigma))
+    for sigma, found in beyond.items():
+        expected = 2 * stats.norm.sf(sigma) * frames * grid.rows * grid.columns
+        assert abs(found - expected) < Z_MAX * np.sqrt(expected), f"beyond {sigma} sigma"
+
+
+def test_no_correlation_with_any_neighbour(field: np.ndarray) -> None:
+    """All lags up to 16 rows and columns in all directions, from the power spectrum."""
+    for channel in range(3):
+        power = np.abs(np.fft.rfft2(field[:, :, channel])) ** 2
+        covariance = np.fft.irfft2(power) / field[:, :, 0].size
+        lags = np.arange(-16, 17)
+        z = covariance[np.ix_(lags, lags)] * np.sqrt(field[:, :, 0].size)
+        z[16, 16] = 0.0  # with itself
+        # 3 x 544 different lags: Gaussian z beyond 5 would come once in a thousand runs.
+        assert np.abs(z).max() < Z_MAX, np.unravel_index(np.abs(z).argmax(), z.shape)
+
+
+@pytest.mark.parametrize("lag", [(64, 0), (0, 64), (128, 128), (512, 0), (1, 512)])
+def test_no_correlation_over_blocks(field: np.ndarray, lag: tuple[int, int]) -> None:
     a = field[: FIELD.rows - lag[0], : FIELD.columns - lag[1]]
     b = field[lag[0] :, lag[1] :]
     assert abs((a * b).mean()) * np.sqrt(a.size) < Z_MAX
@@ -112,6 +137,8 @@ def test_fields_of_other_channels_frames_purposes_seeds_and_scopes_are_independe
     for name, other in others.items():
         z = float((field * other).mean()) * np.sqrt(field.size)
         assert abs(z) < Z_MAX, name
+        squares = float(((field**2 - 1) * (np.square(other, dtype=np.float64) - 1)).mean()) / 2
+        assert abs(squares) * np.sqrt(field.size) < Z_MAX, f"squares, {name}"
 
 
 def test_squares_are_uncorrelated_too(field: np.ndarray) -> None:

@@ -443,14 +443,15 @@ def test_the_smallest_sizes_build_with_training(
 
 def test_a_dry_run_times_a_small_frame(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """No panorama of full size is painted; disk is counted for the full size."""
+    from dsis.scenes import Strip
     from dsis.stimuli import source
 
     painted: list[int] = []
     paint = source.panorama
 
-    def spy(name: str, seed: int, rows: int, columns: int) -> np.ndarray:
-        painted.append(rows * columns)
-        return paint(name, seed, rows, columns)
+    def spy(strip: Strip) -> np.ndarray:
+        painted.append(strip.rows * strip.columns)
+        return paint(strip)
 
     monkeypatch.setattr(source, "panorama", spy)
     found = estimate(read_spec("seybold.toml"), tmp_path / "out", 1)

@@ -452,9 +452,9 @@ def test_killed_half_way_it_goes_on_and_ends_bit_identical(
     made: list[int] = []
     write_one = Builder._write
 
-    def spy(self: Builder, frame: int) -> None:
+    def spy(self: Builder, frame: int) -> dict:
         made.append(frame)
-        write_one(self, frame)
+        return write_one(self, frame)
 
     monkeypatch.setattr(Builder, "_write", spy)
     build_stimuli(read_spec(spec), out, jobs=2)

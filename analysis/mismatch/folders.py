@@ -1,8 +1,10 @@
 """From files to files: a camera model and recordings in, a folder of results for each out."""
 
 import difflib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from analysis.mismatch.diagnose import VOCABULARY, find_mismatch
@@ -12,6 +14,7 @@ from dsis.camera import Camera, read_camera
 from dsis.errors import Fault, InputError
 from dsis.recording import Recording, read_recording
 from dsis.simulate.maps import MAPS, SensorMaps, owner_of, read_maps
+from dsis.workers import completed, workers
 
 Progress = Callable[[int, int, str], None]
 
@@ -33,6 +36,7 @@ def diagnose_recordings(
     seed: int = 0,
     jobs: int = 1,
     without: Sequence[str] = (),
+    scheduler: str | None = None,
     progress: Progress | None = None,
 ) -> tuple[Diagnosis, ...]:
     """Compare recordings with a camera model; what is wrong with the input is said before work.
@@ -48,7 +52,10 @@ def diagnose_recordings(
     seed
         Fixes every random number.
     jobs
-        Threads.
+        Threads for one recording; for several, processes with one recording each. No influence on
+        the results.
+    scheduler
+        Address of a Dask scheduler whose workers see the same files; see `dsis.workers`.
     without
         Effects that must not be named.
     progress
@@ -63,26 +70,67 @@ def diagnose_recordings(
     allowed = VOCABULARY - set(without) if without else None
     maps = _maps(camera_file)
     folders = _folders(opened, out)
-    found = []
-    for (name, folder), recording in zip(folders.items(), opened, strict=True):
-
-        def tell(done: int, total: int, doing: str, of: str = name) -> None:
-            if progress is not None:
-                progress(done, total, doing if len(opened) == 1 else f"{of}: {doing}")
-
-        with finding_folder(folder) as partial:
-            finding = find_mismatch(
-                camera,
-                recording,
-                seed=seed,
-                jobs=jobs,
-                vocabulary=allowed,
-                maps=maps,
-                progress=tell,
+    found: dict[str, Finding] = {}
+    with ExitStack() as left:
+        # All folders are refused before any work begins; each result is there as soon as it is.
+        held = {name: ExitStack() for name in folders}
+        partial_folders = {
+            name: left.enter_context(held[name]).enter_context(finding_folder(folder))
+            for name, folder in folders.items()
+        }
+        of = dict(zip(folders, opened, strict=True))
+        for name, finding in _found(camera, of, (seed, jobs, scheduler), allowed, progress):
+            fill(
+                partial_folders[name], finding, _origin(of[name], camera_file, seed, without), maps
             )
-            fill(partial, finding, _origin(recording, camera_file, seed, without), maps)
-        found.append(Diagnosis(name, folder, finding))
-    return tuple(found)
+            held[name].close()
+            found[name] = finding
+    return tuple(Diagnosis(name, folder, found[name]) for name, folder in folders.items())
+
+
+def _found(
+    camera: Camera,
+    recordings: Mapping[str, Recording],
+    how: tuple[int, int, str | None],
+    allowed: frozenset[str] | None,
+    progress: Progress | None,
+) -> Iterator[tuple[str, Finding]]:
+    """Yield the finding of each recording: one by one, or side by side in processes.
+
+    `how` is the seed, the number of workers and the address of a cluster.
+    """
+    seed, jobs, scheduler = how
+    tell = progress or _silent
+    if scheduler is None and (jobs == 1 or len(recordings) == 1):
+        for name, recording in recordings.items():
+
+            def step(done: int, total: int, doing: str, of: str = name) -> None:
+                tell(done, total, doing if len(recordings) == 1 else f"{of}: {doing}")
+
+            yield (
+                name,
+                find_mismatch(
+                    camera, recording, seed=seed, jobs=jobs, vocabulary=allowed, progress=step
+                ),
+            )
+        return
+    tell(0, len(recordings), "diagnosing")
+    one = partial(_finding, camera, seed, allowed)
+    with workers(jobs, kind="processes", scheduler=scheduler) as pool:
+        finished = completed(pool, one, recordings.items())
+        for done, ((name, _), finding) in enumerate(finished, 1):
+            tell(done, len(recordings), name)
+            yield name, finding
+
+
+def _finding(
+    camera: Camera, seed: int, allowed: frozenset[str] | None, named: tuple[str, Recording]
+) -> Finding:
+    return find_mismatch(camera, named[1], seed=seed, vocabulary=allowed)
+
+
+def _silent(_done: int, _total: int, _doing: str) -> None:
+    """Tell nobody."""
 
 
 def _unknown(names: Sequence[str]) -> list[Fault]:

@@ -38,7 +38,9 @@ _FOLLOWS = {
     "fixed_row_variance": frozenset({"fixed_row_variance", "row_variance"}),
     "fixed_column_variance": frozenset({"fixed_column_variance", "column_variance"}),
     "fixed_smooth_variance": frozenset({"fixed_smooth_variance"}) | _LINES,
-    "skewness": frozenset({"skewness"}),
+    # Few electrons of several DN each leave codes out.
+    "code_imbalance": frozenset({"code_imbalance", "skewness"}),
+    "code_spacing": frozenset({"code_spacing", "skewness"}),
 }
 
 

@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsis.cfa import Cfa
-from dsis.compiled import kernel, over_rows
+from dsis.compiled import inlined, kernel, over_rows
 from dsis.demosaic.borders import Frame, frame
 
 MARGIN = 1
+_SPAN = 512  # columns: what a span reads and writes stays in the first-level cache
 _HALF = np.float32(0.5)
 _QUARTER = np.float32(0.25)
 
@@ -53,33 +54,79 @@ def bilinear(
 
 @kernel
 def _rows(given: Frame, first: int, last: int) -> None:
-    """Demosaick rows first..last-1 with three rows of the mosaic at hand."""
+    """Demosaick rows first..last-1, a span of columns at a time that stays in the first cache."""
     width = given.mosaic.shape[1]
-    above = np.empty(width + 2 * MARGIN, np.float32)
-    here, below = np.empty_like(above), np.empty_like(above)
-    _load(given, first - 1, above)
-    _load(given, first, here)
+    own, green, other = (
+        np.empty(_SPAN, np.float32),
+        np.empty(_SPAN, np.float32),
+        np.empty(_SPAN, np.float32),
+    )
     for y in range(first, last):
-        _load(given, y + 1, below)
-        row_colour = 2 * ((y + given.red_row) & 1)  # red in red rows, blue in blue rows
-        start = (y + given.red_row + given.red_column) & 1
-        line = given.out[y]
-        for x in range(start, width, 2):
-            axial = (here[x] + here[x + 2]) + (above[x + 1] + below[x + 1])
-            diagonal = (above[x] + below[x + 2]) + (above[x + 2] + below[x])
-            line[x, row_colour] = here[x + 1]
-            line[x, 1] = _QUARTER * axial
-            line[x, 2 - row_colour] = _QUARTER * diagonal
-        for x in range(1 - start, width, 2):
-            line[x, row_colour] = _HALF * (here[x] + here[x + 2])
-            line[x, 1] = here[x + 1]
-            line[x, 2 - row_colour] = _HALF * (above[x + 1] + below[x + 1])
-        above, here, below = here, below, above
+        above, here, below = (
+            given.mosaic[given.rows[y]],
+            given.mosaic[given.rows[y + 1]],
+            given.mosaic[given.rows[y + 2]],
+        )
+        blue = (y + given.red_row) & 1  # whether the row's own colour is blue, not red
+        parity = (y + given.red_row + given.red_column) & 1  # of the columns that hold it
+        line = given.out[y].reshape(-1)
+        for start in range(1, width - 1, _SPAN):
+            end = min(start + _SPAN, width - 1)
+            _span(
+                above[start - 1 : end + 1],
+                here[start - 1 : end + 1],
+                below[start - 1 : end + 1],
+                np.uint32((start + parity) & 1),
+                own,
+                green,
+                other,
+            )
+            if blue:
+                _interleave(other, green, own, line[3 * start : 3 * end])
+            else:
+                _interleave(own, green, other, line[3 * start : 3 * end])
+        for x in (0, width - 1):
+            left, right = given.columns[x], given.columns[x + 2]
+            beside, upright = here[left] + here[right], above[x] + below[x]
+            diagonal = (above[left] + below[right]) + (above[right] + below[left])
+            pixel = line[3 * x : 3 * x + 3]
+            if (x & 1) == parity:
+                pixel[2 * blue], pixel[1] = here[x], _QUARTER * (beside + upright)
+                pixel[2 - 2 * blue] = _QUARTER * diagonal
+            else:
+                pixel[2 * blue], pixel[1] = _HALF * beside, here[x]
+                pixel[2 - 2 * blue] = _HALF * upright
 
 
-@kernel
-def _load(given: Frame, y: int, line: NDArray[np.float32]) -> None:
-    """Fill `line` with row y of the mosaic, -1 <= y <= number of rows, and its margins."""
-    row = given.rows[y + MARGIN]
-    for x in range(line.size):
-        line[x] = given.mosaic[row, given.columns[x]]
+@inlined
+def _span(
+    above: NDArray[np.float32],
+    here: NDArray[np.float32],
+    below: NDArray[np.float32],
+    parity: np.uint32,
+    own: NDArray[np.float32],
+    green: NDArray[np.float32],
+    other: NDArray[np.float32],
+) -> None:
+    """Fill the row's own colour, green and the other from three rows with one sample around.
+
+    Both kinds of sites are computed everywhere and one is chosen: no strides, all vector.
+    """
+    for i in range(np.uintp(here.size - 2)):
+        beside, upright = here[i] + here[i + 2], above[i + 1] + below[i + 1]
+        diagonal = (above[i] + below[i + 2]) + (above[i + 2] + below[i])
+        sampled = (np.uint32(i) & np.uint32(1)) == parity
+        own[i] = here[i + 1] if sampled else _HALF * beside
+        green[i] = _QUARTER * (beside + upright) if sampled else here[i + 1]
+        other[i] = _QUARTER * diagonal if sampled else _HALF * upright
+
+
+@inlined
+def _interleave(
+    red: NDArray[np.float32],
+    green: NDArray[np.float32],
+    blue: NDArray[np.float32],
+    line: NDArray[np.float32],
+) -> None:
+    for i in range(np.uintp(line.size // 3)):
+        line[3 * i], line[3 * i + 1], line[3 * i + 2] = red[i], green[i], blue[i]

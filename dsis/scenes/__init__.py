@@ -1,58 +1,70 @@
 """City and Landscape: still panoramas in linear light, without grain, from a seed.
 
-Linear light with Rec.709 primaries and white point D65; 1.0 is a white diffuse surface that faces
-the sun. These are painted stand-ins for rendered scenes: perspective, shading and haze are right,
-but only the landscape is lit by its own relief, and nothing casts a shadow on a roof.
+Rec.709 primaries, white point D65; 1.0 is a white diffuse surface that faces the sun. Both are ray
+traced on the processor: every pixel has the same points, directions to the sun's disc and
+directions of the sky, so there is no chance in a pixel and hence no grain at any number of them. A
+path tracer needs a thousand samples for a grain of 1 %, and the installation of a renderer.
 """
-
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dsis.errors import Fault, InputError
-from dsis.scenes import painted_city, painted_landscape
+from dsis.scenes.cache import cache_folder, is_kept, kept_or_rendered
+from dsis.scenes.presets import OVERSAMPLING, PRESETS, Preset, preset_strip
+from dsis.scenes.renderer import Progress, render
+from dsis.scenes.shipped import as_shipped, is_shipped
+from dsis.scenes.strip import FEWEST_ROWS, SCENES, Strip
 
-_PAINTERS = {"city": painted_city.paint, "landscape": painted_landscape.paint}
-SCENES: Final = tuple(_PAINTERS)
-FEWEST_ROWS = 32
+__all__ = [
+    "FEWEST_ROWS",
+    "OVERSAMPLING",
+    "PRESETS",
+    "SCENES",
+    "Preset",
+    "Progress",
+    "Strip",
+    "cache_folder",
+    "is_ready",
+    "panorama",
+    "preset_strip",
+    "render",
+]
 
 
-def panorama(name: str, seed: int, rows: int, columns: int) -> NDArray[np.float32]:
-    """Paint the strip over which a window pans.
+def is_ready(strip: Strip) -> bool:
+    """Tell whether `panorama` returns a strip without rendering it."""
+    return is_shipped(strip) or is_kept(strip)
 
-    Objects scale with `rows`, so presets of different size look alike; a wider strip shows more of
-    the same scene. The same arguments give the same bytes.
+
+def panorama(
+    strip: Strip, *, threads: int = 1, progress: Progress | None = None
+) -> NDArray[np.float32]:
+    """Return the strip over which a window pans: shipped, from the cache, or rendered.
+
+    The same strip gives the same bytes, whatever the threads.
 
     Parameters
     ----------
-    name
-        "city" or "landscape".
-    seed
-        Not negative; another seed is another city.
-    rows, columns
-        Size in pixels; column 0 is the left end.
+    strip
+        Scene, seed and size; `preset_strip` names common ones.
+    threads
+        How many threads render.
+    progress
+        Called with (parts done, parts in all, what is being done).
 
     Returns
     -------
     NDArray[np.float32]
-        (row, column, 3), linear light, Rec.709 primaries, finite and not negative; a diffuse
-        white is 1.0, glints of the sun reach 4.
+        (row, column, 3), read-only, linear light, Rec.709 primaries, finite and not negative; a
+        diffuse white is 1.0.
 
     Raises
     ------
     InputError
-        Where there is no such scene, or the size or the seed are out of range.
+        Where there is no such scene, or a number is out of range.
     """
-    facts = {
-        "scene": None if name in _PAINTERS else f"is {name!r}, must be one of {', '.join(SCENES)}",
-        "scene_seed": None if seed >= 0 else f"is {seed}, must be 0 or more",
-        "rows": None if rows >= FEWEST_ROWS else f"is {rows}, must be {FEWEST_ROWS} or more",
-        "columns": None if columns >= 1 else f"is {columns}, must be 1 or more",
-    }
-    faults = [Fault("", key, fact) for key, fact in facts.items() if fact]
-    if faults:
-        raise InputError(faults)
-    image = np.zeros((rows, columns, 3), np.float32)
-    _PAINTERS[name](image, seed)
-    return image
+    strip.checked()
+    ready = as_shipped(strip)
+    if ready is not None:
+        return ready
+    return kept_or_rendered(strip, lambda: render(strip, threads, progress))

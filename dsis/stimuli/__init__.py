@@ -5,4 +5,10 @@ from dsis.stimuli.check import check_stimuli, summary
 from dsis.stimuli.estimate import estimate
 from dsis.stimuli.resolved import build_digest
 
-__all__ = ["build_digest", "build_stimuli", "check_stimuli", "estimate", "summary"]
+__all__ = [
+    "build_digest",
+    "build_stimuli",
+    "check_stimuli",
+    "estimate",
+    "summary",
+]

@@ -1,31 +1,29 @@
 """Test spec -> four conditions -> frames and manifest; resumable, whatever the workers."""
 
 import hashlib
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor, as_completed
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dsis.manifest import MANIFEST, Clip, ClipFiles, Manifest, Quality, write_manifest
 from dsis.outdir import result_folder
 from dsis.spec import TRAINING, Test
-from dsis.stimuli.assess import Assessor
-from dsis.stimuli.clipfiles import clip_path, read_frame_bytes, write_frame
+from dsis.stimuli.clipfiles import clip_path, read_frame_bytes, store_frame_bytes
+from dsis.stimuli.clipwriter import ClipWriter, Records, frame_from_afar
 from dsis.stimuli.conditions import Condition
 from dsis.stimuli.figure import write_figures
-from dsis.stimuli.frames import FrameMaker
-from dsis.stimuli.jobs import Job, jobs_of
+from dsis.stimuli.jobs import jobs_of
 from dsis.stimuli.journal import Journal, sha256
-from dsis.stimuli.match import matching_frames
+from dsis.stimuli.panoramas import render_panoramas
 from dsis.stimuli.resolved import build_digest, manifest_of
+from dsis.workers import Workers, completed, workers
 
-Frame = NDArray[np.float32]
 Progress = Callable[[int, int, str], None]
 
-VISIBLE_FRAMES = 3
 VOTES = "session"
 
 
@@ -34,6 +32,7 @@ def build_stimuli(
     out: Path,
     *,
     jobs: int = 1,
+    scheduler: str | None = None,
     progress: Progress | None = None,
 ) -> Manifest:
     """Build all clips of a test in `out` and return their manifest.
@@ -47,13 +46,19 @@ def build_stimuli(
         taken up there, and the result replaces an earlier one in one step.
     jobs
         Number of threads; no influence on the result.
+    scheduler
+        Address of a Dask scheduler whose workers make the frames instead; the same bytes. They
+        find footage under the same paths.
     progress
         Called with (frames done, frames in all, what is being done).
 
     Raises
     ------
     InputError
-        `out` holds something else, or recorded votes, or unfinished work of another spec.
+        `out` holds something else, or recorded votes, or unfinished work of another spec; the
+        scheduler cannot be used.
+    WorkersLostError
+        Workers die again and again.
     OSError
         The disk is full, or the place cannot be written.
     """
@@ -62,15 +67,20 @@ def build_stimuli(
     frames = test.spec.sequence.frames
     total = len(work) * frames
     tell = progress or _silent
-    with result_folder(out, MANIFEST, keep=recorded_votes, resume=digest) as folder:
+    with (
+        workers(jobs, scheduler=scheduler) as pool,
+        result_folder(out, MANIFEST, keep=recorded_votes, resume=digest) as folder,
+    ):
+        render_panoramas(test, threads=jobs, progress=tell)
         journal = Journal(folder)
         clips: list[Clip] = []
         sigmas: dict[str, dict[str, float]] = {}
-        for done, job in zip(range(0, total, frames), work, strict=True):
+        for number, job in enumerate(work):
+            done = number * frames
             tell(done, total, f"{job.name}: light")
-            builder = Builder(test, job, folder, journal)
+            builder = Builder(ClipWriter(test, number), folder, journal)
             sigmas[job.name] = {str(level): s for level, s in builder.maker.sigma.items()}
-            builder.build(jobs, _from(tell, done, total, job.name))
+            builder.build(pool, _from(tell, done, total, job.name))
             clips += builder.clips(jobs)
             middle = builder.maker.figure_frames(frames // 2)
             write_figures(middle, folder / "figures", job.name)
@@ -87,27 +97,21 @@ def recorded_votes(folder: Path) -> str | None:
 class Builder:
     """Builds all clips of one content."""
 
-    def __init__(self, test: Test, job: Job, folder: Path, journal: Journal) -> None:
-        self.test, self.job, self.folder, self.journal = test, job, folder, journal
-        self.size = test.spec.sequence
-        self.maker = FrameMaker.of(test, job)
-        visible = matching_frames(self.size.frames, VISIBLE_FRAMES)
-        self.assessor = Assessor(test.spec, self.maker, visible)
+    def __init__(self, writer: ClipWriter, folder: Path, journal: Journal) -> None:
+        self.writer, self.folder, self.journal = writer, folder, journal
+        self.test, self.maker = writer.test, writer.maker
+        self.job, self.assessor = writer.maker.job, writer.assessor
+        self.size = writer.test.spec.sequence
 
-    def build(self, jobs: int, done: Callable[[int], None]) -> None:
+    def build(self, pool: Workers, done: Callable[[int], None]) -> None:
         """Write every frame that is not there yet."""
         frames = range(self.size.frames)
         todo = [frame for frame in frames if not self._finished(frame)]
         done(self.size.frames - len(todo))
-        with ThreadPoolExecutor(max(1, jobs)) as pool:
-            running = [pool.submit(self._write, frame) for frame in todo]
-            try:
-                for n, result in enumerate(as_completed(running), self.size.frames - len(todo) + 1):
-                    result.result()
-                    done(n)
-            except BaseException:
-                pool.shutdown(cancel_futures=True)
-                raise
+        written = self._received(pool, todo) if pool.apart else completed(pool, self._write, todo)
+        for n, (frame, records) in enumerate(written, self.size.frames - len(todo) + 1):
+            self.journal.add(self.job.name, frame, records)
+            done(n)
 
     def clips(self, jobs: int) -> list[Clip]:
         """Return the manifest's entries of all clips, from what the journal holds."""
@@ -186,29 +190,16 @@ class Builder:
             for form in self.test.spec.formats
         )
 
-    def _write(self, frame: int) -> None:
-        clips = self.maker.frame(frame)
-        name, reference, _ = next(clips)
-        records = {name: {"sha256": self._written(name, frame, reference)}}
-        seen = self.assessor.seen(reference) if frame in self.assessor.visible else None
-        for name, display, clean_dem in clips:
-            record: dict[str, Any] = {"sha256": self._written(name, frame, display)}
-            record |= self.assessor.compare(display, reference, clean_dem)
-            if seen is not None:
-                record["visible"] = self.assessor.visible_noise(display, seen)
-            records[name] = record
-        if seen is not None:
-            base = self.assessor.without_effects(frame, reference, seen)
-            for name, found in base.items():
-                records[name]["without_effects"] = found
-        self.journal.add(self.job.name, frame, records)
+    def _write(self, frame: int) -> Records:
+        return self.writer.write(frame, self.folder)
 
-    def _written(self, name: str, frame: int, display: Frame) -> dict[str, str]:
-        """Write one frame of a clip in all formats and return the digests."""
-        return {
-            form: write_frame(self.folder, name, form, frame, display)
-            for form in self.test.spec.formats
-        }
+    def _received(self, pool: Workers, todo: Iterable[int]) -> Iterator[tuple[int, Records]]:
+        """Yield frames that others made, once their files are here."""
+        make = partial(frame_from_afar, self.writer.order())
+        for frame, (records, files) in completed(pool, make, todo):
+            for (name, form), data in files.items():
+                store_frame_bytes(self.folder, name, form, frame, data)
+            yield frame, records
 
 
 def _silent(done: int, total: int, what: str) -> None:

@@ -1,6 +1,5 @@
 """Clips on disk: where each frame of a clip lies, written, read and hashed alike by all."""
 
-import hashlib
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -11,6 +10,7 @@ from dsis import imagefile
 from dsis.imagefile import find_files
 from dsis.manifest import Clip, ClipFiles
 from dsis.spec import Sequence
+from dsis.stimuli.journal import sha256
 from dsis.stimuli.quality import delivered
 
 Frame = NDArray[np.float32]
@@ -31,17 +31,30 @@ def frame_path(folder: Path, stimulus: str, form: str, frame: int) -> Path:
 
 def write_frame(folder: Path, stimulus: str, form: str, frame: int, display: Frame) -> str:
     """Write one frame of a clip and return the SHA-256 of its bytes."""
+    if form == "player":
+        data = delivered(display).data.cast("B")
+        store_frame_bytes(folder, stimulus, form, frame, data)
+        return sha256(data)
     path = frame_path(folder, stimulus, form, frame)
-    if form != "player":
-        imagefile.write(path, display, form)
-        return hashlib.sha256(path.read_bytes()).hexdigest()
-    data = delivered(display).tobytes()
+    imagefile.write(path, display, form)
+    return sha256(path.read_bytes())
+
+
+def store_frame_bytes(
+    folder: Path, stimulus: str, form: str, frame: int, data: bytes | memoryview
+) -> None:
+    """Put the bytes of one frame of a clip where they belong."""
+    path = frame_path(folder, stimulus, form, frame)
     path.parent.mkdir(parents=True, exist_ok=True)
+    if form != "player":
+        unfinished = path.with_name(f".{path.name}.unfinished")
+        unfinished.write_bytes(data)
+        unfinished.replace(path)
+        return
     path.touch()
     with path.open("r+b") as file:
         file.seek(frame * len(data))
         file.write(data)
-    return hashlib.sha256(data).hexdigest()
 
 
 def read_frame_bytes(folder: Path, stimulus: str, form: str, frame: int, size: Sequence) -> bytes:

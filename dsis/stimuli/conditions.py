@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsis.camera import Camera
-from dsis.cfa import mosaic
-from dsis.color import DisplayTransform, white_balanced
+from dsis.cfa import mosaic, pattern
+from dsis.color import DisplayTransform
 from dsis.demosaic import demosaic
 from dsis.draw import Draw
 from dsis.grid import PixelGrid
@@ -29,6 +29,7 @@ from dsis.spec import Spec
 Frame = NDArray[np.float32]
 
 CODE_MAX = np.float32(255)
+_PIXELS_IN_CACHE = 1 << 14
 
 
 @dataclass(frozen=True)
@@ -79,17 +80,27 @@ class Rendering:
 
     def display(self, raw: Frame) -> Frame:
         """Return the display frame of full-colour raw data: white balance, colour transform."""
-        return self.transform.display_from_scene(self.camera.scene_light(raw))
+        return self._seen(raw, self.camera.scene_light)
 
     def display_demosaicked(self, raw: Frame, method: str) -> Frame:
         """Return the display frame of raw data sampled at the colour filters and demosaicked."""
-        balanced = white_balanced(raw, self.camera.white_balance)
         full_scale = self.camera.diffuse_white_dn or 1.0
-        sampled = mosaic(balanced, self.camera.cfa)
+        balanced = mosaic(raw, self.camera.cfa)
+        for (row, column), channel in np.ndenumerate(pattern(self.camera.cfa)):
+            balanced[row::2, column::2] *= np.float32(self.camera.white_balance[channel])
         full = demosaic(
-            sampled, self.camera.cfa, method, full_scale=full_scale, threads=self.threads
+            balanced, self.camera.cfa, method, full_scale=full_scale, threads=self.threads
         )
-        return self.transform.display_from_scene(self.camera.scene_light_of_balanced(full))
+        return self._seen(full, self.camera.scene_light_of_balanced)
+
+    def _seen(self, field: Frame, scene_light: Callable[[Frame], Frame]) -> Frame:
+        """Return the display frame of a field, in runs of rows that stay in the cache."""
+        display = np.empty(field.shape, np.float32)
+        rows = max(1, _PIXELS_IN_CACHE // field.shape[1])
+        for top in range(0, len(field), rows):
+            block = slice(top, top + rows)
+            display[block] = self.transform.display_from_scene(scene_light(field[block]))
+        return display
 
     def shown(self, noise: str, field: Frame, method: str) -> Frame:
         """Return the display frame 0..1 of a field: raw data (`sd`) or code values (`awgn`)."""
@@ -101,7 +112,8 @@ class Rendering:
 
     def reference(self, clean: Frame) -> Frame:
         """Return the reference of a clean raw frame: clipped to what the display can show."""
-        return np.clip(self.display(clean), np.float32(0), np.float32(1))
+        display = self.display(clean)
+        return np.clip(display, np.float32(0), np.float32(1), out=display)
 
     def noisy_raw(
         self,
@@ -122,7 +134,7 @@ class Rendering:
         sensor = Draw(self.seed, ("sensor",))
         before = None if earlier is None else lambda back: earlier(back) / stops
         raw = self.camera.expose(
-            clean / stops,
+            clean / stops if level else clean,
             temporal,
             sensor,
             frame,
@@ -131,7 +143,7 @@ class Rendering:
             earlier_clean=before,
             threads=self.threads,
         )
-        return raw * stops
+        return raw * stops if level else raw
 
     def noisy_display(
         self, reference: Frame, sigma: float, content: str, level: int, frame: int

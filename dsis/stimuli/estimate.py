@@ -7,16 +7,19 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from dsis.imagefile import info
-from dsis.spec import Sequence, Test
+from dsis.scenes import is_ready, render
+from dsis.spec import Content, Sequence, Test
 from dsis.stimuli.frames import FrameMaker
 from dsis.stimuli.jobs import Job, jobs_of
 from dsis.stimuli.match import matching_frames, solve_sigma
+from dsis.stimuli.panoramas import strip_of
 from dsis.stimuli.source import source_of
 
 _BYTES_PER_SAMPLE = {"player": 1.0, "tiff16": 2.0, "dpx16": 2.0, "exr": 2.0, "png8": 1.0}
 _PLANES_PER_THREAD = 40  # float32 planes (row, column) alive while one frame is made
 _SOURCE_COPIES = 3  # the picture, its light, and its light after the optics
 TIMED_PX = 320 * 180
+_TIMED_COLUMNS = (32, 96)
 
 
 @dataclass(frozen=True)
@@ -97,7 +100,7 @@ def _timed(test: Test, job: Job, small: Sequence) -> tuple[float, float]:
     begun = time.perf_counter()
     source = source_of(job.content, test if files else little, transform)
     grows = 1.0 if files else ratio
-    opening = (time.perf_counter() - begun) * grows
+    opening = (time.perf_counter() - begun) * grows + _rendering(job.content, size, small)
     light = _seconds(lambda: source.light(0)) * grows
     small_light = _seconds(lambda: maker.source.light(0))
 
@@ -110,6 +113,21 @@ def _timed(test: Test, job: Job, small: Sequence) -> tuple[float, float]:
         once = _seconds(lambda: solve_sigma(spec, maker.source, maker.rendering, job.name, level))
         solving = len(maker.sigma) * scaled(once, len(matching_frames(small.frames)))
     return opening + solving, scaled(_seconds(lambda: list(maker.frame(0))), 1)
+
+
+def _rendering(content: Content, size: Sequence, small: Sequence) -> float:
+    """Return seconds that one thread renders a content's panorama; 0 where it is there already.
+
+    From two small ones of other width: a part of the time is the same however many the pixels.
+    """
+    strip, little = strip_of(content, size), strip_of(content, small)
+    if strip is None or little is None or is_ready(strip):
+        return 0.0
+    narrow, wide = (replace(little, columns=columns) for columns in _TIMED_COLUMNS)
+    render(replace(little, columns=1))  # compiles what is not compiled yet
+    took = _seconds(lambda: render(narrow))
+    per_px = max(0.0, _seconds(lambda: render(wide)) - took) / (wide.pixels - narrow.pixels)
+    return took + per_px * strip.pixels
 
 
 def _seconds(work: Callable[[], object]) -> float:

@@ -6,20 +6,21 @@ the footage is. Sources may be larger than the sensor by a whole factor (oversam
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dsis.color import DisplayTransform
 from dsis.imagefile import info, read
-from dsis.optics import Optics, through_optics
-from dsis.scenes import FEWEST_ROWS, panorama
+from dsis.optics import Optics, Pan, through_optics
+from dsis.scenes import panorama
 from dsis.spec import Content, Footage, Sequence, Test
+from dsis.stimuli.panoramas import strip_of
 
 Light = NDArray[np.float32]
-
-_CONTEXT_PX = 64  # sensor pixels beside the window that a fractional shift sees
 
 
 class Source(ABC):
@@ -30,43 +31,64 @@ class Source(ABC):
         """Return frame `frame` (from 0): float32 (row, column, 3), linear, 1 diffuse white."""
 
 
+class Slid(Protocol):
+    """Light after the optics in the sensor's rows, seen through a window."""
+
+    def window(self, column: float, rows: int, columns: int) -> Light:
+        """Return (rows, columns, 3), the first column at `column` of the finer grid."""
+        ...
+
+
+@dataclass(frozen=True)
+class Slices:
+    """A window at whole fine columns: exact, for nothing is computed.
+
+    Attributes
+    ----------
+    light
+        After the optics, float32 (row of the sensor, fine column, 3).
+    step
+        Fine columns per column of the sensor.
+    """
+
+    light: Light
+    step: int
+
+    def window(self, column: float, rows: int, columns: int) -> Light:
+        """Return a copy of the columns from `column` on, which is a whole number."""
+        first = int(column)
+        return np.ascontiguousarray(
+            self.light[:rows, first : first + self.step * columns : self.step]
+        )
+
+
 class Window(Source):
     """A window that slides to the right over one still image.
 
-    Speeds of whole fine pixels are exact slices of one picture that has passed the optics; others
-    shift it by a phase ramp in the same Fourier step.
+    The picture passes the optics once. Speeds of whole fine pixels are exact slices of it; others
+    add a phase ramp to its spectrum.
     """
 
     def __init__(
         self, image: Light, optics: Optics, sequence: Sequence, scale: int, pan_px_per_frame: float
     ) -> None:
-        self.optics, self.sequence, self.scale = optics, sequence, scale
+        self.sequence = sequence
         self.step = scale * pan_px_per_frame
-        self.whole = self.step == round(self.step)
-        self.image = through_optics(image, optics, scale) if self.whole else image
-        spare = image.shape[0] - scale * sequence.height
-        self.first_row = spare // 2
+        first_row = (image.shape[0] - scale * sequence.height) // 2
         travel = abs(self.step) * (sequence.frames - 1)
-        self.start = (image.shape[1] - scale * sequence.width - travel) / 2
-        self.start = np.floor(self.start) + (travel if self.step < 0 else 0.0)
+        self.start = np.floor((image.shape[1] - scale * sequence.width - travel) / 2)
+        self.start += travel if self.step < 0 else 0.0
+        self.slid: Slid
+        if self.step == round(self.step):
+            rows = slice(first_row, first_row + scale * sequence.height, scale)
+            self.slid = Slices(through_optics(image, optics, scale)[rows].copy(), scale)
+        else:
+            self.slid = Pan.of(image, optics, scale, first_row=first_row)
 
     def light(self, frame: int) -> Light:
         """Return the window's light in frame `frame`."""
-        place = self.start + self.step * frame
-        column = int(np.floor(place))
-        if self.whole:
-            return self._sampled(self.image, self.first_row, column)
-        margin = _CONTEXT_PX * self.scale
-        left = max(0, column - margin)
-        right = min(self.image.shape[1], column + self.scale * self.sequence.width + margin)
-        shift = (0.0, -(place - column) / self.scale)
-        seen = through_optics(self.image[:, left:right], self.optics, self.scale, shift_px=shift)
-        return self._sampled(seen, self.first_row, column - left)
-
-    def _sampled(self, image: Light, row: int, column: int) -> Light:
-        s, size = self.scale, self.sequence
-        window = image[row : row + s * size.height : s, column : column + s * size.width : s]
-        return np.ascontiguousarray(window)
+        place = float(self.start + self.step * frame)
+        return self.slid.window(place, self.sequence.height, self.sequence.width)
 
 
 class Numbered(Source):
@@ -93,11 +115,9 @@ def source_of(content: Content, test: Test, transform: DisplayTransform) -> Sour
     """Return the source of a content of a test."""
     spec = test.spec
     size, scale = spec.sequence, content.scale
-    if content.scene is not None:
-        travel = int(np.ceil(abs(content.pan_px_per_frame) * (size.frames - 1)))
-        rows = max(FEWEST_ROWS, scale * size.height)  # of which the window shows the middle
-        image = panorama(content.scene, content.scene_seed, rows, scale * (size.width + travel))
-        light = transform.scene_from_linear_rec709(image)
+    strip = strip_of(content, size)
+    if strip is not None:
+        light = transform.scene_from_linear_rec709(panorama(strip))
         return Window(light, spec.optics, size, scale, content.pan_px_per_frame)
     footage = test.footage[content.name or ""]
     linear = _as_they_are if is_linear(content, footage) else transform.scene_from_display

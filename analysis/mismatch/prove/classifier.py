@@ -65,11 +65,13 @@ class Samples:
 def auc_of(held: Held, camera: Camera, signals: Signals, *, seed: int) -> Auc | None:
     """Return how well locked frames are told from those of a camera; None: too few patches."""
     groups = max(min((len(e.numbers) for e in held.locked if len(e.numbers) > 1), default=0), 0)
-    if groups < 2 or min(held.shape) < SIDE:
+    if groups < 2:
         return None
     taken = tuple(thinned(list(held.locked), _MOST_EXPOSURES))
     held = replace(held, exposures=taken)
     places = (held.shape[0] // SIDE) * (held.shape[1] // SIDE)
+    if places < 2:
+        return None  # places are left out in turn
     sensors = int(np.clip(-(-_SAMPLES // places), _LEAST_SENSORS, _MOST_SENSORS))
     base = base_of(camera)
     variance = {

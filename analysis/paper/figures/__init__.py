@@ -1,0 +1,1 @@
+"""The pictures of the page: the part of it that touches matplotlib."""

@@ -1,0 +1,5 @@
+"""City: a panorama over a dense city, traced without chance."""
+
+from dsis.scenes.city.panorama import render
+
+__all__ = ["render"]

@@ -1,0 +1,151 @@
+"""Promise: a Dask cluster gives the bytes of `--jobs 1`, even where a worker is killed."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dsis.cli import main
+from dsis.errors import InputError
+from dsis.imagefile import write
+from dsis.spec import read_spec
+from dsis.stimuli import build_stimuli
+from dsis.workers import WorkersLostError, _refuse_unlike, versions, workers
+
+distributed = pytest.importorskip("distributed")
+
+SECONDS = 60.0  # in which a cluster of this machine must stand, however busy it is
+SPEC = """\
+schema = "dsis-test/1"
+seed = 3
+formats = ["player", "png8"]
+sequence = {width = 64, height = 48, fps = 25, seconds = 0.64}
+content = [{name = "picture", files = "picture.exr", pan_px_per_frame = 0.5}]
+camera = {model = "cameras/dual_gain_cinema.toml"}
+awgn = {match = "psnr"}
+conditions = {noise = ["awgn", "sd"], demosaic = ["none", "dlmmse"], levels = [0]}
+session = {reference_s = 0.64, test_s = 0.64, training = 0}
+[color]
+[optics]
+f_number = 5.6
+wavelength_nm = 550
+pitch_um = 8.25
+low_pass_spot_separation_px = 0.75
+fill_factor = 1.0
+"""
+
+
+@pytest.fixture(scope="module")
+def spec(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("spec")
+    light = np.random.default_rng(0).uniform(0, 1, (56, 104, 3)).astype(np.float32)
+    write(folder / "picture.exr", light, "exr")
+    (folder / "spec.toml").write_text(SPEC, encoding="utf-8")
+    return folder / "spec.toml"
+
+
+@pytest.fixture(scope="module")
+def built(spec: Path) -> dict[str, bytes]:
+    assert main(["stimuli", str(spec), "--jobs", "1", "--out", str(spec.parent / "one")]) == 0
+    return every_byte(spec.parent / "one")
+
+
+@pytest.fixture(scope="module")
+def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
+    """Yield a client of a scheduler and two workers, each a process of its own."""
+    folder = tmp_path_factory.mktemp("cluster")
+    contact = str(folder / "scheduler.json")
+    program = [sys.executable, "-W", "ignore", "-m"]
+    scheduler = [*program, "distributed.cli.dask_scheduler", "--scheduler-file", contact]
+    scheduler += ["--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--no-show"]
+    worker = [*program, "distributed.cli.dask_worker", "--scheduler-file", contact]
+    worker += ["--nworkers", "2", "--nthreads", "1", "--no-dashboard"]
+    worker += ["--host", "127.0.0.1", "--local-directory", str(folder)]
+    with (folder / "log").open("wb") as log:
+        processes = [
+            subprocess.Popen(one, stdout=log, stderr=log, cwd=folder) for one in (scheduler, worker)
+        ]
+        try:
+            client = joined(folder, contact)
+            yield client
+            client.close()
+        finally:
+            for process in reversed(processes):
+                process.terminate()
+                process.wait(SECONDS)
+
+
+def joined(folder: Path, contact: str) -> Any:
+    """Return a client once both workers are there."""
+    end = time.monotonic() + SECONDS
+    while not Path(contact).exists():
+        assert time.monotonic() < end, (folder / "log").read_text()
+        time.sleep(0.05)
+    client = distributed.Client(scheduler_file=contact, timeout=SECONDS, set_as_default=False)
+    client.wait_for_workers(2, timeout=SECONDS)
+    return client
+
+
+def every_byte(folder: Path) -> dict[str, bytes]:
+    return {
+        str(path.relative_to(folder)): path.read_bytes()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file()
+    }
+
+
+def test_two_worker_processes_give_the_same_bytes(
+    cluster: Any, spec: Path, built: dict[str, bytes], tmp_path: Path
+) -> None:
+    address = cluster.scheduler.address
+    assert len(set(cluster.run(os.getpid).values()) - {os.getpid()}) == 2
+    said = main(["stimuli", str(spec), "--scheduler", address, "--out", str(tmp_path / "out")])
+    assert said == 0
+    assert every_byte(tmp_path / "out") == built
+
+
+def test_workers_with_other_versions_are_refused() -> None:
+    alike, unlike = versions(), versions() | {"numba": "0.1", "processor": "abacus"}
+    _refuse_unlike("there", {"a": alike})
+    with pytest.raises(InputError, match="none has joined"):
+        _refuse_unlike("there", {})
+    with pytest.raises(InputError) as refused:
+        _refuse_unlike("there", {"a": alike, "b": unlike})
+    assert [fault.key for fault in refused.value.faults] == ["there", "there"]
+    assert "worker b has numba 0.1, must have" in str(refused.value)
+
+
+def test_a_worker_that_is_killed_is_no_loss(
+    cluster: Any, spec: Path, built: dict[str, bytes], tmp_path: Path
+) -> None:
+    killed: list[int] = []
+
+    def kill_one(done: int, total: int, what: str) -> None:
+        del total, what
+        if done == 2 and not killed:
+            killed.append(min(cluster.run(os.getpid).values()))
+            os.kill(killed[0], signal.SIGKILL)
+
+    build_stimuli(
+        read_spec(spec),
+        tmp_path / "out",
+        scheduler=cluster.scheduler.address,
+        progress=kill_one,
+    )
+    assert killed
+    assert every_byte(tmp_path / "out") == built
+
+
+def test_work_that_kills_every_worker_is_given_up(cluster: Any) -> None:
+    with (
+        workers(scheduler=cluster.scheduler.address) as pool,
+        pytest.raises(WorkersLostError, match="a worker died each time"),
+    ):
+        pool.submit(os._exit, 1).result(SECONDS)

@@ -123,7 +123,7 @@ def planted(folder: Path, cfa: Cfa) -> Planted:
     numbers = {e.name: e.numbers for e in layout.exposures}
     album = Album(layout)
     seen = observe(layout, lambda name: source.frames(name, numbers[name]), album, keep=True)
-    setting = Setting(layout, seen, split.interpolated, 3, 1, REPEATS, REPEATS, 2, 4)
+    setting = Setting(layout, seen, split.interpolated, 3, 1, REPEATS, REPEATS, 2, 2, 4)
     base = State.of(setting, base_camera(cfa), nothing)
     return Planted(frames, gain, split, album, setting, base)
 

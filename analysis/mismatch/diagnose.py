@@ -1,9 +1,10 @@
 """`find_mismatch`: split, re-calibrate, locate, name, prove."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.mismatch.candidates import CANDIDATES
 from analysis.mismatch.explain import because, explained
@@ -26,6 +27,7 @@ from analysis.mismatch.settle import would_settle
 from analysis.mismatch.source import Source
 from analysis.mismatch.split import Split
 from analysis.mismatch.state import Setting, State
+from analysis.mismatch.thinned import thinned
 from analysis.mismatch.trial import Trial
 from dsis.camera import Camera
 from dsis.recording import Recording
@@ -43,11 +45,9 @@ def find_mismatch(
     seed: int = 0,
     jobs: int = 1,
     vocabulary: frozenset[str] | None = None,
-    maps: object = None,
     progress: Progress | None = None,
 ) -> Finding:
     """Return where a recording differs from a camera model, and what physics was left out."""
-    del maps
     done = 0
 
     def step(what: str = "simulating") -> None:
@@ -62,28 +62,41 @@ def find_mismatch(
     layout = layout_of(recording, development, source.frames)
     numbers = {e.name: e.numbers for e in layout.exposures}
     remarks = remarks_on(recording, development, layout)
+    split = split.without(layout.moving)
     album = Album(layout)
     seen = observe(layout, lambda name: source.frames(name, numbers[name]), album, keep=True)
     samples = sum(len(e.numbers) for e in layout.exposures) * layout.rows * layout.columns
-    counts = (8, 4, 2, 2) if samples > _LARGE else (16, 16, 2, 4)
+    counts = (8, 4, 1, 2, 2) if samples > _LARGE else (16, 16, 2, 2, 4)
     setting = Setting(layout, seen, split.interpolated, seed, jobs, *counts)
     base = State.of(setting, camera, step)
     words = VOCABULARY if vocabulary is None else vocabulary & VOCABULARY
-    search = Search(
-        setting,
-        camera,
-        base,
-        words,
-        step,
-        frames_of=lambda name: source.frames(name, numbers[name]),
-    )
-    final = search.run()
+
+    def frames_of(name: str) -> Iterator[NDArray[np.uint16]]:
+        return source.frames(name, numbers[name])
+
+    search = Search(setting, camera, base, words, step, frames_of=frames_of)
+    final = _searched(search, source) if samples > _LARGE else search.run()
     trial = Trial.of(recording, split, source, setting)
     final, gains = _proven(search, search.settle(final), trial)
     proof = trial.proof(base, final, step, source)
     found = _finding(camera, base, final, search, gains, proof)
     evidence = evidence_of(base, final, album, split)
     return replace(found, remarks=(*remarks, *found.remarks), evidence=evidence)
+
+
+def _searched(search: Search, source: Source) -> State:
+    """Return the final state of a large recording: sought on some of its frames, judged on all."""
+    whole, base = search.setting, search.base
+    layout = thinned(whole.layout)
+    numbers = {e.name: e.numbers for e in layout.exposures}
+    if layout == whole.layout:
+        return search.run()
+    seen = observe(layout, lambda name: source.frames(name, numbers[name]), keep=True)
+    search.setting = replace(whole, layout=layout, seen=seen)
+    search.base = State.of(search.setting, search.camera, search.step)
+    found = search.run()
+    search.setting, search.base = whole, base
+    return State.of(whole, found.camera, search.step) if search.named else base
 
 
 def _proven(search: Search, final: State, trial: Trial) -> tuple[State, dict[str, Gain]]:

@@ -10,6 +10,7 @@ from analysis.mismatch.finding import Mismatch, Where
 from analysis.mismatch.null import Null, adjusted
 from analysis.mismatch.observe import Layout, Observation
 from analysis.mismatch.says import sentence
+from analysis.mismatch.scenes import SCENE
 from analysis.mismatch.vector import Vector
 
 Array = NDArray[np.float64]
@@ -47,6 +48,10 @@ def tested(layout: Layout, null: Null, seen: Vector) -> tuple[Array, Array]:
     for i, row in enumerate(null.contrasts.matrix):
         if small[np.flatnonzero(row)].all():
             z[size + i] = 0.0
+    # The largest of many bins says nothing where it is smaller than chance makes it.
+    peaks = np.array([key.statistic.endswith("spectrum_peak") or key.statistic == "spectral_peak"
+                      for key in null.keys])  # fmt: skip
+    z[peaks] = np.maximum(z[peaks], 0.0)
     known = np.concatenate([null.known, np.ones(len(null.contrasts.keys), bool)])
     chances = np.ones(len(z))
     weights = shares(layout, null)
@@ -121,8 +126,11 @@ def _where(
         layout.signal_dn[e.name, c]
         for e in exposures
         for c in layout.channels
-        if (channel is None or c == channel) and e.kind != "scene"
+        if (channel is None or c == channel) and e.kind != SCENE
     ]
+    for i in single:
+        if keys[i].exposure in layout.scenes:
+            signals += layout.range_dn(keys[i].place)
     kinds = {e.kind for e in exposures}
     times = [e.exposure_time_s for e in exposures]
     return Where(

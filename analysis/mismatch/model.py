@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.observe import Layout, Observation, observe
+from analysis.mismatch.scenes import without_picture
 from dsis.camera import Camera
 from dsis.draw import Draw
 from dsis.effects import Image
@@ -34,7 +35,7 @@ class Model:
         The camera.
     signals
         Clean signal of each flat and dark before all effects, DN above black, for rows 0, 1 and
-        columns 0, 1: (2, 2).
+        columns 0, 1: (2, 2). Of a scene, for every pixel: (row, column).
     """
 
     camera: Camera
@@ -54,9 +55,12 @@ class Model:
 
         def of(name: str) -> Iterator[Image]:
             temporal = Draw(seed).within("exposure", name, str(replicate))
-            clean = tiled(self.signals[name], grid)
+            picture = name in layout.scenes
+            camera = without_picture(self.camera) if picture else self.camera
+            signal = self.signals[name]
+            clean = signal.astype(np.float32) if picture else tiled(signal, grid)
             for number in numbers[name]:
-                image = self.camera.expose(
+                image = camera.expose(
                     clean, temporal, sensor, number, grid, exposure_time_s=times[name]
                 )
                 yield np.rint(image + black)

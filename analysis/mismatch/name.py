@@ -21,9 +21,9 @@ from dsis.effects import Effect
 Array = NDArray[np.float64]
 Step = Callable[[], None]
 LEAST_GAIN = 5.0  # of log-likelihood, for an effect to be taken in
-_TIE = 2.0  # of log-likelihood: two effects nearer than that cannot be told apart
+_TIE = 3.0  # of log-likelihood: odds below 20 do not tell two effects apart
 _ALIKE = 0.5  # cosine of what two effects change, from which they are rivals
-_MOST_EFFECTS = 5
+_MOST_EFFECTS = 8
 _CLEAR = 3.0  # departures below are chance
 _PHASES = {
     "periodic_noise": "the pattern's phase is the same in all frames but for its sign",
@@ -31,6 +31,7 @@ _PHASES = {
 }
 _SPIKY = 10.0  # standard errors from which tails bend the variances
 _TAILS = frozenset({"kurtosis", "kurtosis_within_pixels", "one_off_outliers"})
+_MINOR = 0.3  # share of a departure
 _RESOLVED = 0.7  # share of what an effect touches that it must explain
 
 
@@ -273,9 +274,12 @@ def resolved(predictor: Predictor, state: State, without: Array) -> float:
     forms = np.concatenate([predictor.forms, np.full(len(sums), float(np.median(predictor.forms)))])
     after = null.departures(state.vector)
     clear = np.abs(change) > _CLEAR
+    # Where an effect adds little, and rightly, to a large departure, the rest is another's.
+    departure = after + change
+    clear &= ~((change * departure > 0) & (np.abs(change) < _MINOR * np.abs(departure)))
     if not clear.any():
         return 0.0
-    before = np.abs(after + change)[clear]
+    before = np.abs(departure)[clear]
     allowed = _CLEAR + 2 * forms[clear] * np.abs(change[clear])
     left = np.maximum(np.abs(after[clear]) - allowed, 0.0).sum()
     total = np.maximum(np.maximum(before, np.abs(change[clear])) - _CLEAR, 0.0).sum()

@@ -10,9 +10,11 @@ from numpy.typing import NDArray
 
 from analysis.mismatch.bank.coherent import Peak, SpectrumSums, VarianceSums
 from analysis.mismatch.bank.common import common
+from analysis.mismatch.bank.local import local_scalars, variances, widened
 from analysis.mismatch.bank.maps import Parts, PatternSums, Regressors, parts
 from analysis.mismatch.bank.scalars import Number, scalars
 from analysis.mismatch.bank.together import together
+from analysis.mismatch.scenes import SCENE, Local, Scene
 from dsis.cfa import Cfa, pattern
 from dsis.measures import Accumulator, Channel, Measured
 
@@ -20,7 +22,7 @@ Array = NDArray[np.float64]
 Frames = Callable[[str], Iterable[NDArray[np.generic]]]
 Watcher = Callable[[str, Measured], None]
 Place = tuple[str, str]
-"""Exposure and channel."""
+"""Exposure and channel; of a scene also channel and bin of signal."""
 
 
 @dataclass(frozen=True)
@@ -60,6 +62,10 @@ class Layout:
         Nominal black level and largest code: levels are counted from this black.
     signal_dn, variance_dn2
         Expected by the re-calibrated model, by exposure and channel: weights only.
+    scenes
+        Static scenes among the exposures; their signals and variances are as recorded.
+    moving
+        Exposures of kind scene that are left out, for the picture moves between frames.
     """
 
     exposures: tuple[Taken, ...]
@@ -70,6 +76,8 @@ class Layout:
     white_dn: float
     signal_dn: Mapping[Place, float]
     variance_dn2: Mapping[Place, float]
+    scenes: Mapping[str, Scene] = field(default_factory=dict)
+    moving: tuple[str, ...] = ()
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -84,7 +92,29 @@ class Layout:
     @property
     def uniform(self) -> tuple[Taken, ...]:
         """Darks and flats."""
-        return tuple(e for e in self.exposures if e.kind != "scene")
+        return tuple(e for e in self.exposures if e.kind != SCENE)
+
+    @property
+    def pictures(self) -> tuple[Taken, ...]:
+        """Static scenes."""
+        return tuple(e for e in self.exposures if e.name in self.scenes)
+
+    def part(self, place: Place) -> tuple[Local, slice]:
+        """Return the pixels of a place of a scene: a channel's, and those of a bin of signal."""
+        channel, _, label = place[1].partition(" ")
+        local = self.scenes[place[0]].channels[channel]
+        return local, local.bins[label].ranges if label else slice(None)
+
+    def range_dn(self, place: Place) -> tuple[float, float]:
+        """Return the lowest and the highest signal of a place of a scene from 0 on, DN above black.
+
+        A place of all channels together has those of all its channels.
+        """
+        channels = self.scenes[place[0]].channels
+        name, _, label = place[1].partition(" ")
+        parts = [channels[name]] if name in channels else channels.values()
+        own = [bin_ for part in parts for key, bin_ in part.bins.items() if label in ("", key)]
+        return max(min(b.low_dn for b in own), 0.0), max(b.high_dn for b in own)
 
     def regressors(self, channel: str) -> Regressors:
         """Return what the mean frames of a channel are regressed on."""
@@ -159,6 +189,8 @@ class Observation:
         channel and name, and summed relative pixel variances under the name `variance`.
     common
         What the channels of a mosaic have in common, by exposure.
+    local
+        The same as `levels` of scenes: by exposure and channel, and in bins of signal.
     """
 
     levels: Mapping[Place, Level]
@@ -168,6 +200,11 @@ class Observation:
     peaks: Mapping[tuple[str, str], Peak]
     images: Mapping[tuple[str, str], tuple[Array, float]] = field(default_factory=dict)
     common: Mapping[str, Mapping[str, Number]] = field(default_factory=dict)
+    local: Mapping[Place, Level] = field(default_factory=dict)
+
+    def level(self, place: Place) -> Level | None:
+        """Return mean and variance at a place, of a scene or not; None: it is none."""
+        return self.levels.get(place) or self.local.get(place)
 
 
 def measure(layout: Layout, frames: Iterable[NDArray[np.generic]]) -> Measured:
@@ -247,6 +284,7 @@ def observe(
                 sums[name] = _Channel(layout.regressors(name), (n, m))
             variance, signal = layout.variance_dn2[place], layout.signal_dn[place]
             sums[name].add(exposure.name, channel, frames, variance, signal)
+    local = _scenes(layout, frames_of, watch, found, shared)
     maps, images = _maps(layout, sums)
     return Observation(
         levels,
@@ -256,7 +294,52 @@ def observe(
         {(name, kind): peak for name, own in sums.items() for kind, peak in own.peaks()},
         images if keep else {},
         shared,
+        local,
     )
+
+
+def _scenes(
+    layout: Layout,
+    frames_of: Frames,
+    watch: Watcher | None,
+    found: dict[Place, Mapping[str, Number]],
+    shared: dict[str, Mapping[str, Number]],
+) -> dict[Place, Level]:
+    """Add what scenes show to what was found; return their variances by signal."""
+    local: dict[Place, Level] = {}
+    for exposure in layout.pictures:
+        scene = layout.scenes[exposure.name]
+        measured = measure(layout, map(scene.steadied, frames_of(exposure.name)))
+        if watch is not None:
+            watch(exposure.name, measured)
+        frames, parts = len(exposure.numbers), scene.channels
+        if len(measured.channels) > 1:
+            signals = {name: layout.signal_dn[exposure.name, name] for name in measured.channels}
+            alike = common(measured.channels, signals, frames, layout.sites)
+            shared[exposure.name] = widened(alike, measured.channels, parts)
+        for name, channel in measured.channels.items():
+            own = parts[name]
+            found[exposure.name, name] = local_scalars(channel, frames, own)
+            local[exposure.name, name] = _level(channel, frames)
+            for label, level in _by_signal(channel, frames, own).items():
+                local[exposure.name, f"{name} {label}"] = level
+    return local
+
+
+def _by_signal(channel: Channel, frames: int, own: Local) -> dict[str, Level]:
+    """Return the variance in each bin of signal; its degrees of freedom allow for its range."""
+    rows, columns = channel.mean_frame.shape
+    share = (frames - 1) * (1 - 1 / rows) * (1 - 1 / columns)
+    level, variance = own.by_range(channel.mean_frame), variances(channel, own)
+    measured = own.by_range(channel.variance_map)
+    found = {}
+    for label, part in ((label, one.ranges) for label, one in own.bins.items()):
+        mean, pixels = own.mean(variance, part), int(own.pixels[part].sum())
+        uneven = own.mean(measured**2, part) / mean**2 if mean > 0 else 1.0
+        at = own.mean(level, part)
+        error = (max(mean, 0.0) / frames / pixels) ** 0.5
+        found[label] = Level(at, error, mean, share * pixels / uneven, 0.0, 0.0, pixels)
+    return found
 
 
 def _maps(

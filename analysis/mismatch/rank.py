@@ -7,14 +7,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.candidates import CANDIDATES, Proposal
+from analysis.mismatch.model import in_threads
 from analysis.mismatch.polish import Polished, polish, with_effects
-from analysis.mismatch.predict import Predictor
 from analysis.mismatch.state import State
 from dsis.effects import Effect
 
 Array = NDArray[np.float64]
 _MOST = 4  # kinds that are fitted, after all were tried as proposed
 _FAR = 15.0  # of log-likelihood behind the best as proposed: fitting does not make up for it
+_SHARE = 0.03  # or that share of what the best gains
 _ALIKE = 0.05  # relative difference of parameters up to which a proposal is an earlier one
 _SHARED = 0.1  # share of an effect's change that may lie where the model moved since
 
@@ -31,8 +32,8 @@ class Memory:
 
     changes: list[tuple[Effect, Array, Array]] = field(default_factory=list)
 
-    def mean(self, effect: Effect, state: State, predictor: Predictor) -> Array:
-        """Return the numbers predicted with an effect added: as remembered, or else simulated."""
+    def recalled(self, effect: Effect, state: State) -> Array | None:
+        """Return the numbers with an effect added, as remembered; None: it must be simulated."""
         null = state.null
         for known, means, change in self.changes:
             if not _near(known, effect):
@@ -41,12 +42,12 @@ class Memory:
             moved = np.where(null.known, np.abs(null.mean - means) / null.sd, 0.0) > 1.0
             if size[moved].sum() <= _SHARED * size.sum():
                 return null.mean + change
-        built = with_effects(state.camera, [effect])
-        if built is None:
-            return np.full_like(null.mean, np.nan)
-        mean = predictor.mean(built)
-        self.changes.append((effect, null.mean, np.nan_to_num(mean - null.mean)))
-        return mean
+        return None
+
+    def keep(self, effect: Effect, state: State, mean: Array) -> None:
+        """Remember what an effect changed."""
+        means = state.null.mean
+        self.changes.append((effect, means, np.nan_to_num(mean - means)))
 
 
 def _near(one: Effect, other: Effect) -> bool:
@@ -76,11 +77,12 @@ def ranked(
     """Return the effects among `kinds` that mismatches call for, fitted one at a time."""
     predictor = state.predictor()
     before = predictor.loglik(state.null.mean)
-    tried = _tried(state, predictor, kinds, memory, step)
+    tried = _tried(state, kinds, memory, step)
     best = max((value for value, _, _ in tried), default=0.0)
+    far = max(_FAR, _SHARE * (best - before))
     found = []
     for value, kind, proposal in tried[:_MOST]:
-        if value < best - _FAR:
+        if value < best - far:
             continue
         polished = polish(predictor, state.camera, [proposal], rounds=1 + len(proposal.free))
         if polished is not None:
@@ -91,26 +93,37 @@ def ranked(
 
 
 def _tried(
-    state: State,
-    predictor: Predictor,
-    kinds: Iterable[str],
-    memory: Memory,
-    step: Callable[[], None],
+    state: State, kinds: Iterable[str], memory: Memory, step: Callable[[], None]
 ) -> list[tuple[float, str, Proposal]]:
     """Return the best proposal of each kind as it is proposed, the most likely first."""
     off = {m.statistic for m in state.mismatches}
     clues = state.clues()
-    tried = []
-    for kind in sorted(kinds):
-        candidate = CANDIDATES.get(kind)
-        if candidate is None or not off & set(candidate.calls):
-            continue
-        own = []
-        for proposal in candidate.propose(clues):
-            mean = memory.mean(proposal.effect, state, predictor)
-            if np.isfinite(mean).any():
-                own.append((predictor.loglik(mean), kind, proposal))
-        if own:
-            tried.append(max(own, key=lambda one: one[0]))
+    proposed = [
+        (kind, proposal)
+        for kind in sorted(kinds)
+        if kind in CANDIDATES and off & set(CANDIDATES[kind].calls)
+        for proposal in CANDIDATES[kind].propose(clues)
+    ]
+    predictor = state.predictor(state.setting.screening)
+
+    def mean(one: tuple[str, Proposal]) -> tuple[Array | None, bool]:
+        known = memory.recalled(one[1].effect, state)
+        if known is not None:
+            return known, True
+        built = with_effects(state.camera, [one[1].effect])
         step()
-    return sorted(tried, key=lambda one: -one[0])
+        return (None if built is None else predictor.mean(built)), False
+
+    # One simulation for each leaves the threads to them.
+    side_by_side = state.setting.jobs if predictor.replicates == 1 else 1
+    best: dict[str, tuple[float, str, Proposal]] = {}
+    means = in_threads(mean, proposed, side_by_side)
+    for (kind, proposal), (found, old) in zip(proposed, means, strict=True):
+        if found is None:
+            continue
+        if not old:
+            memory.keep(proposal.effect, state, found)
+        value = predictor.loglik(found)
+        if kind not in best or value > best[kind][0]:
+            best[kind] = (value, kind, proposal)
+    return sorted(best.values(), key=lambda one: -one[0])

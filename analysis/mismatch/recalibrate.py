@@ -16,6 +16,8 @@ from analysis.mismatch.finding import ParameterError
 from analysis.mismatch.model import Model, Sites
 from analysis.mismatch.observe import Layout, Level, Observation, Place, Taken, sites
 from analysis.mismatch.rounding import rounded, unrounded
+from analysis.mismatch.scenes import SCENE
+from analysis.mismatch.staging import with_pictures, with_scenes
 from dsis.camera import BaseNoise, Camera, Segment
 from dsis.cfa import Cfa
 from dsis.effects.quantisation import Quantisation
@@ -75,8 +77,9 @@ def layout_of(
 ) -> Layout:
     """Return the layout of the frames `numbers`; two frames of each exposure set the weights.
 
-    `first(exposure, numbers)` gives frames. Exposures with fewer than two frames, with more than
-    0.1 % of a channel at the white level, or whose frames are copies are left out.
+    `first(exposure, numbers)` gives frames; all of a scene are read. Scenes that move are left out,
+    and exposures with fewer than two frames, with more than 0.1 % of a channel at the white level,
+    or whose frames are copies.
 
     Raises
     ------
@@ -107,7 +110,7 @@ def layout_of(
             spread = np.percentile(two - one, [15.865, 84.135])
             robust = float(spread[1] - spread[0]) ** 2 / 8
             variances[e.name, channel] = max(robust, 0.05)
-    if not any(e.kind != "scene" for e in taken):
+    if not any(e.kind != SCENE for e in taken):
         fact = "holds no dark or flat of two different frames that are not clipped"
         raise InputError.of(recording.folder, "exposure", fact)
     signal = {}
@@ -118,7 +121,7 @@ def layout_of(
             signal[e.name, channel] = (
                 0.0 if e.kind == "dark" else max(means[e.name, channel] - ground, 0.0)
             )
-    return Layout(
+    layout = Layout(
         tuple(taken),
         recording.rows,
         recording.columns,
@@ -128,6 +131,7 @@ def layout_of(
         signal,
         variances,
     )
+    return with_scenes(layout, means, first)
 
 
 def calibrate(
@@ -164,6 +168,8 @@ def calibrate(
             fit = fitted(recorded, switches)
         model = Model(with_numbers(camera, fit, switches, layout.black_dn), signals_of(layout, fit))
         effects = bending_offsets(model, layout, seed + 1, jobs)
+    if layout.scenes:
+        model = with_pictures(model, layout, fit, effects, seed=seed + 1, jobs=jobs)
     offsets = _sum(_rounding(model, layout, fit), effects)
     return Calibrated(model, fit, fitted(offsets, switches), offsets, switches, left_out)
 

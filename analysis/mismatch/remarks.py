@@ -13,20 +13,19 @@ def remarks_on(
 ) -> tuple[str, ...]:
     """Return what a reader of the result must know of the frames that were used."""
     used = {e.name for e in layout.uniform}
-    scenes = [e.name for e in recording.exposures if e.kind == "scene"]
-    unfit = [
-        e.name
-        for e in recording.exposures
-        if e.kind != "scene" and e.name in development and e.name not in used
-    ]
+    used |= {*layout.scenes, *layout.moving}
+    unfit = [e.name for e in recording.exposures if e.name in development and e.name not in used]
     found = []
     if unfit:
         found.append(
             f"{len(unfit)} exposure(s) are left out, clipped at the white level, of a single frame "
             f"or of copies: {_listed(unfit)}."
         )
-    if scenes:
-        found.append(f"{len(scenes)} exposure(s) of kind scene are not looked at.")
+    if layout.moving:
+        found.append(
+            f"{len(layout.moving)} scene(s) are left out, their picture moves between frames: "
+            f"{_listed(layout.moving)}."
+        )
     if not recording.of_kind("dark"):
         found.append(
             "There are no darks: the black level is the camera model's, offsets and dark current "

@@ -2,6 +2,7 @@
 
 from analysis.mismatch.bank.key import Key
 from analysis.mismatch.finding import Where
+from analysis.mismatch.scenes import SCENE
 
 _WORDS = {
     "level": "the mean level is off what the light (or the other darks) ask for",
@@ -55,8 +56,10 @@ def sentence(statistic: str, key: Key, z: float, where: Where) -> str:
     how = _SCOPES.get(key.scope, "")
     if key.scope == "contrast" and key.detail not in ("", "at all levels"):
         how = f" ({key.detail})"
-    if key.detail and key.scope not in ("contrast", "exposure"):
+    if key.detail and key.scope not in ("contrast", "exposure", SCENE):
         how += f" ({key.detail})"
+    if key.detail and key.scope == SCENE and where.signal_dn is not None:
+        how += " (between {:.3g} and {:.3g} DN)".format(*where.signal_dn)
     places = ", ".join(where.exposures[:4]) + (" ..." if len(where.exposures) > 4 else "")
     channel = f" in channel {where.channel}" if where.channel not in (None, "MONO") else ""
     sign = "more" if z > 0 else "less"

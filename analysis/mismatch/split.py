@@ -5,8 +5,8 @@ is in all parts. Exposures of fewer than six frames are given whole to one part;
 left out of the re-calibration, so that the line's interpolation is tested.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
 
 from dsis.recording import RecordedExposure, Recording
 
@@ -40,6 +40,14 @@ class Split:
             name: tuple(sorted((*self.train.get(name, ()), *self.select.get(name, ()))))
             for name in names
         }
+
+    def without(self, names: Collection[str]) -> "Split":
+        """Return the split without some exposures."""
+        train, select, locked = (
+            {name: numbers for name, numbers in part.items() if name not in names}
+            for part in (self.train, self.select, self.locked)
+        )
+        return replace(self, train=train, select=select, locked=locked)
 
     @classmethod
     def of(cls, recording: Recording) -> "Split":

@@ -33,9 +33,9 @@ class Setting:
         The exposure that the re-calibration leaves out.
     seed, jobs
         Of the simulations.
-    nulls, drafts, replicates, polishing
-        Simulations for a null, for that of a model on the way, for the comparison of candidates
-        and for the parameters of all effects together.
+    nulls, drafts, screening, replicates, polishing
+        Simulations for a null, for that of a model on the way, for a first look at candidates, for
+        their comparison and for the parameters of all effects together.
     """
 
     layout: Layout
@@ -45,6 +45,7 @@ class Setting:
     jobs: int
     nulls: int
     drafts: int
+    screening: int
     replicates: int
     polishing: int
 

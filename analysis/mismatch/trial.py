@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from analysis.mismatch.finding import Change, Gain, Proof
 from analysis.mismatch.heldnumbers import HeldNumbers
-from analysis.mismatch.model import simulate
+from analysis.mismatch.model import in_threads, simulate
 from analysis.mismatch.observe import Observation, observe
 from analysis.mismatch.prove.gain import heldout_gain
 from analysis.mismatch.prove.gap import gap_closed
@@ -86,11 +86,14 @@ class Trial:
         if not without:
             return {}
         signals = final.calibrated.model.signals
-        whole = loglik_of(self.held, final.camera, signals, seed=self.seed)
+        held, jobs = self.held, self.numbers.setting.jobs
+        cameras = [final.camera, *without.values()]
+        whole, *rest = in_threads(
+            lambda camera: loglik_of(held, camera, signals, seed=self.seed), cameras, jobs
+        )
         frames = sum(own.size for own in whole.frames.values())
         found = {}
-        for kind, camera in without.items():
-            less = loglik_of(self.held, camera, signals, seed=self.seed)
+        for (kind, camera), less in zip(without.items(), rest, strict=True):
             found[kind] = _of_pixels(heldout_gain(less, whole, seed=self.seed), frames)
             if not found[kind].certain:
                 gain, error = self.numbers.gain(final, camera)

@@ -9,9 +9,11 @@ from numpy.typing import NDArray
 
 from analysis.mismatch.bank.coherent import split_name
 from analysis.mismatch.bank.key import Key
+from analysis.mismatch.bank.local import LOCAL_NAMES
 from analysis.mismatch.bank.scalars import NAMES, OF_CODES, OF_MEAN_FRAMES, Number
 from analysis.mismatch.basefit import CLIPPED_SHARE, BaseFit, colour
 from analysis.mismatch.observe import Layout, Observation, Place
+from analysis.mismatch.scenes import SCENE
 
 Array = NDArray[np.float64]
 _SAME = 0.98  # cosine from which two shapes are one
@@ -51,9 +53,10 @@ def vector(layout: Layout, seen: Observation, fit: BaseFit) -> Vector:
         if "Gr" in layout.channels and exposure.kind == "flat":
             rows.append((Key("channel_ratio", "exposure", exposure.name, "G"),
                          _ratio(exposure.name, seen, fit)))  # fmt: skip
-        for label, number in seen.common.get(exposure.name, {}).items():
-            statistic, detail = split_name(label)
-            rows.append((Key(statistic, MOSAIC, exposure.name, "", detail), number))
+        rows += _in_common(exposure.name, seen)
+    for exposure in layout.pictures:
+        rows += _of_scene(layout, exposure.name, seen, fit)
+        rows += _in_common(exposure.name, seen)
     for (channel, name), numbers in seen.maps.items():
         for label, number in numbers.items():
             statistic, detail = split_name(label)
@@ -66,6 +69,38 @@ def vector(layout: Layout, seen: Observation, fit: BaseFit) -> Vector:
     values, errors = np.array([number for _, number in rows]).T
     unknown = ~(np.isfinite(values) & np.isfinite(errors) & (errors > 0))
     return Vector(keys, np.where(unknown, nan, values), np.where(unknown, inf, errors))
+
+
+def _in_common(name: str, seen: Observation) -> Iterator[tuple[Key, Number]]:
+    for label, number in seen.common.get(name, {}).items():
+        statistic, detail = split_name(label)
+        yield Key(statistic, MOSAIC, name, "", detail), number
+
+
+def _of_scene(
+    layout: Layout, name: str, seen: Observation, fit: BaseFit
+) -> Iterator[tuple[Key, Number]]:
+    """Yield a scene's temporal measures, and its pixel variance by signal beside the line."""
+    for channel, local in layout.scenes[name].channels.items():
+        for statistic in LOCAL_NAMES:
+            number = seen.scalars[name, channel][statistic]
+            yield Key(statistic, SCENE, name, channel), number
+        for label in local.bins:
+            key = Key("pixel_variance", SCENE, name, channel, label)
+            level, expected = seen.local[key.place], expected_dn2(layout, key.place, fit)
+            known = level.variance_dn2 > 0 and expected > 0
+            yield (
+                key,
+                (log(level.variance_dn2 / expected), sqrt(2 / level.dof)) if known else (nan, inf),
+            )
+
+
+def expected_dn2(layout: Layout, place: Place, fit: BaseFit) -> float:
+    """Return the variance that the base numbers give at a place, of a scene or not."""
+    if place in fit.expected_dn2:
+        return fit.expected_dn2[place]
+    local, part = layout.part(place)
+    return local.mean(fit.line_dn2(local.signal_dn), part) + 1 / 12
 
 
 def _variance(place: Place, seen: Observation, fit: BaseFit) -> Number:
@@ -154,7 +189,7 @@ def _groups(reference: Vector, known: NDArray[np.bool_]) -> dict[tuple[str, str]
         if key.scope == MOSAIC and known[i]:
             odd = f"{MOSAIC}, {key.detail}" if key.statistic == "alternation_variance" else MOSAIC
             names = [(key.statistic, odd)]
-        elif key.scope == "exposure" and known[i] and key.statistic not in OF_CODES:
+        elif key.scope in ("exposure", SCENE) and known[i] and key.statistic not in OF_CODES:
             names = [(key.statistic, "")]
             if key.statistic in _PAIRS:
                 names.append((_PAIRS[key.statistic], BOTH))
@@ -176,7 +211,7 @@ def _shaped(
     for name, shape in shapes.items():
         row = np.zeros(len(reference.keys))
         for i in which:
-            place = (reference.keys[i].exposure, reference.keys[i].channel)
+            place = reference.keys[i].place
             place = place if place in layout.signal_dn else (place[0], "Gr")
             s, v = max(layout.signal_dn[place], 0.0), layout.variance_dn2[place]
             row[i] = shape(s, v) / reference.errors[i]

@@ -12,8 +12,8 @@ class Key:
     statistic
         One of `dsis.measures.MEASURES`, or one of the bank's own.
     scope
-        What the number is of: `exposure`, or a coherent sum over exposures (`offset`, `gain`,
-        `time`, `pooled` and the weighting of a contrast).
+        What the number is of: `exposure`, `scene` (an exposure to a picture), or a coherent sum
+        over exposures (`offset`, `gain`, `time`, `pooled` and the weighting of a contrast).
     exposure
         Name of the exposure; empty for sums over exposures.
     channel
@@ -27,3 +27,8 @@ class Key:
     exposure: str = ""
     channel: str = ""
     detail: str = ""
+
+    @property
+    def place(self) -> tuple[str, str]:
+        """Exposure and channel; of a range of signal in a scene: exposure, channel and range."""
+        return self.exposure, f"{self.channel} {self.detail}".strip()

@@ -60,6 +60,10 @@ def evidence_of(
         signal_dn={
             e.name: float(np.mean([base.fit.signal_dn[e.name, c] for c in layout.channels]))
             for e in layout.uniform
+        }
+        | {
+            e.name: float(np.mean([layout.signal_dn[e.name, c] for c in layout.channels]))
+            for e in layout.pictures
         },
         tests=int(base.null.known.sum()) + len(base.null.contrasts.keys),
         simulations=base.setting.nulls,

@@ -70,7 +70,8 @@ class Album:
         rows, columns = channel.mean_frame.shape
         pixel = channel.estimates["pixel_variance"].value
         sums = self.spectra.setdefault(place[1], SpectrumSums((rows, columns)))
-        sums.add(channel, frames, self.layout.variance_dn2[place], self.layout.signal_dn[place])
+        if place[0] not in self.layout.scenes:
+            sums.add(channel, frames, self.layout.variance_dn2[place], self.layout.signal_dn[place])
         self.means[place] = channel.frame_means
         if pixel > 0:
             self.lines[place] = Lines(

@@ -61,8 +61,8 @@ def points(state: State) -> dict[Key, Point]:
     for key, i in own.items():
         place = (key.exposure, key.channel)
         x, mean_x, sd = float(values[i]), float(null.mean[i]), float(null.sd[i])
-        if place in state.setting.seen.levels:
-            scale = Scale.of(state, place)
+        if state.setting.seen.level(place) is not None:
+            scale = Scale.of(state, key.place)
             recorded, expected = (back(key.statistic, scale, n) for n in places[place])
         else:
             recorded = expected = shared(key.statistic)
@@ -132,8 +132,8 @@ def _place(state: State, name: str, key: Key) -> float:
     if name == "level":
         light = _exposure(state, key).light
         return np.nan if light is None else light
-    signals = state.fit.signal_dn
-    place = (key.exposure, key.channel)
+    signals = {**state.setting.layout.signal_dn, **state.fit.signal_dn}
+    place = key.place
     return signals[place if place in signals else (key.exposure, "Gr")]
 
 

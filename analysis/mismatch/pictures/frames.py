@@ -87,7 +87,7 @@ def series(
 ) -> dict[str, tuple[Series, ...]]:
     """Return frame means by exposure; nan: frames that were not looked at."""
     found: dict[str, tuple[Series, ...]] = {}
-    for exposure in layout.uniform:
+    for exposure in layout.exposures:
         locked = split.locked.get(exposure.name, ())
         size = 1 + max((*exposure.numbers, *locked))
         some = []

@@ -6,6 +6,7 @@ from math import exp, expm1, isfinite
 
 from analysis.mismatch.observe import Place
 from analysis.mismatch.state import State
+from analysis.mismatch.vector import expected_dn2
 from dsis.measures.fixed_pattern import Smooth
 
 UNITS = {
@@ -49,13 +50,17 @@ class Scale:
     def of(cls, state: State, place: Place) -> "Scale":
         """Return the scale beside a model."""
         layout, seen = state.setting.layout, state.setting.seen
-        step = 1 if place[1] == "MONO" else 2
+        step = 1 if layout.channels == ("MONO",) else 2
+        level = seen.level(place)
+        if level is None:
+            message = f"{place} was not observed"
+            raise ValueError(message)
         return cls(
             layout.rows // step,
             layout.columns // step,
             next(len(e.numbers) for e in layout.exposures if e.name == place[0]),
-            seen.levels[place].variance_dn2,
-            state.calibrated.residual.expected_dn2[place],
+            level.variance_dn2,
+            expected_dn2(layout, place, state.calibrated.residual),
         )
 
 

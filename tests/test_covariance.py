@@ -8,6 +8,7 @@ from scipy import ndimage
 
 from dsis.cfa import Cfa, mosaic, pattern
 from dsis.covariance import (
+    LagCovariance,
     averaged,
     linearised_covariance,
     linearised_noise,
@@ -52,8 +53,9 @@ def test_white_noise_has_the_closed_form(cfa):
     columns=st.integers(12, 17),
     seed=st.integers(0, 99),
     masked=st.booleans(),
+    lags=st.integers(1, 3),
 )
-def test_any_variances_as_the_matrix_product_has_them(cfa, rows, columns, seed, masked):
+def test_any_variances_as_the_matrix_product_has_them(cfa, rows, columns, seed, masked, lags):
     """B Sigma_d B^T with dense matrices, averaged over the pixels of a region."""
     generator = np.random.default_rng(seed)
     variance = generator.uniform(0.1, 9.0, (rows, columns)).astype(np.float32)
@@ -63,27 +65,42 @@ def test_any_variances_as_the_matrix_product_has_them(cfa, rows, columns, seed, 
     full = full.reshape(3, rows, columns, 3, rows, columns)
     inside = [
         (i, j)
-        for i in range(3, rows - 3)
-        for j in range(3, columns - 3)
+        for i in range(lags + 1, rows - lags - 1)
+        for j in range(lags + 1, columns - lags - 1)
         if region is None or region[i, j]
     ]
-    found = predicted_covariance(variance, cfa, region=region)
+    found = predicted_covariance(variance, cfa, lags=lags, region=region)
     assert found.pixels == len(inside)
-    for k, m in ((0, 0), (0, 1), (1, 0), (-2, 1), (2, 2), (1, -1)):
+    for k, m in ((0, 0), (0, 1), (1, 0), (-lags, 1), (lags, lags), (1, -1)):
         wanted = np.mean([full[:, i, j, :, i + k, j + m] for i, j in inside], axis=0)
-        np.testing.assert_allclose(found.values[2 + k, 2 + m], wanted, rtol=1e-5, atol=1e-5)
+        np.testing.assert_allclose(found.values[lags + k, lags + m], wanted, rtol=1e-5, atol=1e-5)
 
 
-def test_what_is_measured_is_a_mean_of_products():
-    noise = np.random.default_rng(3).normal(1.0, 2.0, (20, 24, 2)).astype(np.float32)
-    region = np.zeros((20, 24), bool)
-    region[5:9, 4:20:3] = True
+@pytest.mark.parametrize("columns", [24, 25, 26, 27])
+def test_what_is_measured_is_a_mean_of_products(columns):
+    noise = np.random.default_rng(3).normal(1.0, 2.0, (20, columns, 2)).astype(np.float32)
+    region = np.zeros((20, columns), bool)
+    region[5:9, 4 : columns - 2 : 3] = True
+    region[9, columns - 5 : columns - 2] = True  # to the last column that counts
     found = measured_covariance(noise, lags=1, region=region)
     products = [noise[i, j, 0] * noise[i + 1, j - 1, 1] for i, j in np.argwhere(region)]
     assert found.values[2, 0, 0, 1] == pytest.approx(np.mean(products), rel=1e-6)
     assert found.pixels == region.sum()
     with pytest.raises(ValueError, match="no pixel of the region"):
-        measured_covariance(noise, region=np.zeros((20, 24), bool))
+        measured_covariance(noise, region=np.zeros((20, columns), bool))
+
+
+def test_correlations_are_of_their_lag_and_their_channels():
+    """Values of their own at each lag and pair: nothing may be transposed or mixed up."""
+    values = np.arange(5 * 5 * 3 * 3, dtype=np.float64).reshape(5, 5, 3, 3) - 100
+    np.fill_diagonal(values[2, 2], (4.0, 9.0, 25.0))
+    found = LagCovariance(values, 1)
+    assert found.lags == 2
+    assert found.pooled()[1, 2] == np.trace(values[3, 4]) / 38
+    assert found.pooled()[2, 1] == np.trace(values[4, 3]) / 38
+    assert found.of_channel(1)[1, 2] == values[3, 4, 1, 1] / 9
+    assert found.correlations()[3, 1, 0, 2] == values[3, 1, 0, 2] / (2 * 5)
+    assert found.between_channels()[2, 1] == values[2, 2, 2, 1] / (5 * 3)
 
 
 def test_parts_taken_together_count_by_their_pixels():
@@ -148,6 +165,28 @@ def test_small_noise_is_predicted_by_the_jacobian_at_the_clean_mosaic(method):
     np.testing.assert_allclose(linear(clean).values, found.values, rtol=0, atol=0.04 * largest)
     flat = linear(np.full_like(clean, 128))
     assert np.abs(flat.values - found.values).max() > 0.05 * largest
+
+
+def test_draws_are_independent_of_one_another_and_of_where_the_jacobian_is_taken():
+    """The stated recipe, step by step: probes of all draws, at noise of a purpose of its own."""
+    clean = np.random.default_rng(2).uniform(0, 255, (40, 44)).astype(np.float32)
+    variance = np.full_like(clean, 9.0)
+    options = {"full_scale": 255.0, "draws": 3}
+    draw, grid = Draw(1), PixelGrid(40, 44, Cfa.RGGB)
+
+    def full(samples):
+        return demosaic(samples, Cfa.RGGB, "lu_tan", full_scale=255.0)
+
+    for around, sd in (("clean", 0.0), ("noisy", 3.0)):
+        parts = []
+        for number in range(3):
+            at = clean + np.float32(sd) * draw.normal("point of linearisation", grid, number)
+            probe = np.float32(3) * draw.normal("probe", grid, number)
+            parts.append(measured_covariance(linearised_noise(full, at, probe)))
+        found = linearised_covariance(
+            clean, variance, Cfa.RGGB, "lu_tan", draw, around=around, **options
+        )
+        np.testing.assert_allclose(found.values, averaged(parts).values, rtol=1e-5, atol=1e-6)
 
 
 def test_threads_and_draws_leave_the_bytes_as_they_are():

@@ -12,14 +12,18 @@ from scipy.stats import multivariate_normal
 
 from analysis.denoising.bls_gsm import LOG_Z, mixture_of, neighbourhood_covariance
 from analysis.denoising.bls_gsm_estimate import estimate_rows
+from analysis.denoising.bm3d import GAMMA, REACH, _reach, _Stage
 from analysis.denoising.bm3d_filtering import (
     MOST,
+    Groups,
+    Shrinkage,
     bit_reversed,
     combine_covariances,
     fill_covariances,
+    filter_groups,
 )
 from analysis.denoising.bm3d_matching import match_blocks
-from analysis.denoising.bm3d_transforms import bior15, coefficient_covariances, dct
+from analysis.denoising.bm3d_transforms import BLOCK, bior15, coefficient_covariances, dct
 from analysis.denoising.opponent import image_of, planes_of
 from analysis.denoising.pyramid import Grid, Pyramid, good_odd_size
 from analysis.denoising.spectrum import NoiseSpectrum
@@ -129,6 +133,72 @@ def test_variances_of_a_groups_coefficients(transform, order, seed):
         h + int(s) for k in range(order) for h in [1 << k] for s in bit_reversed()[k, :h]
     ]
     assert np.abs(placed[sorted_slots] - wanted).max() < 1e-5 * wanted.max()
+
+
+def test_what_noise_makes_alike_is_taken_off_the_likeness_of_blocks():
+    """The bias is GAMMA times how much nearer than independent ones blocks of noise are."""
+    white = np.random.default_rng(1).normal(size=(1, 700, 700))
+    noise = (white + np.roll(white, 1, axis=2)).astype(np.float32)  # its neighbours correlate
+    spectrum = NoiseSpectrum.of_autocovariance([[1.0, 2.0, 1.0]])
+    bias = _Stage.first(noise, spectrum).bias
+    independent = 2 * BLOCK**2 * 2.0
+    for dy, dx in ((0, 1), (0, -1), (1, 0), (3, 5)):
+        moved = np.roll(noise, (-dy, -dx), axis=(1, 2))
+        nearer = BLOCK**2 * float(np.square(noise - moved).mean()) - independent
+        # Of 490 000 squares with some neighbours alike: 64 x 4 x 2.5 / 700 for one deviation.
+        assert bias[REACH + dy, REACH + dx] / GAMMA == pytest.approx(nearer, abs=5)
+
+
+def test_blocks_are_independent_from_where_no_two_of_their_pixels_correlate():
+    spectrum = NoiseSpectrum.of_autocovariance([[0.5, 1, 2, 1, 0.5]])
+    for offset in (BLOCK, BLOCK + 1, BLOCK + 2):  # along the row: gaps of 0, 1 and 2 pixels
+        nearest = offset - (BLOCK - 1)
+        assert (offset <= _reach(spectrum)) == (nearest <= 2)
+    assert _reach(NoiseSpectrum.white(1.0)) == 0
+
+
+def test_power_is_never_negative():
+    """A covariance cut off at some lag: 1 + 2 x 0.9 cos f falls below 0, where no noise is."""
+    power = NoiseSpectrum.of_autocovariance([[0.9, 1.0, 0.9]]).power(0, 1, 16)[0]
+    expected = 1 + 1.8 * np.cos(2 * np.pi * np.arange(16) / 16)
+    np.testing.assert_allclose(power, np.maximum(expected, 0), atol=1e-12)
+
+
+@pytest.mark.parametrize("wiener", [True, False])
+@pytest.mark.parametrize("members", [1, 2])
+def test_a_group_is_shrunk_and_weighted_as_published(wiener, members):
+    """Dabov et al. (2007), equations (5), (6), (10) and (11), with another's cosine transform."""
+    generator = np.random.default_rng(3)
+    width = BLOCK * members  # blocks side by side, so that what each adds is seen
+    noisy, basic = (generator.normal(0, 2, (1, BLOCK, width)).astype(np.float32) for _ in range(2))
+    variance = generator.uniform(0.2, 3, (BLOCK, BLOCK))  # vertical, horizontal frequency
+    window = generator.uniform(0.5, 1, (BLOCK, BLOCK))
+    by_hand = variance.T.reshape(1, 1, 1, -1), window
+    covariance, weights = (a.astype(np.float32) for a in by_hand)
+    forward = dct().astype(np.float32)
+    numbers = np.float32(1e-6), np.float32(1.5)
+    rule = Shrinkage(forward, np.ascontiguousarray(forward.T), covariance, *numbers, weights)
+    places = (BLOCK * np.arange(members, dtype=np.int32)).reshape(1, 1, -1)
+    groups = Groups(places, np.full((1, 1), members, np.int32), bit_reversed())
+    total, weight = np.zeros_like(noisy), np.zeros_like(noisy)
+    filter_groups(noisy, basic if wiener else basic[:0], groups, rule, 0, total, weight)
+
+    def coefficients(image):
+        split = image[0].astype(np.float64).reshape(BLOCK, members, BLOCK).swapaxes(0, 1)
+        turned = scipy.fft.dctn(split, axes=(1, 2), norm="ortho")
+        return turned if members == 1 else np.stack([turned[0] + turned[1], turned[0] - turned[1]])
+
+    scale = members**-0.5  # of Haar's orthonormal pair
+    seen, guide = scale * coefficients(noisy), scale * coefficients(basic)
+    gain = guide**2 / (guide**2 + variance) if wiener else np.abs(seen) > 1.5 * np.sqrt(variance)
+    gain = gain.astype(np.float64)
+    gain[0, 0, 0] = 1  # the mean of the group stays
+    kept = gain * seen
+    parts = kept if members == 1 else scale * np.stack([kept[0] + kept[1], kept[0] - kept[1]])
+    estimate = np.hstack(list(scipy.fft.idctn(parts, axes=(1, 2), norm="ortho")))
+    certain = np.tile(window, (1, members)) / (gain**2 * variance).sum()
+    np.testing.assert_allclose(weight[0], certain, rtol=1e-5)
+    np.testing.assert_allclose(total[0] / weight[0], estimate, atol=1e-5)
 
 
 @given(st.integers(1, 4000))

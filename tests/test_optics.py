@@ -200,6 +200,18 @@ def test_a_uniform_picture_stays(rows: int, columns: int, value: float, oversamp
     np.testing.assert_allclose(seen, image, rtol=FLOAT32_TRANSFORM)
 
 
+def test_the_finest_wave_moved_by_half_its_sample_vanishes() -> None:
+    """Samples cannot hold (-1)^i cos(x) half a sample on: they lie where it is 0."""
+    row, column = np.indices((64, 64))
+    finest = np.where(row % 2 == 0, 0.5, -0.5) * np.cos(2 * np.pi * column / 8)
+    image = (1 + finest).astype(np.float32)[..., np.newaxis]
+    still = through_optics(image, CINEMA)[16:48, 16:48]
+    assert still.max() > 1.05
+    for shift_px in ((0.5, 0.0), (0.5, 0.25)):
+        moved = through_optics(image, CINEMA, shift_px=shift_px)[16:48, 16:48]
+        np.testing.assert_allclose(moved, 1, atol=1e-3)  # the ends of the wave along the row
+
+
 def test_opposite_edges_do_not_leak_into_each_other() -> None:
     image = np.zeros((40, 60, 1), np.float32)
     image[:, 0] = 1.0

@@ -144,6 +144,7 @@ def test_bad_input_leaves_with_status_2_and_one_message(pictures, tmp_path, caps
         ("table1", "--kodak", str(full)): "holds no .png",
         ("fig2", "--recording", str(tmp_path / "no")): "--recording: is",
         ("fig6", "--votes", str(tmp_path / "no.csv")): "no.csv",
+        ("fig6", "--scale", "1", "10"): "--scale: is that of people's votes: give --votes FILE",
         ("table1", "--kodak", str(pictures), "--out", str(full)): "holds notes.txt",
     }
     for words, message in cases.items():
@@ -152,6 +153,25 @@ def test_bad_input_leaves_with_status_2_and_one_message(pictures, tmp_path, caps
         assert message in capsys.readouterr().err
     assert (full / "notes.txt").exists()
     assert not (tmp_path / "out").exists()
+
+
+def test_votes_that_cannot_be_used_are_refused_before_the_work_begins(tmp_path, monkeypatch):
+    for name in PARTS:
+        monkeypatch.setitem(PARTS, name, None)  # called, it raises a TypeError
+    votes = tmp_path / "votes.csv"
+    votes.write_text("observer,stimulus,vote\na,x,11\n", encoding="utf-8")
+    with pytest.raises(InputError, match="is 11, must be from 1 to 10"):
+        write_paper(tmp_path / "out", Small(votes=votes, scale=(1.0, 10.0)))
+    assert [p.name for p in tmp_path.iterdir()] == ["votes.csv"]
+
+
+def test_one_image_has_no_standard_error_and_no_nan(pictures, tmp_path):
+    one = Setting(kodak=tuple(sorted(pictures.glob("*.png")))[:1])
+    write_paper(tmp_path / "out", one, ["table1"])
+    for path in (tmp_path / "out").iterdir():
+        assert "nan" not in path.read_text(encoding="utf-8"), path
+    exact = read(tmp_path / "out" / "table1_bilinear.csv")
+    assert {row["s.e."] + row["z"] for row in exact} == {""}
 
 
 # Table 1 on the images that the paper used.
@@ -281,6 +301,10 @@ class Two(Small):
         return 2
 
 
+def _refuses(*_):
+    raise InputError.of("votes.csv", "", "was moved meanwhile")
+
+
 def test_an_interrupted_table_2_goes_on_where_it_stopped(tmp_path, monkeypatch):
     def unchanged(image, *_, **__):
         return image
@@ -303,6 +327,10 @@ def test_an_interrupted_table_2_goes_on_where_it_stopped(tmp_path, monkeypatch):
     assert not out.exists()
     with pytest.raises(InputError, match="unfinished work of another"):
         write_paper(out, replace(Two(), seed=2), ["table2"])
+    with monkeypatch.context() as patch:  # an error takes no finished frame away either
+        patch.setattr(table2, "scene", _refuses)
+        with pytest.raises(InputError, match="was moved"):
+            write_paper(out, Two(), ["table2"])
     write_paper(out, replace(Two(), jobs=2), ["table2"])
     assert made == [0, 1, 1]
     one, two = ({p.name: p.read_bytes() for p in folder.iterdir()} for folder in (whole, out))

@@ -182,6 +182,37 @@ def test_what_is_cut_short_or_gone_is_rendered_again_and_said(
     assert path.read_bytes() == whole
 
 
+def test_a_damaged_one_is_forgotten_by_narrower_requests_too(
+    folder: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    ask = Renderer()
+    ask(Strip("city", 7, 32, 60))
+    only(folder, "npy").write_bytes(b"damaged")
+    ask(STRIP)
+    assert caplog.text.count("is damaged") == 1
+    ask(STRIP)
+    assert ask.times == 2
+    assert caplog.text.count("is damaged") == 1
+
+
+def test_files_get_their_names_when_they_are_whole(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A kill in the middle of writing leaves nothing under a name that is looked for."""
+    write = Path.write_bytes
+    seen: list[str] = []
+
+    def watched(path: Path, held: bytes) -> int:
+        seen.extend(other.name for other in (path, *folder.iterdir()) if other.suffix != ".lock")
+        return write(path, held)
+
+    monkeypatch.setattr(Path, "write_bytes", watched)
+    Renderer()()
+    record, panorama = only(folder, "json").name, only(folder, "npy").name
+    unfinished = {f".{panorama}.unfinished", f".{record}.unfinished"}
+    assert set(seen) == {*unfinished, panorama}  # the record last
+
+
 def test_a_full_disk_costs_the_cache_and_not_the_panorama(
     folder: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:

@@ -134,6 +134,28 @@ def test_to_the_left_is_the_same_film_backwards(name: str) -> None:
         np.testing.assert_allclose(one, other, atol=ROUTES_AGREE)
 
 
+@pytest.mark.parametrize("speed", [1.0, 1.01, 0.3, -1.0, -1.01])
+def test_the_window_lies_in_the_middle_and_moves_as_told(speed: float) -> None:
+    """On a picture whose light is the place itself, larger than the window on all sides."""
+    rows, columns, frames = 240, 460, 51
+    row, column = np.indices((rows, columns), np.float32)
+    image = np.stack([row, column, column], axis=2)
+    size = Sequence(width=60, height=40, fps=25.0, seconds=frames / 25)
+    window = Window(image, CINEMA, size, 2, speed)
+    travel = 2 * speed * (frames - 1)
+    top, left = (rows - 2 * 40) // 2, (columns - 2 * 60 - travel) / 2
+    for frame in (0, frames - 1):
+        light = window.light(frame)
+        # The optics keep a slope as it is but for what their tails see of the reflected margin.
+        at = np.indices((40, 60))
+        np.testing.assert_allclose(light[..., 0], top + 2 * at[0], atol=0.3)
+        moved = travel * frame / (frames - 1)
+        # It begins at a whole place: up to one before the exact middle.
+        np.testing.assert_allclose(light[..., 1] + 0.5, left + moved + 2 * at[1], atol=0.8)
+    one = window.light(frames // 2)[20, 30, 1] - window.light(0)[20, 30, 1]
+    assert one == pytest.approx(travel / 2, abs=0.1)
+
+
 @SCENE
 def test_temporal_information_grows_with_the_speed(name: str) -> None:
     """ITU-T P.910's TI, the standard deviation of frame differences: linear in small steps."""

@@ -82,8 +82,8 @@ def city_balanced(city: Scene, raw: Image, method: str) -> Image:
 def white_spectrum(city: Scene, cell: Cell, sigma: float) -> NoiseSpectrum:
     """Return equation (5) for noise of one variance on the mosaic that a cell comes from.
 
-    `sigma` is in the unit of the cell; with DLMMSE and Lu-Tan the Jacobian is taken at the
-    noise-free field, which the methods leave as it is at the sites of the mosaic.
+    `sigma` is in the unit of the cell; with DLMMSE and Lu-Tan the Jacobian is taken at the noisy
+    mosaic, whose samples the methods leave as they are.
     """
     cfa = city.camera.cfa
     variance = np.full(cell.still.shape[:2], sigma**2, np.float32)

@@ -6,6 +6,8 @@ from dataclasses import astuple, dataclass
 from pathlib import Path
 from typing import TypeAlias
 
+from dsis.outdir import UNFINISHED
+
 NAME = "table2_frames.csv"
 HEADER = (
     "frame",
@@ -59,7 +61,10 @@ def read_frames(folder: Path) -> list[dict[Key, FrameScore]]:
 
 
 def write_frames(folder: Path, frames: list[dict[Key, FrameScore]]) -> None:
-    """Write all frames; a kill leaves the old file or the new one."""
+    """Write all frames; a kill leaves the old file or the new one.
+
+    The journal of the folder tells of them, so that they outlast an error of another part.
+    """
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(HEADER)
@@ -70,3 +75,5 @@ def write_frames(folder: Path, frames: list[dict[Key, FrameScore]]) -> None:
     new = folder / f"{NAME}.new"
     new.write_bytes(text.getvalue().encode())
     new.replace(folder / NAME)
+    with (folder / UNFINISHED).open("ab") as journal:
+        journal.write(b'{"frames": %d}\n' % len(frames))

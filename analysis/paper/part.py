@@ -135,8 +135,12 @@ def number(value: float | None, digits: int = 4) -> str:
 def table_of(
     name: str, caption: str, header: Sequence[str], rows: Sequence[Sequence[object]]
 ) -> Table:
-    """Return a table whose numbers are set as `number` does."""
-    cells = tuple(tuple(number(c) if isinstance(c, float) else str(c) for c in row) for row in rows)
+    """Return a table whose numbers are set as `number` does, with its minus in texts too."""
+
+    def cell(given: object) -> str:
+        return number(given) if isinstance(given, float) else _MINUS.sub("\u2212", str(given))
+
+    cells = tuple(tuple(map(cell, row)) for row in rows)
     return Table(name, caption, tuple(header), cells)
 
 

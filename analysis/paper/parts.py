@@ -13,6 +13,7 @@ from analysis.paper.fig3 import recompute as fig3
 from analysis.paper.fig4 import recompute as fig4
 from analysis.paper.fig5 import recompute as fig5
 from analysis.paper.fig6 import recompute as fig6
+from analysis.paper.fig6 import scores
 from analysis.paper.page import render
 from analysis.paper.part import Part
 from analysis.paper.setting import Setting
@@ -52,7 +53,8 @@ def write_paper(
 
     `out` gets `paper.html`, which needs no network, figures as SVG and PNG, tables as CSV and
     Markdown. The same setting gives the same bytes on one machine. Work goes on in `out`.partial;
-    of work that was interrupted, the frames of Table 2 that were finished are kept.
+    of work that was interrupted or ended in an error, the frames of Table 2 that were finished are
+    kept.
 
     Parameters
     ----------
@@ -76,6 +78,7 @@ def write_paper(
         allowed = f"must be one of {', '.join(PARTS)}"
         raise InputError([Fault("", "NAME", f"is {name!r}, {allowed}") for name in unknown])
     wanted = [name for name in PARTS if name in names or not names]
+    _check_votes(setting, wanted)
     parts: dict[str, Part] = {}
     with result_folder(out, PAGE, keep=_not_ours, resume=_digest(setting, wanted)) as folder:
         # The claims stand first on the page, and need what the others compute.
@@ -89,6 +92,14 @@ def write_paper(
         found = tuple(parts[name] for name in wanted)
         (folder / PAGE).write_bytes(render(found, setting, folder).encode())
     return found
+
+
+def _check_votes(setting: Setting, wanted: Sequence[str]) -> None:
+    """Refuse before the work begins what would be refused in the middle of it."""
+    if setting.votes is None and setting.scale is not None:
+        raise InputError.of("--scale", "", "is that of people's votes: give --votes FILE too")
+    if setting.votes is not None and not {"fig6", "claims"}.isdisjoint(wanted):
+        scores(setting)  # kept for those parts
 
 
 def _digest(setting: Setting, names: Sequence[str]) -> str:

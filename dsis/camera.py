@@ -8,7 +8,7 @@ between them.
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self
 
@@ -148,8 +148,7 @@ class Camera(Model):
 
     def scene_light_of_balanced(self, balanced: Image) -> Image:
         """Return scene light of white-balanced signals (row, column, 3), demosaicked ones say."""
-        matrix = np.linalg.inv(np.array(self.camera_from_scene)) / self._scene_gain()
-        return balanced @ matrix.T.astype(np.float32)
+        return balanced @ _scene_from_camera(self.camera_from_scene, self._scene_gain())
 
     def expose(
         self,
@@ -245,6 +244,13 @@ class Camera(Model):
             message = f"the camera '{self.name}' has no diffuse_white_dn: no scene can be exposed"
             raise ValueError(message)
         return self.diffuse_white_dn
+
+
+@lru_cache(maxsize=16)
+def _scene_from_camera(camera_from_scene: tuple[Row, Row, Row], gain: float) -> Image:
+    """Return what rows of pixels are multiplied with on the right: M inverted, over the gain."""
+    matrix = np.linalg.inv(np.array(camera_from_scene)) / gain
+    return matrix.T.astype(np.float32)
 
 
 def _place(link: Effect) -> tuple[int, int, str]:
@@ -363,8 +369,10 @@ class Conversion(BaseLink):
         """Return whole codes less black; values below black stay negative."""
         black = np.float32(exposure.read_out.black_level_dn)
         white = np.float32(exposure.read_out.white_level_dn)
-        codes: Image = np.clip(np.rint(image + black), np.float32(0), white)
-        return codes - black
+        codes: Image = image + black
+        np.clip(np.rint(codes, out=codes), np.float32(0), white, out=codes)
+        codes -= black
+        return codes
 
 
 def read_camera(path: Path) -> Camera:

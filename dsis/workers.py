@@ -5,12 +5,16 @@ and work whose worker died is simply done again.
 """
 
 import importlib
+import logging
 import multiprocessing
 import platform
+import signal
+import time
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import (
     FIRST_COMPLETED,
     BrokenExecutor,
+    CancelledError,
     Executor,
     Future,
     ProcessPoolExecutor,
@@ -30,6 +34,7 @@ R = TypeVar("R")
 
 MOST_TRIES = 3
 CONNECT_S = 10
+PAUSE_S = 0.2
 _SAME_ON_ALL = ("dsis", "numpy", "scipy", "numba", "llvmlite", "opencolorio", "openimageio")
 
 
@@ -100,6 +105,9 @@ class Workers(Executor):
 
     def _done(self, order: _Order, pool: Executor, running: Future[Any]) -> None:
         """Keep the promise with what came back, or hand the call out again."""
+        if running.cancelled() and self._tries and not order.promised.cancelled():
+            self._lost_worker(order, pool, CancelledError("nobody here called it off"))
+            return
         if running.cancelled():
             order.promised.cancel()
             order.promised.set_running_or_notify_cancel()
@@ -115,6 +123,8 @@ class Workers(Executor):
             order.promised.set_result(running.result())
 
     def _lost_worker(self, order: _Order, pool: Executor, reason: BaseException) -> None:
+        if order.tries < self._tries:
+            time.sleep(PAUSE_S)  # Ctrl-C ends processes, too: then the call is called off by now
         if order.tries < self._tries and not order.promised.cancelled():
             with self._lock:
                 if self._pool is pool:  # the first of its calls to notice
@@ -122,6 +132,8 @@ class Workers(Executor):
             self._hand_out(order)
         elif order.promised.set_running_or_notify_cancel():
             fact = "a worker died each time it was given this work (killed, or out of memory?)"
+            if isinstance(reason, CancelledError):
+                fact = "the scheduler went away before this work was done (ended, out of reach?)"
             error = WorkersLostError(f"{fact}: {reason}")
             error.__cause__ = reason
             order.promised.set_exception(error)
@@ -161,7 +173,13 @@ def workers(
         return Workers(partial(ThreadPoolExecutor, count), count, apart=False)
     # A fork would copy locks that other threads hold.
     afresh = multiprocessing.get_context("spawn")
-    return Workers(partial(ProcessPoolExecutor, count, mp_context=afresh), count)
+    start = partial(ProcessPoolExecutor, count, mp_context=afresh, initializer=_die_without_a_word)
+    return Workers(start, count)
+
+
+def _die_without_a_word() -> None:
+    """Let Ctrl-C end this process: who handed out its work says that it was interrupted."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def completed(pool: Workers, work: Callable[[T], R], items: Iterable[T]) -> Iterator[tuple[T, R]]:
@@ -195,9 +213,15 @@ def _cluster(address: str) -> Workers:
     except ImportError:
         fact = "Dask is not installed: pip install 'dsis[cluster]'"
         raise InputError.of("--scheduler", address, fact) from None
+    # What it would say of a lost connection, call by call, is raised as `WorkersLostError`.
+    logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
     try:
+        distributed.comm.resolve_address(address)  # a client that cannot waits 20 s for nobody
         client = distributed.Client(address, timeout=CONNECT_S, set_as_default=False)
-    except (OSError, ValueError) as error:
+    except ValueError as error:
+        fact = f"is no address of a Dask scheduler, such as tcp://host:8786 ({error})"
+        raise InputError.of("--scheduler", address, fact) from None
+    except OSError as error:
         fact = f"no Dask scheduler answers there within {CONNECT_S} s ({error})"
         raise InputError.of("--scheduler", address, fact) from None
     try:

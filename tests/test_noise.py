@@ -114,6 +114,22 @@ def test_a_crop_of_a_noisy_frame_is_the_noisy_crop() -> None:
     np.testing.assert_array_equal(crop, whole[13:60, 21:80])
 
 
+@pytest.mark.parametrize("threads", [1, 2])
+def test_every_row_of_a_large_frame_has_noise_of_its_own(threads: int) -> None:
+    """Frames are worked on in runs of rows: each gets the deviates of its own rows."""
+    grid = PixelGrid(300, 500)  # some runs of each thread's block
+    image = np.full(grid.shape, 800.0, np.float32)
+    draw = Draw(8)
+    white = awgn(image, 2.0, draw, grid, 5)
+    whole = draw.normal("awgn", grid, 5)
+    np.testing.assert_allclose((white - image) / 2, whole, atol=1e-4)
+    noisy = camera_noise(image, SEGMENTS, draw, grid, 5, threads)
+    m, t = LOW
+    shot, read = draw.normal("shot_noise", grid, 5), draw.normal("read_noise", grid, 5)
+    wanted = image + np.sqrt(m * 800) * shot + np.sqrt(t) * read
+    np.testing.assert_allclose(noisy, wanted, atol=1e-3)  # float32 of some 1000 DN
+
+
 def test_the_memory_layout_of_the_signal_does_not_matter() -> None:
     """A transposed or strided signal is the same signal."""
     signal = np.random.default_rng(0).uniform(0, 5000, (140, 96)).astype(np.float32)

@@ -55,3 +55,27 @@ def test_kernels_are_compiled_once_and_that_is_said(tmp_path: Path) -> None:
     environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "other")}
     silent = subprocess.run(code, capture_output=True, text=True, check=True, env=environment)
     assert silent.stderr == ""  # nobody is at the terminal
+
+
+def test_a_kernel_is_compiled_anew_when_one_that_it_calls_changes(tmp_path: Path) -> None:
+    """The compiler's own cache would keep the old one."""
+    package = tmp_path / "package"
+    (package / "__pycache__").mkdir(parents=True)
+    (package / "outer.py").write_text(
+        "from dsis.compiled import kernel\nfrom inner import add\n\n"
+        "@kernel\ndef outer(x):\n    return add(x)\n"
+    )
+    said = []
+    for step in (1, 2, 2):
+        (package / "inner.py").write_text(
+            f"from dsis.compiled import kernel\n\n@kernel\ndef add(x):\n    return x + {step}\n"
+        )
+        os.utime(package / "inner.py", (step, step))  # of one size; written at another time
+        code = "from outer import outer; print(outer(1), sum(outer.stats.cache_hits.values()))"
+        environment = {k: v for k, v in os.environ.items() if k != "NUMBA_CACHE_DIR"}
+        found = subprocess.run(
+            [sys.executable, "-c", code], capture_output=True, text=True, check=True,
+            cwd=package, env=environment,
+        )  # fmt: skip
+        said.append(found.stdout.split())
+    assert said == [["2", "0"], ["3", "0"], ["3", "1"]]

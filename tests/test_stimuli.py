@@ -209,6 +209,14 @@ def test_pairs_differ_by_demosaicking_alone(camera: str, method: str) -> None:
     np.testing.assert_allclose(again, mosaic(codes, make.camera.cfa), rtol=1e-6)
 
 
+def test_a_display_frame_is_made_alike_in_all_its_rows() -> None:
+    """Frames go through the transform in runs of rows: here three, the last one short."""
+    make = rendering("dual_gain_cinema", DisplayTransform)
+    raw = make.camera.clean_raw(scene(250, 160))
+    at_once = make.transform.display_from_scene(make.camera.scene_light(raw))
+    np.testing.assert_allclose(make.display(raw), at_once, rtol=1e-5, atol=1e-6)
+
+
 def test_the_mosaic_of_sd_dem_is_the_raw_of_sd_rgb_sampled(monkeypatch: pytest.MonkeyPatch) -> None:
     """Bit for bit: what enters the demosaicker, less the white-balance gains."""
     from dsis.stimuli import conditions

@@ -101,7 +101,8 @@ class Autocorrelation:
     def at(self, lags: Mapping[str, tuple[int, int]]) -> dict[str, Estimate]:
         """Return the correlation at some lags (dy, dx) by name; error by Bartlett's formula."""
         centre = self.values.shape[0] // 2
-        scatters = _bartlett(self.observed, self.pairs, self.degrees, tuple(lags.values()))
+        wanted = np.array(list(lags.values()), np.int64).reshape(-1, 2)
+        scatters = _bartlett(self.observed, self.pairs, self.degrees, wanted)
         # What temporal noise leaves is estimated from T - 1 frames and taken off: its noise again.
         again = 1 / (self.frames - 1)
         null = 1 + (again if self.left else 0.0)
@@ -200,14 +201,28 @@ def _taken_off(rho: Array, size: tuple[int, int, int, int], off: Array) -> None:
     loses the sum of its row's lags over m; likewise columns, and both means hold the frame's.
     """
     n, m, step, lost = size
+    lags = rho.shape[0]
+    rows, columns = np.zeros(lags), np.zeros(lags)
     for y in range(step):
         for x in range(step):
-            part, out = rho[y::step, x::step], off[y::step, x::step]
-            rows, columns = part.sum(axis=1) / m, part.sum(axis=0) / n
-            both = rows.sum() * (1 - lost) / n
-            for i in range(rows.size):
-                for j in range(columns.size):
-                    out[i, j] = rows[i] + columns[j] - both
+            whole = 0.0
+            for i in range(y, lags, step):
+                rows[i] = _every(rho[i], x, step) / m
+                whole += rows[i]
+            for j in range(x, lags, step):
+                columns[j] = _every(rho[:, j], y, step) / n
+            both = whole * (1 - lost) / n
+            for i in range(y, lags, step):
+                for j in range(x, lags, step):
+                    off[i, j] = rows[i] + columns[j] - both
+
+
+@inlined
+def _every(line: Array, first: int, step: int) -> float:
+    total = 0.0
+    for i in range(first, line.size, step):
+        total += line[i]
+    return total
 
 
 @kernel
@@ -222,10 +237,8 @@ def _inflation(values: Array, pairs: Array, degrees: int) -> float:
 
 
 @kernel
-def _bartlett(
-    observed: Array, pairs: Array, degrees: int, lags: tuple[tuple[int, int], ...]
-) -> Array:
-    """Return n var(rho) of a linear process at some lags, from the lags known (Bartlett 1946)."""
+def _bartlett(observed: Array, pairs: Array, degrees: int, lags: NDArray[np.int64]) -> Array:
+    """Return n var(rho) of a linear process at lags (lag, 2), from those known (Bartlett 1946)."""
     size = observed.shape[0]
     centre = size // 2
     # A margin of zeros: the formula looks one lag ahead, and one behind.
@@ -240,9 +253,9 @@ def _bartlett(
                 known[i, j] = 1.0
             if np.abs(known[i, j]) > least:
                 wide[start + i, start + j] = known[i, j]
-    found = np.empty(len(lags))
-    for k in range(len(lags)):
-        dy, dx = lags[k]
+    found = np.empty(lags.shape[0])
+    for k in range(lags.shape[0]):
+        dy, dx = lags[k, 0], lags[k, 1]
         h = known[centre + dy, centre + dx]
         total = 0.0
         for i in range(centre, size + 3 * centre):

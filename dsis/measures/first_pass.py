@@ -51,8 +51,10 @@ def first_pass(
         )
 
     over_rows(block, rows, threads)
-    broken, lowest, highest = _over_blocks(by_column, squares, limits)
-    return Passed(by_row, by_column[0], squares[0], not broken, lowest, highest)
+    # Blocks are added in their order, whoever made them.
+    broken, lowest, highest = limits[:, 0].any(), limits[:, 1].min(), limits[:, 2].max()
+    columns_summed, squares_summed = by_column.sum(0), squares.sum(0)
+    return Passed(by_row, columns_summed, squares_summed, not broken, int(lowest), int(highest))
 
 
 @kernel
@@ -87,18 +89,6 @@ def _first_pass(
             for p in range(2):
                 _fold(changes[p], squares[y // _BLOCK, p])
             changes[:] = 0
-
-
-@kernel
-def _over_blocks(by_column: Sums, squares: Sums, limits: NDArray[np.int64]) -> tuple[int, int, int]:
-    """Add up the blocks into the first; return their (not whole, lowest, highest)."""
-    broken, low, high = limits[0, 0], limits[0, 1], limits[0, 2]
-    for k in range(1, limits.shape[0]):
-        by_column[0] += by_column[k]
-        squares[0] += squares[k]
-        broken |= limits[k, 0]
-        low, high = min(low, limits[k, 1]), max(high, limits[k, 2])
-    return broken, low, high
 
 
 @inlined

@@ -6,7 +6,7 @@ the same draws. So a fixed pattern that locked frames share with the rest counts
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -26,6 +26,8 @@ from dsis.recording import Recording
 
 Array = NDArray[np.float64]
 _SIMULATIONS = 16
+_FEW = 5  # where simulations are large
+_LARGE = 2.5e7  # samples
 _CLEAR = 3.0  # standard errors from which a simulated change counts
 _NORMAL = 1.96
 
@@ -40,12 +42,15 @@ class HeldNumbers:
         The frames.
     setting
         Of the diagnosis.
+    kept
+        Numbers of simulated recordings, by camera and frames.
     """
 
     recording: Recording
     split: Split
     source: Source
     setting: Setting
+    kept: dict[tuple[str, int], Array] = field(default_factory=dict)
 
     @cached_property
     def whole(self) -> tuple[Layout, Observation]:
@@ -77,18 +82,9 @@ class HeldNumbers:
         self, final: State, without: Camera, layout: Layout, seen: Observation
     ) -> tuple[float, Array]:
         """Return ln p(with) - ln p(without) as recorded, and of recordings of the final model."""
-        calibrated, setting = final.calibrated, self.setting
-        of = _numbers_of(calibrated, layout)
-        replicates = range(_SIMULATIONS)
-
-        def made(camera: Camera) -> Array:
-            model = calibrated.model.with_camera(camera)
-            seed = setting.seed + 3
-            return np.stack(
-                [of(one) for one in simulate(model, layout, replicates, seed, setting.jobs)]
-            )
-
-        one, other, recorded = made(final.camera), made(without), of(seen)
+        of = _numbers_of(final.calibrated, layout)
+        one, other = (self._made(final, camera, layout) for camera in (final.camera, without))
+        recorded = of(seen)
         weights = _weights(one, other, recorded)
         if not weights.any():
             return 0.0, np.zeros(len(one))
@@ -105,6 +101,19 @@ class HeldNumbers:
             )
 
         return float(ratio(float(value))), ratio(first)
+
+    def _made(self, final: State, camera: Camera, layout: Layout) -> Array:
+        """Return the numbers of simulated recordings of a camera: (recording, number)."""
+        frames = sum(len(e.numbers) for e in layout.exposures)
+        yardstick = final.camera.model_dump_json()
+        key = (f"{yardstick} {camera.model_dump_json()}", frames)
+        if key not in self.kept:
+            count = _SIMULATIONS if frames * layout.rows * layout.columns <= _LARGE else _FEW
+            model = final.calibrated.model.with_camera(camera)
+            setting, of = self.setting, _numbers_of(final.calibrated, layout)
+            made = simulate(model, layout, range(count), setting.seed + 3, setting.jobs)
+            self.kept[key] = np.stack([of(one) for one in made])
+        return self.kept[key]
 
 
 def _numbers_of(calibrated: Calibrated, layout: Layout) -> Callable[[Observation], Array]:

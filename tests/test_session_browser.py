@@ -259,12 +259,16 @@ def _same(row, other):
 def test_a_stall_is_logged_as_dropped_frames_and_the_showing_repeated(browser, tmp_path):
     folder = tmp_path / "stimuli"
     write_test(folder, contents=("city",), training=0, dummies=0, fps=25.0, frames=20)
-    stall = "const t = performance.now(); while (performance.now() - t < 130);"
+    # Planned inside the page: how late this process notices a clip must not move the stall.
+    stall = f"""() => {{
+        const stall = () => {{ const t = performance.now(); while (performance.now() - t < 130); }};
+        const look = () => document.querySelector("{CLIP_SHOWN}")
+            ? setTimeout(stall, 200) : requestAnimationFrame(look);
+        look();
+    }}"""
     with served(folder, "anna") as (address, said, _thread), page_of(browser, address) as page:
+        page.evaluate(stall)
         begin(page)
-        page.wait_for_selector(CLIP_SHOWN, state="attached")
-        page.wait_for_timeout(200)
-        page.evaluate(f"() => {{ {stall} }}")
         while next_screen(page) == "vote":  # a loaded machine may drop frames of its own
             page.keyboard.press("8")
             page.keyboard.press("Enter")

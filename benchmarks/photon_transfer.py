@@ -14,13 +14,13 @@ import resource
 import sys
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
-import test_photon_transfer as planted
-
+import planted_camera as planted
 from analysis.photon_transfer import fit_camera
 from dsis.camera import Camera
 from dsis.cfa import Cfa
@@ -101,10 +101,9 @@ def speed() -> None:
     small = planted.record(made, 1, levels=levels, frames=16, size=(54, 96))
     # The content does not matter to the time; the size does.
     tiles = [
-        planted.replace(exposure, stack=Tiled(exposure.stack, (30, 30)))
-        for exposure in small.exposures
+        replace(exposure, stack=Tiled(exposure.stack, (30, 30))) for exposure in small.exposures
     ]
-    recording = planted.replace(small, exposures=tuple(tiles))
+    recording = replace(small, exposures=tuple(tiles))
     fit_camera(small)  # compiles
     begun, before = time.perf_counter(), resource.getrusage(resource.RUSAGE_SELF).ru_utime
     fit_camera(recording, threads=2)

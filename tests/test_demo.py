@@ -34,7 +34,7 @@ def demo(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "demo.toml").write_text("no spec at all", encoding="utf-8")
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
-        patch.setattr("dsis.cli.DEMO_SPEC", str(folder / "small.toml"))
+        patch.setattr("dsis.cli.demo.DEMO_SPEC", str(folder / "small.toml"))
         assert main(["demo"]) == 0
     return folder / "dsis-demo"
 
@@ -138,7 +138,7 @@ def test_it_never_deletes_the_votes_of_people(
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("dsis.cli.DEMO_SPEC", str(demo.parent / "small.toml"))
+    monkeypatch.setattr("dsis.cli.demo.DEMO_SPEC", str(demo.parent / "small.toml"))
     mine = tmp_path / "dsis-demo"
     shutil.copytree(demo, mine)
     manifest = read_manifest(mine / "stimuli")
@@ -153,6 +153,6 @@ def test_it_never_deletes_the_votes_of_people(
 def test_it_can_be_run_again(demo: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     before = (demo / "report" / "report.html").read_bytes()
     monkeypatch.chdir(demo.parent)
-    monkeypatch.setattr("dsis.cli.DEMO_SPEC", str(demo.parent / "small.toml"))
+    monkeypatch.setattr("dsis.cli.demo.DEMO_SPEC", str(demo.parent / "small.toml"))
     assert main(["demo"]) == 0
     assert (demo / "report" / "report.html").read_bytes() == before

@@ -9,10 +9,10 @@ import pytest
 
 import analysis
 import dsis
-from dsis.cli import _parser, main
+from dsis.cli import main, parser
 
 ROOT = Path(__file__).resolve().parents[1]
-COMMANDS = next(action.choices for action in _parser()._subparsers._group_actions if action.choices)
+COMMANDS = next(action.choices for action in parser()._subparsers._group_actions if action.choices)
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -40,7 +40,7 @@ def test_unknown_words_leave_with_status_2() -> None:
 
 def test_help_imports_nothing_heavy() -> None:
     """`dsis --help` is instant because no library is loaded for it."""
-    code = "import sys, dsis.cli; dsis.cli._parser(); print(*sys.modules)"
+    code = "import sys, dsis.cli; dsis.cli.parser(); print(*sys.modules)"
     loaded = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
     ).stdout.split()

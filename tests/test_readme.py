@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from dsis.cli import _parser
+from dsis.cli import parser
 
 ROOT = Path(__file__).resolve().parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -36,7 +36,7 @@ def test_python_examples_run(code: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("line", SHELL)
 def test_commands_are_understood(line: str) -> None:
-    options = _parser().parse_args(shlex.split(line)[1:])
+    options = parser().parse_args(shlex.split(line)[1:])
     assert callable(options.command)
 
 

@@ -8,13 +8,13 @@ from pathlib import Path
 
 import pytest
 
-from dsis.cli import _parser
+from dsis.cli import parser
 
 HEAVY = {
     "IPython", "OpenImageIO", "PyOpenColorIO", "distributed", "jinja2", "matplotlib", "numba",
     "numpy", "pandas", "pydantic", "scipy", "starlette", "tqdm", "uvicorn",
 }  # fmt: skip
-COMMANDS = next(action.choices for action in _parser()._subparsers._group_actions if action.choices)
+COMMANDS = next(action.choices for action in parser()._subparsers._group_actions if action.choices)
 
 
 @pytest.mark.parametrize("arguments", [["--help"], ["--version"], ["stimuli", "--help"], []])

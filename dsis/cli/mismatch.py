@@ -1,0 +1,53 @@
+"""`dsis mismatch`: what physics a camera model leaves out."""
+
+import argparse
+from pathlib import Path
+
+from dsis.cli.arguments import Add, add_jobs, add_scheduler, add_seed
+from dsis.cli.progress import progress_bar
+
+
+def add_mismatch(add: Add) -> None:
+    """Say what `dsis mismatch` takes."""
+    sub = add(
+        "mismatch",
+        mismatch,
+        "Say where recordings differ from a camera model, and what physics it leaves out.",
+        "mismatch camera.toml recording -o diagnosis",
+    )
+    sub.add_argument("camera", type=Path, metavar="camera.toml")
+    recordings = "folder with recording.toml, or an EMVA 1288 descriptor file; one or several"
+    sub.add_argument("recordings", type=Path, nargs="+", metavar="RECORDING", help=recordings)
+    out = "mismatch.json, report.html, camera.toml; of several recordings: a folder for each"
+    sub.add_argument("-o", "--out", type=Path, required=True, metavar="DIR", help=out)
+    without = "effects that must not be named; may be given several times"
+    sub.add_argument(
+        "--without", nargs="+", action="extend", default=[], metavar="EFFECT", help=without
+    )
+    add_jobs(sub)
+    add_scheduler(sub)
+    add_seed(sub, "default: 0")
+
+
+def mismatch(options: argparse.Namespace) -> None:
+    """Say where recordings differ from a camera model, and what physics it leaves out."""
+    from analysis.mismatch.folders import diagnose_recordings
+    from analysis.mismatch.report.summary import comparison, summary
+
+    with progress_bar("mismatch") as progress:
+        found = diagnose_recordings(
+            options.camera,
+            options.recordings,
+            options.out,
+            seed=options.seed or 0,
+            jobs=options.jobs,
+            without=options.without,
+            scheduler=options.scheduler,
+            progress=progress,
+        )
+    for one in found:
+        print(f"# {one.name}\n\n{summary(one.finding)}")
+    if len(found) > 1:
+        print(comparison({one.name: one.finding for one in found}))
+    for one in found:
+        print(f"report in {one.folder / 'report.html'}, model in {one.folder / 'camera.toml'}")

@@ -60,7 +60,7 @@ def result_folder(
         Says what in an earlier result (or unfinished work) must not be lost; None: nothing.
     resume
         Digest of all that decides the result: unfinished work of the same digest is handed over,
-        of another is refused. None: begin with an empty folder.
+        of another is refused, unless nothing of it was finished. None: begin with an empty folder.
 
     Raises
     ------
@@ -82,7 +82,7 @@ def result_folder(
             yield partial
         except DsisError:
             # What the input cannot give leaves nothing behind, unless frames were finished.
-            if (partial / UNFINISHED).read_bytes().count(b"\n") <= 1:
+            if _nothing_finished(partial / UNFINISHED):
                 shutil.rmtree(partial)
             raise
         if out.exists():
@@ -116,14 +116,20 @@ def _make_ready(partial: Path, keep: Callable[[Path], str | None], resume: str |
         if lost is not None:
             raise InputError.of(partial, "", f"holds {lost}, which would be lost: move it away")
         found = _first_line(journal)
-        if resume is None or found is None:
+        another = found != resume
+        if resume is None or found is None or (another and _nothing_finished(journal)):
             shutil.rmtree(partial)
-        elif found != resume:
+        elif another:
             fact = "holds unfinished work of another spec, seed or version: remove it, or give "
             raise InputError.of(partial, "", fact + "another folder with --out")
     partial.mkdir(parents=True, exist_ok=True)
     if not journal.exists():
         journal.write_bytes(json.dumps({"build": resume}).encode() + b"\n")
+
+
+def _nothing_finished(journal: Path) -> bool:
+    """Tell whether a journal has no line but its first: nothing is lost with such work."""
+    return journal.read_bytes().count(b"\n") <= 1
 
 
 def _first_line(journal: Path) -> str | None:

@@ -73,6 +73,7 @@ def test_the_report_shows_what_was_shown(demo: Path) -> None:
     assert "added physics" not in table
 
 
+@pytest.mark.usefixtures("unpainted")
 def test_the_report_says_what_added_physics_does(tmp_path: Path) -> None:
     """A camera with row noise of 200 DN: every camera clip has its PSNR change in the report."""
     text = (SHIPPED / "demo.toml").read_text(encoding="utf-8")

@@ -5,52 +5,34 @@ The test walks the registry: a new file in `dsis/effects` is tested the moment i
 
 from collections.abc import Mapping
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy import stats
 
-from dsis.camera import BaseNoise, Camera, Segment, read_camera, write_camera
-from dsis.cfa import Cfa, mosaic
+from dsis.cfa import Cfa
 from dsis.draw import Draw
-from dsis.effects import Effect, Exposure, OperatingPoint, Stage, registry
-from dsis.effects.catalogue import catalogue
-from dsis.errors import InputError
+from dsis.effects import OperatingPoint
 from dsis.grid import PixelGrid
 from dsis.measures import MEASURES, Estimate, measure
-
-Z_MAX = 5.0
-REPEATS, FRAMES, ROWS, COLUMNS = 3, 64, 96, 64
-EXPOSURE_TIME_S = 0.1
-SLOPE_DN, SWITCH_DN, INTERCEPTS_DN2 = 1.5, 1000.0, (30.0, 80.0)
-LEVELS_DN = (0.0, 400.0, 5000.0)
-
-BACKGROUND = Camera(
-    name="background",
-    cfa=Cfa.MONO,
-    black_level=500.0,
-    white_level=65535.0,
-    bit_depth=16,
-    noise=BaseNoise(
-        segment=(
-            Segment(upper_dn=SWITCH_DN, slope=SLOPE_DN, intercept=INTERCEPTS_DN2[0]),
-            Segment(slope=SLOPE_DN, intercept=INTERCEPTS_DN2[1]),
-        )
-    ),
+from effect_examples import (
+    BACKGROUND,
+    COLUMNS,
+    FRAMES,
+    INTERCEPTS_DN2,
+    KINDS,
+    REPEATS,
+    ROWS,
+    SLOPE_DN,
+    SWITCH_DN,
+    Z_MAX,
+    camera_with,
+    every_kind,
+    example_of,
 )
 
-KINDS = registry()
-every_kind = pytest.mark.parametrize("name", KINDS)
-
-
-def example_of(kind: type[Effect]) -> Effect:
-    """Return an effect with the examples that its fields declare."""
-    fields = {n: f for n, f in kind.model_fields.items() if n != "kind"}
-    missing = [n for n, f in fields.items() if f.is_required() and not f.examples]
-    assert not missing, f"{kind.__name__}: no example of {missing}"
-    return kind(**{name: f.examples[0] for name, f in fields.items() if f.examples})
-
+EXPOSURE_TIME_S = 0.1
+LEVELS_DN = (0.0, 400.0, 5000.0)
 
 STRONG: dict[str, tuple[dict[str, object], ...]] = {
     "adc_dnl": ({"rms_lsb": 2.0},),
@@ -76,13 +58,6 @@ STRONG: dict[str, tuple[dict[str, object], ...]] = {
 
 LEADING_ORDER = {"brighter_fatter", "crosstalk", "readout_memory", "spatial_filtering"}
 """Whose closed forms hold for weak coupling: of infinite planes, or of first order in strength."""
-
-
-def camera_with(*effects: Effect) -> Camera:
-    """Return the background with effects: monochrome unless an effect needs colours."""
-    unfit = any(effect.unfit_for(BACKGROUND.read_out) for effect in effects)
-    cfa = Cfa.RGGB if unfit else Cfa.MONO
-    return BACKGROUND.model_copy(update={"effect": effects, "cfa": cfa})
 
 
 def point_at(level: float) -> OperatingPoint:
@@ -227,239 +202,3 @@ def seen(name: str, quantity: str, level: float, strong: int) -> bool:
     square = float(found @ found) / own if own > 0 else 0.0
     # False where the measure is unknown.
     return square > stats.chi2.isf(2 * stats.norm.sf(Z_MAX), found.size)
-
-
-@every_kind
-class TestLaws:
-    def exposure(self, grid: PixelGrid, frame: int, image: np.ndarray) -> Exposure:
-        return Exposure(
-            grid,
-            frame,
-            Draw(1),
-            Draw(2),
-            image,
-            camera_with().model_copy(update={"cfa": grid.cfa or Cfa.GBRG}).read_out,
-            earlier=lambda k: image / np.float32(1 + k),
-            exposure_time_s=0.2,
-        )
-
-    @pytest.mark.parametrize("cfa", [Cfa.RGGB, Cfa.MONO, None])
-    def test_a_crop_sees_the_same_effect(self, name: str, cfa: Cfa | None) -> None:
-        effect = example_of(KINDS[name])
-        grid = PixelGrid(40, 50, cfa)
-        image = np.random.default_rng(0).uniform(0, 3000, grid.shape).astype(np.float32)
-        whole = effect.apply(image, self.exposure(grid, 4, image))
-        part = image[5:30, 7:44]
-        crop = effect.apply(part, self.exposure(PixelGrid(25, 37, cfa, 5, 7, 40, 50), 4, part))
-        margin = effect.reach_pixels()
-        inside = (slice(margin, 25 - margin), slice(margin, 37 - margin))
-        np.testing.assert_array_equal(crop[inside], whole[5:30, 7:44][inside])
-
-    def test_a_mosaic_is_the_sampled_planes(self, name: str) -> None:
-        effect = example_of(KINDS[name])
-        if effect.reach_pixels():
-            return  # couples neighbouring sites: a mosaic's are of other colours
-        planes = np.random.default_rng(0).uniform(0, 3000, (20, 30, 3)).astype(np.float32)
-        sampled = mosaic(planes, Cfa.GBRG)
-        full = effect.apply(planes, self.exposure(PixelGrid(20, 30), 1, planes))
-        single = effect.apply(sampled, self.exposure(PixelGrid(20, 30, Cfa.GBRG), 1, sampled))
-        np.testing.assert_array_equal(single, mosaic(full, Cfa.GBRG))
-
-    def test_reshaped_noise_too_is_the_same_in_a_crop_and_in_a_mosaic(self, name: str) -> None:
-        if not KINDS[name].reshapes:
-            return  # leaves the base noise alone
-        camera = camera_with(example_of(KINDS[name])).model_copy(update={"cfa": Cfa.GBRG})
-        planes = np.random.default_rng(0).uniform(0, 3000, (80, 30, 3)).astype(np.float32)
-        sampled = mosaic(planes, Cfa.GBRG)
-        full = camera.expose(planes, Draw(1), Draw(2), 3, PixelGrid(80, 30), threads=2)
-        single = camera.expose(sampled, Draw(1), Draw(2), 3, PixelGrid(80, 30, Cfa.GBRG))
-        np.testing.assert_array_equal(single, mosaic(full, Cfa.GBRG))
-        crop_grid = PixelGrid(60, 20, Cfa.GBRG, 7, 5)
-        crop = camera.expose(sampled[7:67, 5:25], Draw(1), Draw(2), 3, crop_grid)
-        np.testing.assert_array_equal(crop, single[7:67, 5:25])
-
-    def test_the_given_image_is_left_alone(self, name: str) -> None:
-        image = np.full((16, 16), 100.0, np.float32)
-        image.flags.writeable = False
-        grid = PixelGrid(16, 16, Cfa.MONO)
-        made = example_of(KINDS[name]).apply(image, self.exposure(grid, 0, image))
-        assert made.dtype == np.float32
-        assert made.shape == image.shape
-
-    def test_without_strength_nothing_happens(self, name: str) -> None:
-        example = example_of(KINDS[name])
-        strength = next((n for n, v in example if isinstance(v, float)), None)
-        if strength is None or name in {"heavy_tailed_read_noise", "crosstalk", "saturation"}:
-            return  # no parameter whose zero is "none"
-        if name == "quantisation":
-            return  # a step of 1 rounds
-        grid = PixelGrid(16, 16, Cfa.RGGB)
-        image = np.random.default_rng(0).uniform(0, 3000, grid.shape).astype(np.float32)
-        nothing = KINDS[name](**dict(example) | {strength: 0.0})
-        np.testing.assert_array_equal(nothing.apply(image, self.exposure(grid, 2, image)), image)
-
-    def test_it_loads_from_toml_as_it_was_written(self, name: str, tmp_path: Path) -> None:
-        camera = camera_with(example_of(KINDS[name]))
-        write_camera(camera, tmp_path / "camera.toml")
-        assert read_camera(tmp_path / "camera.toml") == camera
-
-    def test_it_documents_itself(self, name: str) -> None:
-        kind = KINDS[name]
-        assert kind.__doc__
-        assert len(kind.__doc__) > 80
-        assert kind.reference
-        assert kind.confounders
-        assert isinstance(kind.stage, Stage)
-        assert kind.measures
-
-    def test_bounds_are_kept(self, name: str) -> None:
-        example = example_of(KINDS[name])
-        for field, info in KINDS[name].model_fields.items():
-            if isinstance(getattr(example, field), float):
-                assert info.metadata, f"{field} has no bounds"
-                with pytest.raises(ValueError, match=field):
-                    KINDS[name](**dict(example) | {field: -1e9})
-
-
-def test_the_page_of_effects_is_up_to_date() -> None:
-    """If not: python -m dsis.effects.catalogue > docs/effects.md."""
-    page = Path(__file__).resolve().parents[1] / "docs" / "effects.md"
-    assert page.read_text(encoding="utf-8") == catalogue()
-
-
-def test_temporal_effects_change_from_frame_to_frame_and_fixed_ones_do_not() -> None:
-    """What holds for all frames shows in fixed measures or the level, and in no other draw."""
-    grid = PixelGrid(32, 32, Cfa.RGGB)
-    image = np.full(grid.shape, 1000.0, np.float32)
-    read_out = camera_with().model_copy(update={"cfa": Cfa.RGGB}).read_out
-    temporal = {
-        "bistable_pattern", "black_level_drift", "column_noise", "flicker", "impulse",
-        "line_flicker", "periodic_noise", "pink_noise", "row_noise", "rts",
-    }  # fmt: skip
-
-    def made(effect: Effect, frame: int, sensor: int) -> np.ndarray:
-        exposure = Exposure(
-            grid, frame, Draw(1), Draw(sensor), image, read_out, lambda _: image, 0.2
-        )
-        return effect.apply(image, exposure)
-
-    for name, kind in KINDS.items():
-        effect = example_of(kind)
-        frames = np.array([made(effect, frame, 5) for frame in range(8)])
-        assert (np.ptp(frames, 0).max() > 0) == (name in temporal), name
-
-
-def test_another_effect_leaves_the_noise_of_the_others_as_it_was() -> None:
-    """The row offsets themselves are the whole difference, to a code of rounding."""
-    grid = PixelGrid(ROWS, COLUMNS, Cfa.MONO)
-    clean = np.full(grid.shape, 3000.0, np.float32)
-    camera = camera_with(KINDS["row_noise"](sigma_dn=4.0))
-    before = BACKGROUND.expose(clean, Draw(1), Draw(2), 3, grid)
-    after = camera.expose(clean, Draw(1), Draw(2), 3, grid)
-    offsets = 4.0 * Draw(1).rows("row_noise", grid, 3)[:, np.newaxis]
-    assert np.abs(after - before - offsets).max() <= 1.0
-
-
-def test_a_second_effect_of_a_kind_has_noise_of_its_own() -> None:
-    grid = PixelGrid(512, 8, Cfa.MONO)
-    clean = np.full(grid.shape, 3000.0, np.float32)
-    rows = KINDS["row_noise"](sigma_dn=40.0)
-    one, two = (
-        camera_with(*effects).expose(clean, Draw(1), Draw(2), 3, grid).mean(1) - 3000
-        for effects in ((rows,), (rows, rows))
-    )
-    second = two - one
-    assert abs(np.corrcoef(one, second)[0, 1]) < Z_MAX / np.sqrt(512)
-    assert abs(second.var() / 40**2 - 1) < Z_MAX * np.sqrt(2 / 512)
-
-
-def test_links_are_sorted_as_light_and_charge_meet_them() -> None:
-    effects = tuple(example_of(kind) for kind in reversed(KINDS.values()))
-    kinds = [link.kind for link in camera_with(*effects).chain()]
-    stages = [link.stage for link in camera_with(*effects).chain()]
-    assert stages == sorted(stages)
-    assert kinds.index("prnu") < kinds.index("dark_current") < kinds.index("shot_noise")
-    assert kinds.index("shot_noise") < kinds.index("crosstalk") < kinds.index("read_noise")
-    assert kinds.index("read_noise") < kinds.index("row_noise")
-    assert kinds[-1] == "conversion"
-
-
-def test_all_effects_together_are_simulated() -> None:
-    effects = tuple(example_of(kind) for kind in KINDS.values())
-    grid = PixelGrid(24, 32, Cfa.RGGB)
-    clean = np.full(grid.shape, 2000.0, np.float32)
-    camera = camera_with(*effects)
-    frames = [
-        camera.expose(clean, Draw(1), Draw(2), 1, grid, exposure_time_s=0.1, threads=threads)
-        for threads in (1, 2)
-    ]
-    np.testing.assert_array_equal(*frames)
-    np.testing.assert_array_equal(frames[0], np.rint(frames[0]))
-
-
-class TestRefusals:
-    def read(self, tmp_path: Path, effects: str, *, segments: int = 1, cfa: str = "MONO") -> Camera:
-        upper = "[[noise.segment]]\nupper_dn = 100.0\nslope = 1.0\nintercept = 2.0\n"
-        text = f"""schema = "dsis-camera/1"
-name = "x"
-cfa = "{cfa}"
-black_level = 10
-white_level = 1023
-bit_depth = 10
-[noise]
-{upper if segments == 2 else ""}
-[[noise.segment]]
-slope = 1.0
-intercept = 2.0
-"""
-        path = tmp_path / "camera.toml"
-        path.write_text(text + effects)
-        return read_camera(path)
-
-    def test_what_a_camera_cannot_have(self, tmp_path: Path) -> None:
-        text = """[[effect]]
-kind = "channel_imbalance"
-gain_percent = 1.0
-[[effect]]
-kind = "dual_gain_mismatch"
-gain_error_percent = 1.0
-"""
-        with pytest.raises(InputError) as refused:
-            self.read(tmp_path, text)
-        assert "effect[0] (channel_imbalance): needs a Bayer mosaic" in str(refused.value)
-        assert "effect[1] (dual_gain_mismatch): needs a second" in str(refused.value)
-        self.read(tmp_path, text, segments=2, cfa="RGGB")
-
-    def test_a_second_gain_belongs_to_the_base_model(self, tmp_path: Path) -> None:
-        text = '[[effect]]\nkind = "dual_gain"\n[[effect]]\nkind = "row_nois"\n'
-        with pytest.raises(InputError) as refused:
-            self.read(tmp_path, text)
-        first, second = str(refused.value).splitlines()
-        assert first.endswith(
-            "effect[0].kind: is 'dual_gain', which is no effect: write a second [[noise.segment]]"
-        )
-        assert "effect[1].kind: is 'row_nois' (did you mean row_noise?)" in second
-
-    @pytest.mark.parametrize(("level", "bits", "says"), [
-        ("1022.5", "10", r"white_level is 1022\.5, must be a whole number"),
-        ("1023", "25", "bit_depth is 25, must be <= 24: frames are computed in single precision"),
-    ])  # fmt: skip
-    def test_codes_that_cannot_be(self, tmp_path: Path, level: str, bits: str, says: str) -> None:
-        path = tmp_path / "camera.toml"
-        write_camera(BACKGROUND, path)
-        text = path.read_text().replace("white_level = 65535.0", f"white_level = {level}")
-        path.write_text(text.replace("bit_depth = 16", f"bit_depth = {bits}"))
-        with pytest.raises(InputError, match=says):
-            read_camera(path)
-
-    def test_a_law_given_twice(self, tmp_path: Path) -> None:
-        with pytest.raises(InputError, match="poisson_shot_noise is given 2 times"):
-            self.read(tmp_path, '[[effect]]\nkind = "poisson_shot_noise"\n' * 2)
-
-    def test_growth_without_an_exposure_time(self, tmp_path: Path) -> None:
-        camera = self.read(tmp_path, '[[effect]]\nkind = "dark_current"\ndn_per_s = 3.0\n')
-        grid = PixelGrid(4, 4, Cfa.MONO)
-        clean = np.zeros((4, 4), np.float32)
-        with pytest.raises(InputError, match=r"dark_current.*exposure time"):
-            camera.expose(clean, Draw(1), Draw(2), 0, grid)
-        camera.expose(clean, Draw(1), Draw(2), 0, grid, exposure_time_s=0.0)

@@ -1,8 +1,6 @@
 """Promise: the limits that decide what a fit uses, and the errors it states, are the right ones."""
 
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,9 +14,7 @@ from analysis.photon_transfer.statistics import expose_statistics
 from dsis.cfa import Cfa
 from dsis.effects import registry
 from dsis.measures import measure_exposure
-
-sys.path.insert(0, str(Path(__file__).parent))  # tests are no package
-from test_photon_transfer import (
+from planted_camera import (
     LEVELS_DN,
     ONE,
     Z_MAX,

@@ -3,9 +3,7 @@
 The recordings are made in memory by `Camera.expose` of cameras whose patterns are known fields.
 """
 
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -21,9 +19,7 @@ from dsis.effects import registry
 from dsis.errors import InputError
 from dsis.grid import PixelGrid
 from dsis.simulate.maps import with_maps
-
-sys.path.insert(0, str(Path(__file__).parent))  # tests are no package
-from test_photon_transfer import ONE, Z_MAX, misses, patterned, record
+from planted_camera import ONE, Z_MAX, misses, patterned, record
 
 N, M = 64, 96
 

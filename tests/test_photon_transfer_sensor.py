@@ -3,9 +3,6 @@
 Each test is one term of a formula that the fit's other tests would hardly miss.
 """
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -17,9 +14,7 @@ from analysis.photon_transfer.parts import Component, Noise, Pattern
 from analysis.photon_transfer.patterns import FixedPatterns
 from analysis.photon_transfer.pedestal import black_level
 from dsis.effects import registry
-
-sys.path.insert(0, str(Path(__file__).parent))  # tests are no package
-from test_photon_transfer import ONE, Z_MAX, camera, patterned, record
+from planted_camera import ONE, Z_MAX, camera, patterned, record
 
 N, M = 48, 64
 DARKS = (0.0, 0.0, 0.0)

@@ -101,6 +101,7 @@ def test_names_that_are_nobodys_or_several_peoples_are_refused_at_once():
         analysis.reject(two_labs(), everybody)
 
 
+@pytest.mark.usefixtures("unpainted")
 def test_the_loop_of_a_lab(shared_data, tmp_path, capsys):
     """Report, accept in a spreadsheet, report again: scores without the four, said so."""
     votes = real_votes(shared_data, "nflx_public_last4outliers")
@@ -139,6 +140,7 @@ def test_the_loop_of_a_lab(shared_data, tmp_path, capsys):
     assert "--accept: s98: is no observer" in said
 
 
+@pytest.mark.usefixtures("unpainted")
 def test_a_report_made_again_in_place_keeps_the_decisions(shared_data, tmp_path):
     """`--accept` of the very folder that is written: twice the same command, twice the same."""
     votes = real_votes(shared_data, "nflx_public_last4outliers")

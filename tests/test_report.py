@@ -1,98 +1,33 @@
-"""The report: what it writes, that it says what must be said, and that it repeats itself."""
+"""Promise: the report has the columns and numbers of the contract, and the same bytes each time."""
 
 import base64
 import os
 import re
 import subprocess
 import sys
-from html.parser import HTMLParser
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
-from matplotlib.image import imread
-from scipy.stats import beta
 
 import analysis
-from analysis.report import Options, analyse
 from analysis.report.tables import TABLES
-from analysis.scale import Description, Scale
 from dsis.errors import InputError
 from dsis.outdir import UNFINISHED
+from opinions import MARK, PAPER, PICTURES, Page, make_votes, marks_in_figure, page, report
 
-PAPER = (1, 10)
-PICTURES = ("mos", "votes", "observers", "scale_use", "flagged", "contrasts")
 FILES = {"report.html", *TABLES, *(f"{name}.{end}" for name in PICTURES for end in ("svg", "png"))}
+
 MOS_HEADER = (
     "stimulus,content,noise,demosaic,level,n,mos,sd,ci_low,ci_high,"
     "n_removed,mos_trimmed,sd_trimmed,ci_trimmed_low,ci_trimmed_high,"
     "mos_bt500,mos_p913,score_p910,p910_ci_low,p910_ci_high"
 )
+
 OBSERVERS_HEADER = (
     "observer,n,bias,inconsistency,bt500_p,bt500_q,bt500_rejected,correlation,correlation_rejected"
 )
-MARK = "SIMULATED VOTES"
-
-
-def make_votes(contents=("city", "landscape"), methods=("none", "bilinear"), observers=18):
-    """Votes of a test like the paper's, with hidden references."""
-    random = np.random.default_rng(1)
-    rows = []
-    for content in contents:
-        conditions = [(n, d, 0) for n in ("awgn", "sd") for d in methods] + [("", "", None)]
-        for noise, demosaic, level in conditions:
-            name = f"{content}__{noise}__{demosaic}" if noise else f"{content}-ref"
-            kind = "test" if noise else "reference"
-            expected = 7.5 - 2 * (demosaic != "none") if noise else 9.5
-            votes = np.clip(np.rint(random.normal(expected, 1.2, observers)), 1, 10)
-            rows += [
-                (f"s{o}", name, content, noise, demosaic, level, kind, vote)
-                for o, vote in enumerate(votes, 1)
-            ]
-    columns = ["observer", "stimulus", "content", "noise", "demosaic", "level", "kind", "vote"]
-    return pd.DataFrame(rows, columns=columns)
-
-
-def report(folder, votes, scale=PAPER, name="report"):
-    file = folder / "votes.csv"
-    analysis.write_votes(votes, file)
-    analysis.write_report(file, folder / name, scale)
-    return folder / name
-
-
-def page(out):
-    return (out / "report.html").read_text()
-
-
-class Page(HTMLParser):
-    """Checks that elements nest, and gathers captions and the text of the remarks."""
-
-    VOID = ("meta", "img", "br")
-
-    def __init__(self, text):
-        super().__init__()
-        self.open, self.captions, self.shown, self.remarks = [], [], 0, ""
-        self.feed(text)
-        self.close()
-        assert self.open == []
-
-    def handle_starttag(self, tag, attrs):
-        if tag not in self.VOID:
-            self.open.append((tag, dict(attrs).get("class", "")))
-        self.shown += tag == "figure" or (tag == "table" and "id" in dict(attrs))
-        if tag in ("caption", "figcaption"):
-            self.captions.append("")
-
-    def handle_endtag(self, tag):
-        assert self.open.pop()[0] == tag
-
-    def handle_data(self, data):
-        tags = [tag for tag, _ in self.open]
-        if "caption" in tags or "figcaption" in tags:
-            self.captions[-1] += data
-        if ("section", "remarks") in self.open:
-            self.remarks += data
 
 
 @pytest.fixture(scope="module")
@@ -189,15 +124,6 @@ def test_same_votes_same_bytes(written, tmp_path):
         assert (again / name).read_bytes() == (out / name).read_bytes(), name
 
 
-def marks_in_figure(out):
-    """Texts of the SVG (matplotlib writes each as a comment), and red pixels of the PNG."""
-    svg = (out / "mos.svg").read_text()
-    red, green, blue = np.moveaxis(imread(out / "mos.png")[..., :3], -1, 0)
-    strong = (red > 0.6) & (green < 0.1) & (blue < 0.2)
-    pale = (red > 0.9) & (green > 0.85) & (green < 0.95) & (red - green > 0.05)
-    return svg.count(MARK), int(strong.sum()), int(pale.sum())
-
-
 def test_real_votes_carry_no_mark_of_simulation(written):
     out, __ = written
     assert marks_in_figure(out)[0] == 0
@@ -206,113 +132,7 @@ def test_real_votes_carry_no_mark_of_simulation(written):
     assert not pd.read_csv(out / "mos.csv")["simulated"].any()
 
 
-@pytest.mark.parametrize("share", [1.0, 0.5])
-def test_simulated_votes_are_marked_in_every_table_and_figure(tmp_path, share):
-    votes = make_votes()
-    robots = votes["observer"].str[1:].astype(int) <= share * 18
-    out = report(tmp_path, votes.assign(simulated=robots))
-    mark = MARK if share == 1 else f"50 % {MARK}"
-    parsed = Page(page(out))
-    assert len(parsed.captions) == parsed.shown
-    assert all(f"{mark}." in caption for caption in parsed.captions)
-    assert f'role="alert">{mark}.' in page(out)
-    texts, strong, pale = marks_in_figure(out)
-    assert texts >= 2  # title and across
-    assert strong > 500
-    assert pale > 5000
-    assert mark.encode() in (out / "mos.png").read_bytes()  # among its properties
-    for name in PICTURES:
-        assert mark in (out / f"{name}.svg").read_text()
-    for name in ("mos.csv", "observers.csv", "removed_votes.csv"):
-        flags = pd.read_csv(out / name)["simulated"]
-        assert flags.dtype == bool
-        assert flags.all() if share == 1 or name == "mos.csv" else flags.any()
-    assert "say nothing about what people see" in parsed.remarks
-
-
-def table(rows, **columns):
-    """Votes from one list per stimulus, in the order of the observers."""
-    return pd.DataFrame(
-        [(f"o{o}", f"s{s}", vote) for s, row in enumerate(rows) for o, vote in enumerate(row)],
-        columns=["observer", "stimulus", "vote"],
-    ).assign(**columns)
-
-
-# Votes on 24 stimuli by sixteen observers, nothing remarkable about them.
-TYPICAL = np.clip(
-    np.rint(np.random.default_rng(0).normal(np.linspace(1.8, 4.2, 24)[:, None], 0.5, (24, 16))),
-    1,
-    5,
-).tolist()
-
-
-@pytest.mark.parametrize(
-    ("votes", "remark"),
-    [
-        (table([row[:14] for row in TYPICAL]), "14 observers: with fewer than 15"),
-        (table([[5, 4, 5, 5, 1], *TYPICAL]), "cannot remove anything where there are 5 votes"),
-        (table([[5, 5, 5, 5, 5, 5, 5, 1]] * 3), "removes 12.5 % of the votes, more than 10 %"),
-        (table([[4] * 16, *TYPICAL]), "All votes are equal on s0"),
-        (table([[4], *TYPICAL]), "A single vote has no interval of Student's: s0"),
-        (table([[5] * 15 + [4], *TYPICAL]), "The interval leaves the scale on s0"),
-        (table([[4] * 16] * 2), "No correlation exists for o0"),
-        (table(TYPICAL), ""),
-        (table([[5, 4, 4], *TYPICAL]), "Not all sequences have the same number of votes"),
-        (
-            pd.concat([table(TYPICAL), table(TYPICAL, repetition=2)]),
-            "shown repeatedly to the same observers",
-        ),
-        (
-            pd.concat([table(TYPICAL, lab="x"), table(TYPICAL, lab="y")]),
-            "Votes of 2 laboratories are pooled",
-        ),
-        (table([[4, 5]]), "finds no inconsistency"),
-        (table([[1, 5, 1, 2], [2, 1, 2, 3], [3, 3, 2, 4]]), "Screening proposes to reject o2"),
-        (
-            table([[1, 5, 1, 2], [2, 1, 2, 3], [3, 3, 2, 4]]),
-            "over 3 sequences is uncertain by 0.36",
-        ),
-    ],
-)
-def test_remarks(votes, remark):
-    found = " ".join(analyse(votes, Description(Scale(1, 5))).remarks)
-    assert remark in found if remark else found == ""
-
-
-def test_votes_without_conditions_are_listed(shared_data, tmp_path):
-    votes = pd.read_csv(shared_data / "votes" / "nflx_public_last4outliers_votes.csv")
-    votes = votes.rename(columns={"subject": "observer"})
-    votes["kind"] = votes["is_reference"].map({0: "test", 1: "reference"})
-    out = report(tmp_path, votes, (1, 5))
-    figure, text = (out / "mos.svg").read_text(), page(out)
-    for stimulus in votes["stimulus"].unique():
-        assert f"<!-- {stimulus} -->" in figure
-    assert "would reject s27, s30; the correlation screen s27, s28, s29, s30" in text
-    assert "Far above on BigBuckBunny_30_384_550" in text
-    assert "hidden reference" in text
-
-
-def test_many_contents_have_a_panel_each(tmp_path):
-    contents = [f"kodim{n:02}" for n in range(1, 25)]
-    out = report(tmp_path, make_votes(contents, observers=6))
-    figure = (out / "mos.svg").read_text()
-    for content in contents:
-        assert f"<!-- {content} -->" in figure
-    assert figure.count("<!-- without -->") == 24
-
-
-def test_names_are_text_wherever_they_stand(tmp_path):
-    """Neither markup nor formula; a label may start with an underscore."""
-    votes = make_votes(methods=("none", "$x_1$")).replace(
-        {"content": {"city": "_<b>a&b"}, "observer": {"s1": "<script>alert(1)</script>"}}
-    )
-    out = report(tmp_path, votes)
-    Page(page(out))
-    assert "<script" not in page(out)
-    assert "&lt;script&gt;" in page(out)
-    assert "_&lt;b&gt;a&amp;b" in page(out)
-
-
+@pytest.mark.usefixtures("unpainted")
 def test_an_earlier_report_is_replaced_and_anything_else_refused(tmp_path):
     votes = make_votes(observers=3)
     out = report(tmp_path, votes)
@@ -367,42 +187,7 @@ def test_methods_say_what_was_done_and_no_more(written):
     assert "mean of all votes on the stimulus, this one included" in text
 
 
-def test_trimmed_votes_that_all_agree_have_the_binomial_interval_of_their_own():
-    """One vote far off is removed; fifteen equal ones are left, which Student gives no width."""
-    rows = [[8] * 15 + [2], [5, 6, 7, 8] * 4]
-    scores = analysis.score_table(table(rows), Scale(1, 10)).set_index("stimulus")
-    agreed = scores.loc["s0"]
-    assert (agreed["n_removed"], agreed["mos_trimmed"], agreed["sd_trimmed"]) == (1, 8, 0)
-    # 15 votes at 7/9 of the scale: k = 35/3 of 15 in the beta quantiles of Clopper and Pearson
-    k = 15 * 7 / 9
-    expected = (1 + 9 * beta.ppf(0.025, k, 16 - k), 1 + 9 * beta.ppf(0.975, k + 1, 15 - k))
-    assert (agreed["ci_trimmed_low"], agreed["ci_trimmed_high"]) == pytest.approx(expected)
-
-
-def test_how_few_votes_no_rule_can_remove_follows_the_threshold():
-    """Of four votes the farthest lies exactly 1.5 sd off, of five 1.79."""
-    votes = table([[5, 5, 5, 1], [5, 5, 5, 5, 1], *TYPICAL])
-    results = analyse(votes, Description(Scale(1, 5)), Options(threshold=1.5))
-    remark = "The 1.5\u03c3 rule cannot remove anything where there are 4 votes or fewer: s0."
-    assert remark in results.remarks
-    assert results.scores.set_index("stimulus").loc[["s0", "s1"], "n_removed"].tolist() == [0, 1]
-
-
-def test_stimuli_that_share_a_condition_are_named():
-    """Two takes of one condition, or blank contents: no contrast, and never silently."""
-    votes = make_votes()
-    take = votes[votes["stimulus"] == "city__sd__none"].assign(stimulus="city-take-2")
-    results = analyse(pd.concat([votes, take], ignore_index=True), Description(Scale(1, 10)))
-    assert results.contrasts.empty
-    remark = "city-take-2, city__sd__none are the same condition (content city, noise sd, "
-    assert any(remark in one and "No comparison" in one for one in results.remarks)
-    tests = votes[votes["kind"] == "test"].assign(content="")
-    blank = analyse(tests, Description(Scale(1, 10)))
-    assert sum("(content blank, " in one for one in blank.remarks) == 4
-    sound = analyse(votes, Description(Scale(1, 10)))
-    assert not any("No comparison" in one for one in sound.remarks)
-
-
+@pytest.mark.usefixtures("unpainted")
 def test_other_rules_of_removal_are_said(tmp_path):
     votes = make_votes(methods=("none",))
     analysis.write_votes(votes, tmp_path / "votes.csv")
@@ -422,53 +207,7 @@ def test_other_rules_of_removal_are_said(tmp_path):
     assert pd.read_csv(tmp_path / "report" / "mos.csv")["n_removed"].sum() == len(removed)
 
 
-def repeated_votes():
-    """Votes of a test with places, two repetitions and a drift of a grade in ten presentations."""
-    random = np.random.default_rng(2)
-    rows = []
-    for observer in range(16):
-        shown = [(s, r) for s in range(8) for r in (1, 2)]
-        order = random.permutation(len(shown))
-        for place, at in enumerate(order, 1):
-            stimulus, repetition = shown[at]
-            vote = np.clip(np.rint(2 + stimulus / 2 + place / 10 + random.normal(0, 0.8)), 1, 10)
-            rows.append((f"o{observer}", f"s{stimulus}", repetition, place, vote))
-    columns = ["observer", "stimulus", "repetition", "presentation", "vote"]
-    return pd.DataFrame(rows, columns=columns)
-
-
-def test_order_and_repetition_are_shown_where_they_are_known(tmp_path):
-    out = report(tmp_path, repeated_votes())
-    text = page(out)
-    assert "The order of presentations shows in the votes (drift)" in Page(text).remarks
-    assert (out / "order.svg").is_file()
-    assert "128 votes of 16 observers were cast twice on the same sequence" in text
-    assert "<h3>Test and retest</h3>" in text
-    assert pd.read_csv(out / "order.csv")["effect"].tolist() == ["drift", "fatigue", "contrast"]
-
-
-def test_votes_that_spread_too_much_are_flagged(shared_data):
-    votes = pd.read_csv(shared_data / "votes" / "nflx_public_last4outliers_votes.csv")
-    votes = votes.rename(columns={"subject": "observer"})
-    results = analyse(votes, Description(Scale(1, 5)), Options())
-    found = " ".join(results.remarks)
-    assert "SOS parameter a = 0.26, over 0.25" in found
-    assert "Screening proposes to reject s27, s28, s29, s30" in found
-
-
-def test_very_many_stimuli_are_drawn_without_names(tmp_path):
-    random = np.random.default_rng(1)
-    rows = [
-        (f"o{o}", f"s{s}", np.clip(np.rint(random.normal(3 + s / 60, 1.2)), 1, 10))
-        for s in range(200)
-        for o in range(6)
-    ]
-    votes = pd.DataFrame(rows, columns=["observer", "stimulus", "vote"])
-    out = report(tmp_path, votes)
-    assert "200 stimuli, by MOS" in (out / "votes.svg").read_text()
-    assert "<!-- s17 -->" not in (out / "votes.svg").read_text()
-
-
+@pytest.mark.usefixtures("unpainted")
 def test_scripts_to_copy_run(tmp_path, capsys, monkeypatch):
     from analysis.scripts import compare_conditions, merge_and_convert, mos_report
 

@@ -69,11 +69,21 @@ def test_unfinished_work_of_the_same_digest_is_resumed(tmp_path: Path) -> None:
         (folder / MARK).touch()
 
 
-def test_unfinished_work_of_another_digest_is_refused(tmp_path: Path) -> None:
+def test_finished_parts_of_another_digest_are_not_lost(tmp_path: Path) -> None:
     interrupted(tmp_path / "out", "digest")
+    with (tmp_path / "out.partial" / UNFINISHED).open("a", encoding="utf-8") as journal:
+        journal.write('{"frames": 1}\n')
     with pytest.raises(InputError, match="unfinished work of another spec"):
         make(tmp_path / "out", resume="other")
     assert (tmp_path / "out.partial" / "half").exists()
+
+
+def test_work_of_another_digest_of_which_nothing_was_finished_gives_way(tmp_path: Path) -> None:
+    """A command that was stopped before it finished anything does not stop other ones."""
+    interrupted(tmp_path / "out", "digest")
+    with result_folder(tmp_path / "out", MARK, resume="other") as folder:
+        assert names(folder) == [UNFINISHED]
+        (folder / MARK).touch()
 
 
 @pytest.mark.parametrize("resume", [None, "digest"])

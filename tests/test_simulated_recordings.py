@@ -1,44 +1,34 @@
 """Promise: a simulated recording has the layout, the levels and the noise it is asked for."""
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import ClassVar, Literal
 
 import numpy as np
 import pytest
 
-from dsis.camera import BaseNoise, Camera, Segment
 from dsis.cfa import Cfa
 from dsis.draw import Draw
 from dsis.effects import Effect, Exposure, Image, Stage, registry
 from dsis.errors import InputError
 from dsis.grid import PixelGrid
 from dsis.recording import ExposurePlan, Recording, Sensor, write_recording
-from dsis.simulate import (
-    SensorMaps,
-    Shot,
-    dark,
-    flat,
-    read_maps,
-    simulate,
-    simulate_like,
-    simulated_frames,
-    write_maps,
+from dsis.simulate import Shot, dark, flat, simulate, simulate_like, simulated_frames
+from folder_bytes import every_byte
+from simulated_stacks import (
+    BLACK,
+    COLUMNS,
+    INTERCEPT,
+    ROWS,
+    SHOTS,
+    SITES,
+    WHITE,
+    Z_MAX,
+    camera_of,
+    recorded,
+    site,
+    stack,
+    variance_dn2,
 )
-
-Z_MAX = 5.0
-ROWS, COLUMNS = 64, 96
-BLACK, WHITE = 64.0, 4095.0
-SLOPE, INTERCEPT = 0.5, 30.0
-SITES = [(0, 0), (0, 1), (1, 0), (1, 1)]
-
-
-def camera_of(cfa: Cfa = Cfa.RGGB, effects: Sequence[Effect] = (), black: float = BLACK) -> Camera:
-    noise = BaseNoise(segment=(Segment(slope=SLOPE, intercept=INTERCEPT),))
-    camera = Camera(
-        name="test", cfa=cfa, black_level=black, white_level=WHITE, bit_depth=12, noise=noise
-    )
-    return camera.model_copy(update={"effect": tuple(effects)})
 
 
 class Falloff(Effect):
@@ -83,34 +73,10 @@ class Bend(Effect):
         return bent
 
 
-def stack(recording: Recording, name: str) -> np.ndarray:
-    return np.stack(list(recording.frames(recording.exposure(name)))).astype(np.float64)
-
-
-def site(frames: np.ndarray, place: tuple[int, int]) -> np.ndarray:
-    return frames[..., place[0] :: 2, place[1] :: 2]
-
-
 def assert_mean(values: np.ndarray, expected: float, variance: float, extra: float = 0.0) -> None:
     """`extra` is the variance that the expectation itself has."""
     z = (values.mean() - expected) / np.sqrt(variance / values.size + extra)
     assert abs(z) < Z_MAX, f"{values.mean():.4f}, expected {expected:.4f}"
-
-
-def variance_dn2(level: float) -> float:
-    """Base model and rounding (Sheppard)."""
-    return SLOPE * level + INTERCEPT + 1 / 12
-
-
-def bytes_of(folder: Path) -> dict[str, bytes]:
-    return {str(p.relative_to(folder)): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
-
-
-SHOTS = (
-    dark("dark", frames=6, exposure_time_s=0.01),
-    flat("low", 50.0, frames=6, exposure_time_s=0.01, light=10.0),
-    flat("colours", [[900, 400], [410, 200]], frames=6, exposure_time_s=0.02, light=20.0),
-)
 
 
 class TestStatedLayout:
@@ -136,10 +102,10 @@ class TestStatedLayout:
         camera, made = camera_of(effects=effects), []
         for jobs in (1, 2, 3):
             simulate(camera, SHOTS, ROWS, COLUMNS, tmp_path / f"{jobs}", seed=9, jobs=jobs)
-            made.append(bytes_of(tmp_path / f"{jobs}"))
+            made.append(every_byte(tmp_path / f"{jobs}"))
         assert made[0] == made[1] == made[2]
         simulate(camera, SHOTS, ROWS, COLUMNS, tmp_path / "other", seed=10)
-        assert bytes_of(tmp_path / "other") != made[0]
+        assert every_byte(tmp_path / "other") != made[0]
 
     def test_frames_without_files_are_those_of_the_files(self, tmp_path: Path) -> None:
         made = simulate(camera_of(), SHOTS, ROWS, COLUMNS, tmp_path / "r", seed=2)
@@ -188,14 +154,6 @@ class TestStatedLayout:
         np.testing.assert_array_equal(codes, np.rint(image.astype(np.float64) + black))
 
 
-def recorded(
-    folder: Path, shots: Sequence[Shot], cfa: Cfa = Cfa.RGGB, effects: Sequence[Effect] = ()
-) -> Recording:
-    """Return a recording of another camera: other black level, seed and noise."""
-    camera = camera_of(cfa, effects, black=100.0)
-    return simulate(camera, shots, ROWS, COLUMNS, folder, seed=77)
-
-
 def assert_levels_agree(made: Recording, like: Recording, black_made: float) -> None:
     """Each site's mean above black agrees within the noise of both recordings."""
     for e in like.of_kind("flat"):
@@ -227,8 +185,8 @@ class TestLike:
         camera = camera_of(effects=[Falloff()])
         for name, seed, jobs in (("a", 1, 1), ("b", 1, 3), ("c", 2, 1)):
             simulate_like(camera, like, tmp_path / name, seed=seed, jobs=jobs)
-        assert bytes_of(tmp_path / "a") == bytes_of(tmp_path / "b")
-        assert bytes_of(tmp_path / "a") != bytes_of(tmp_path / "c")
+        assert every_byte(tmp_path / "a") == every_byte(tmp_path / "b")
+        assert every_byte(tmp_path / "a") != every_byte(tmp_path / "c")
 
     @pytest.mark.parametrize("effects", [[Falloff()], [Bend()], [Falloff(), Bend(), Thermal()]])
     def test_what_the_cameras_own_effects_do_to_a_mean_is_taken_off(
@@ -325,78 +283,10 @@ class TestLike:
         assert abs(found.mean()) < Z_MAX * np.sqrt(2 / 8 / n)
 
 
-class TestSameSensor:
-    def maps(self) -> SensorMaps:
-        rng = np.random.default_rng(5)
-        offsets = rng.normal(0, 12, (ROWS, COLUMNS)).astype(np.float32)
-        gains = rng.normal(1, 0.03, (ROWS, COLUMNS)).astype(np.float32)
-        for row, column in SITES:
-            site(offsets, (row, column))[:] -= site(offsets, (row, column)).mean()
-            site(gains, (row, column))[:] /= site(gains, (row, column)).mean()
-        return SensorMaps(offsets, gains)
-
-    def test_mean_frames_show_the_maps_and_no_other_pattern(self, tmp_path: Path) -> None:
-        maps = self.maps()
-        shots = [
-            dark("dark", frames=12, exposure_time_s=0.01),
-            flat("flat", 1500.0, frames=12, exposure_time_s=0.01),
-        ]
-        like = recorded(tmp_path / "real", shots)
-        camera = camera_of(effects=[registry()["prnu"](sigma_percent=5.0)])
-        made = simulate_like(camera, like, tmp_path / "made", maps=maps)
-        for name, level in (("dark", 0.0), ("flat", 1500.0)):
-            signal = level * maps.prnu_gain
-            left = stack(made, name).mean(0) - BLACK - signal - maps.dsnu_dn
-            z = (left - left.mean()) / np.sqrt(variance_dn2(signal) / 12)
-            assert abs(z.var() - 1) < Z_MAX * np.sqrt(2 / z.size)
-
-    def test_a_scene_gets_the_pattern_once(self, tmp_path: Path) -> None:
-        maps = self.maps()
-        light = np.full((ROWS, COLUMNS), 1500, np.float32) * maps.prnu_gain + maps.dsnu_dn
-        shots = [
-            dark("dark", frames=12, exposure_time_s=0.01),
-            Shot(ExposurePlan("scene", "scene", 0.01, 12), lambda _: light.copy()),
-        ]
-        like = recorded(tmp_path / "real", shots)
-        made = simulate_like(camera_of(), like, tmp_path / "made", maps=maps)
-        left = stack(made, "scene").mean(0) - BLACK - light
-        variance = 2 * variance_dn2(1500) / 12
-        assert abs(left.var() - variance) < Z_MAX * variance * np.sqrt(2 / left.size)
-
-    def test_maps_are_read_as_written(self, tmp_path: Path) -> None:
-        maps = self.maps()
-        write_maps(maps, tmp_path / "camera.toml")
-        again = read_maps(tmp_path / "camera.toml")
-        np.testing.assert_array_equal(again.dsnu_dn, maps.dsnu_dn)
-        np.testing.assert_array_equal(again.prnu_gain, maps.prnu_gain)
-        first = (tmp_path / "maps.npz").read_bytes()
-        write_maps(maps, tmp_path / "camera.toml")
-        assert (tmp_path / "maps.npz").read_bytes() == first
-
-    def test_maps_that_cannot_be_used(self, tmp_path: Path) -> None:
-        camera_file = tmp_path / "camera.toml"
-        with pytest.raises(InputError, match=r"maps\.npz: is missing"):
-            read_maps(camera_file)
-        (tmp_path / "maps.npz").write_bytes(b"PK and no more")
-        with pytest.raises(InputError, match="is damaged"):
-            read_maps(camera_file)
-        np.savez(tmp_path / "maps.npz", dsnu_dn=np.full((3, 4), np.nan))
-        with pytest.raises(InputError) as refused:
-            read_maps(camera_file)
-        assert len(refused.value.faults) == 2
-        write_maps(SensorMaps(np.zeros((3, 4)), np.zeros((3, 4))), camera_file)
-        with pytest.raises(InputError, match="gain <= 0"):
-            read_maps(camera_file)
-        like = recorded(tmp_path / "real", SHOTS)
-        small = SensorMaps(np.zeros((3, 4), np.float32), np.ones((3, 4), np.float32))
-        with pytest.raises(InputError, match="is of 3 x 4 pixels, must be of 64 x 96"):
-            simulate_like(camera_of(), like, tmp_path / "made", maps=small)
-
-
 class TestRefused:
     def test_what_does_not_fit_in_one_message(self, tmp_path: Path) -> None:
         like = recorded(tmp_path / "real", SHOTS)
-        before = bytes_of(tmp_path / "real")
+        before = every_byte(tmp_path / "real")
         camera = camera_of(Cfa.BGGR).model_copy(update={"bit_depth": 20})
         with pytest.raises(InputError) as refused:
             simulate_like(camera, like, tmp_path / "real")
@@ -404,7 +294,7 @@ class TestRefused:
         assert "cfa: is BGGR, must be RGGB as in the recording" in message
         assert "bit_depth: is 20, must be at most 16" in message
         assert "is the recording itself" in message
-        assert bytes_of(tmp_path / "real") == before
+        assert every_byte(tmp_path / "real") == before
 
     def test_progress_counts_every_frame(self, tmp_path: Path) -> None:
         told: list[tuple[int, int, str]] = []

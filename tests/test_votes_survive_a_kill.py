@@ -20,12 +20,27 @@ KILLS = 20
 VOTES_PER_LIFE = 8
 PLANNED = 20_000
 
-# One process imports dsis once and forks a voter for every line that it reads. A voter makes the
-# store and the plan where there are none, votes on from the first presentation that has no vote, as
-# a resumed session does, and writes what was acknowledged.
-VOTERS = """
+# One process imports dsis once and forks another for every line that it reads: it says who that is,
+# and when it has ended.
+FORKS = """
 import os, sys
 from pathlib import Path
+{prepare}
+for line in sys.stdin:
+    pid = os.fork()
+    if pid:
+        os.waitpid(pid, 0)
+        os.write(1, b"end\\n")
+        continue
+    os.write(1, f"pid {{os.getpid()}}\\n".encode())
+    live(line)
+    os._exit(0)
+"""
+
+# A voter makes the store and the plan where there are none, votes on from the first presentation
+# that has no vote, as a resumed session does, and writes what was acknowledged.
+VOTERS = FORKS.format(
+    prepare="""
 from dsis.manifest import read_manifest
 from dsis.session.plan import Presentation
 from dsis.session.store import Vote, open_store
@@ -33,13 +48,8 @@ from dsis.session.store import Vote, open_store
 folder, planned = Path(sys.argv[1]), int(sys.argv[2])
 manifest = read_manifest(folder)
 plan = [Presentation(i, "test", "s", "r", i, 1, 1) for i in range(1, planned + 1)]
-for line in sys.stdin:
-    pid = os.fork()
-    if pid:
-        os.waitpid(pid, 0)
-        os.write(1, b"end\\n")
-        continue
-    os.write(1, f"pid {os.getpid()}\\n".encode())
+
+def live(line):
     with open_store(folder, manifest) as store:
         if store.observer("anna") is None:
             store.add_observer("anna", plan, simulated=False)
@@ -50,19 +60,48 @@ for line in sys.stdin:
             os.write(1, f"vote {number} {vote.vote}\\n".encode())
             number += 1
 """
+)
+
+# A server is new, or resumed.
+SERVERS = FORKS.format(
+    prepare="""
+from dsis.session import serve
+
+def live(line):
+    folder, port = Path(sys.argv[1]), int(sys.argv[2])
+    serve(folder, "anna", port=port, open_browser=False, resume=line == "resume\\n", say=len)
+"""
+)
+
+CLIPS = (
+    Clip(stimulus="r", content="c", role="reference", files={"player": ClipFiles(path="r")}),
+    Clip(stimulus="s", content="c", reference="r", files={"player": ClipFiles(path="s")}),
+)
+
+
+def forking(program, *arguments):
+    return subprocess.Popen(
+        [sys.executable, "-c", program, *map(str, arguments)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+
+
+def fork(process, line):
+    """Have one more forked; return its number."""
+    process.stdin.write(f"{line}\n")
+    process.stdin.flush()
+    return int(process.stdout.readline().split()[1])
 
 
 @pytest.fixture
 def folder(tmp_path):
-    clips = (
-        Clip(stimulus="r", content="c", role="reference", files={"player": ClipFiles(path="r")}),
-        Clip(stimulus="s", content="c", reference="r", files={"player": ClipFiles(path="s")}),
-    )
     manifest = Manifest(
         schema="dsis-manifest/1",
         sequence=Sequence(width=8, height=8, fps=25.0, seconds=1.0),
         session=Session(),
-        clips=clips,
+        clips=CLIPS,
     )
     write_manifest(manifest, tmp_path)
     return tmp_path
@@ -76,16 +115,9 @@ def _vote(line):
 def test_every_acknowledged_vote_is_there_once(folder):
     delays_s = random.Random(20)  # noqa: S311  moments, no secrets
     acknowledged = []
-    with subprocess.Popen(
-        [sys.executable, "-c", VOTERS, str(folder), str(PLANNED)],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
-    ) as voters:
+    with forking(VOTERS, folder, PLANNED) as voters:
         for kill in range(KILLS):
-            voters.stdin.write("go\n")
-            voters.stdin.flush()
-            voter = int(voters.stdout.readline().split()[1])
+            voter = fork(voters, "go")
             if kill % 2:  # every other voter lives to its first vote, however slow the machine
                 acknowledged.append(_vote(voters.stdout.readline()))
             time.sleep(delays_s.uniform(0.0, 0.2))
@@ -107,23 +139,6 @@ def test_every_acknowledged_vote_is_there_once(folder):
     assert sorted(stored) == list(range(1, len(stored) + 1))
 
 
-# One process imports dsis once and forks a server for every line that it reads: new, or resumed.
-SERVERS = """
-import os, sys
-from pathlib import Path
-from dsis.session import serve
-
-folder, port = Path(sys.argv[1]), int(sys.argv[2])
-for line in sys.stdin:
-    pid = os.fork()
-    if pid:
-        os.waitpid(pid, 0)
-        os.write(1, b"end\\n")
-        continue
-    os.write(1, f"pid {os.getpid()}\\n".encode())
-    serve(folder, "anna", port=port, open_browser=False, resume=line == "resume\\n", say=len)
-    os._exit(0)
-"""
 FORMS = {
     "observer": {
         "age": "not said",
@@ -211,15 +226,11 @@ def write_quick_test(folder, planned):
         session_minutes_max=1e6,
         **dict.fromkeys(("reference_s", "test_s", "grey_s", "vote_s"), 0.001),
     )
-    clips = (
-        Clip(stimulus="r", content="c", role="reference", files={"player": ClipFiles(path="r")}),
-        Clip(stimulus="s", content="c", reference="r", files={"player": ClipFiles(path="s")}),
-    )
     manifest = Manifest(
         schema="dsis-manifest/1",
         sequence=Sequence(width=8, height=8, fps=1000.0, seconds=0.001),
         session=session,
-        clips=clips,
+        clips=CLIPS,
     )
     write_manifest(manifest, folder)
 
@@ -232,16 +243,9 @@ def kill_servers(folder, kills, planned, seed, tell=lambda _: None):
         port = free.getsockname()[1]
     delays_s = random.Random(seed)  # noqa: S311  moments, no secrets
     acknowledged = []
-    with subprocess.Popen(
-        [sys.executable, "-c", SERVERS, str(folder), str(port)],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
-    ) as servers:
+    with forking(SERVERS, folder, port) as servers:
         for kill in range(kills + 1):
-            servers.stdin.write("resume\n" if kill else "new\n")
-            servers.stdin.flush()
-            server = int(servers.stdout.readline().split()[1])
+            server = fork(servers, "resume" if kill else "new")
             window = Window(port, time.monotonic() + 60)
             if kill < kills:
                 moment_s = delays_s.uniform(0.0, 0.15)

@@ -63,9 +63,13 @@ def _cores() -> int:
 
 
 def add_jobs(sub: argparse.ArgumentParser) -> None:
-    """Take how many threads work."""
+    """Take how many threads or processes work."""
     sub.add_argument(
-        "--jobs", type=whole(1), default=_cores(), metavar="N", help="threads (default: all)"
+        "--jobs",
+        type=whole(1),
+        default=_cores(),
+        metavar="N",
+        help="threads or processes (default: one a core)",
     )
 
 

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from dsis.cli.arguments import Add, add_jobs, add_seed
+from dsis.cli.arguments import Add, add_jobs, add_scheduler, add_seed
 from dsis.cli.progress import progress_bar
 from dsis.errors import InputError
 
@@ -24,6 +24,7 @@ def add_scenes(add: Add) -> None:
     out = "float32: .exr, .tif"
     sub.add_argument("--out", type=Path, required=True, metavar="FILE.exr", help=out)
     add_jobs(sub)
+    add_scheduler(sub)
     add_seed(sub, "default: 1")
 
 
@@ -31,6 +32,7 @@ def scenes(options: argparse.Namespace) -> None:
     """Render City or Landscape into a file."""
     from dsis.imagefile import LIGHT_FORMATS, write_light
     from dsis.scenes import panorama, preset_strip
+    from dsis.workers import workers
 
     out: Path = options.out
     seed = 1 if options.seed is None else options.seed
@@ -39,7 +41,10 @@ def scenes(options: argparse.Namespace) -> None:
         fact = f"must be a file that ends in one of: {', '.join(LIGHT_FORMATS)}"
         raise InputError.of("--out", "", f"is {str(out)!r}, {fact}")
     out.parent.mkdir(parents=True, exist_ok=True)
-    with progress_bar(strip.scene) as progress:
-        light = panorama(strip, threads=options.jobs, progress=progress)
+    with (
+        workers(options.jobs, scheduler=options.scheduler) as pool,
+        progress_bar(strip.scene) as progress,
+    ):
+        light = panorama(strip, pool=pool, progress=progress)
     write_light(out, light, f"{strip}; linear light, Rec.709 primaries, D65, 1.0 a sunlit white")
     print(f"{strip} in {out}: linear light, Rec.709 primaries, 1.0 a sunlit white")

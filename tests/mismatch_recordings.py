@@ -1,0 +1,118 @@
+"""Recordings in memory, for what is proven on locked frames."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.mismatch.prove import hold
+from analysis.mismatch.prove.held import Held
+from dsis.camera import BaseNoise, Camera, Segment
+from dsis.cfa import Cfa
+from dsis.effects import Effect
+from dsis.grid import PixelGrid
+from dsis.recording import ExposurePlan, RecordedExposure, Recording, Sensor
+from dsis.simulate import Shot, dark, flat
+from dsis.simulate.simulator import simulated_frames
+
+ROWS, COLUMNS = 96, 128
+LEVELS = (100.0, 250.0, 500.0, 900.0, 1600.0, 2600.0)
+FRAMES = 8
+TRAINING, LOCKED = (0, 1, 2, 4, 5, 6), (3, 7)
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class InMemory(Recording):
+    """A recording whose frames are held in memory."""
+
+    stacks: dict[str, NDArray[np.uint16]] | None = None
+
+    def frame(self, exposure: RecordedExposure, index: int) -> NDArray[np.uint16]:
+        assert self.stacks is not None
+        return self.stacks[exposure.name][index]
+
+
+def camera(
+    *effects: Effect,
+    cfa: str = "MONO",
+    segments: tuple[tuple[float, float, float | None], ...] = ((0.5, 20.0, None),),
+    black: float = 64.0,
+) -> Camera:
+    parts = tuple(Segment(slope=m, intercept=t, upper_dn=end) for m, t, end in segments)
+    return Camera(
+        name="planted",
+        cfa=Cfa(cfa),
+        black_level=black,
+        white_level=4095.0,
+        bit_depth=12,
+        noise=BaseNoise(segment=parts),
+        effect=effects,
+    )
+
+
+def recorded(
+    true: Camera,
+    seed: int,
+    *,
+    rows: int = ROWS,
+    columns: int = COLUMNS,
+    frames: int = FRAMES,
+    levels: tuple[float, ...] = LEVELS,
+    lit: bool = True,
+    scene: NDArray[np.float32] | None = None,
+) -> InMemory:
+    """Return a recording of two dark times and flats."""
+    shots = [
+        dark("dark-0", frames=frames, exposure_time_s=0.005),
+        dark("dark-1", frames=frames, exposure_time_s=0.05),
+    ]
+    shots += [
+        flat(
+            f"flat-{i}",
+            level,
+            frames=frames,
+            exposure_time_s=0.01 * (i + 1),
+            light=level if lit else None,
+        )
+        for i, level in enumerate(levels)
+    ]
+    if scene is not None:
+        shots.append(Shot(ExposurePlan("scene", "scene", 0.01, frames), lambda _: scene.copy()))
+    grid = PixelGrid(rows, columns, true.cfa)
+    made = list(simulated_frames(true, shots, grid, seed=seed))
+    stacks = {
+        shot.plan.name: np.stack(made[k * frames : (k + 1) * frames])
+        for k, shot in enumerate(shots)
+    }
+    exposures = tuple(
+        RecordedExposure(
+            shot.plan.name,
+            shot.plan.kind,
+            shot.plan.exposure_time_s,
+            shot.plan.light,
+            tuple(Path(str(i)) for i in range(frames)),
+        )
+        for shot in shots
+    )
+    sensor = Sensor(
+        name="planted",
+        cfa=true.cfa,
+        black_level=true.black_level,
+        white_level=true.white_level,
+        bit_depth=true.bit_depth,
+    )
+    return InMemory(sensor, exposures, rows, columns, Path(), stacks)
+
+
+def held_of(recording: Recording, locked: tuple[int, ...] = LOCKED) -> Held:
+    names = [e.name for e in recording.exposures]
+    frames = len(recording.exposures[0].frames)
+    training = tuple(i for i in range(frames) if i not in locked)
+    return hold(recording, dict.fromkeys(names, training), dict.fromkeys(names, locked))
+
+
+def signals(levels: tuple[float, ...] = LEVELS) -> dict[str, Array]:
+    made = {f"flat-{i}": np.full((2, 2), level) for i, level in enumerate(levels)}
+    return made | {"dark-0": np.zeros((2, 2)), "dark-1": np.zeros((2, 2))}

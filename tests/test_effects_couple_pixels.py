@@ -1,0 +1,124 @@
+"""Promise: effects that share charge or remember it correlate noise as their kernels say.
+
+Measured without dsis's own measures; tolerances are five standard errors.
+"""
+
+import numpy as np
+import pytest
+
+from dsis.cfa import Cfa
+from dsis.draw import Draw
+from dsis.grid import PixelGrid
+from exposing import SIDE, Z_MAX, apply, camera, effect, recorded, white
+
+SAME_NOISE = (
+    0.03  # of a change seen in one and the same noise: 2^18 pixels, correlation's own error
+)
+
+
+def correlation(image: np.ndarray, dy: int, dx: int) -> float:
+    z = image - image.mean()
+    rows, columns = z.shape
+    pairs = z[: rows - dy, : columns - dx] * z[dy:, dx:]
+    return float(pairs.mean() / z.var())
+
+
+CORRELATION_ERROR = 1.5 / SIDE  # 1 / sqrt(n), with room for Bartlett's factor
+
+
+@pytest.mark.parametrize("fraction", [0.01, 0.05, 0.15])
+@pytest.mark.parametrize("along", ["both", "rows", "columns"])
+def test_crosstalk_correlates_by_its_kernel(fraction: float, along: str) -> None:
+    made = apply(effect("crosstalk", fraction=fraction, along=along), white(mean=500))
+    neighbours = 4 if along == "both" else 2
+    own = 1 - neighbours * fraction
+    norm = own**2 + neighbours * fraction**2
+    expected = 2 * own * fraction / norm
+    for lag, axis in (((0, 1), "rows"), ((1, 0), "columns")):
+        rho = expected if along in ("both", axis) else 0.0
+        assert abs(correlation(made, *lag) - rho) < Z_MAX * CORRELATION_ERROR
+    assert abs(made.var() / white().var() - norm) < Z_MAX * np.sqrt(2) / SIDE
+    assert made.mean() == pytest.approx(white(mean=500).mean(), abs=1e-4)  # charge is kept
+
+
+@pytest.mark.parametrize("kind", ["crosstalk", "spatial_filtering"])
+def test_a_single_charge_is_shared_with_its_neighbours(kind: str) -> None:
+    point = np.zeros((9, 9))
+    point[4, 4] = 1000.0
+    expected = np.zeros((9, 9))
+    expected[4, 4] = 880.0
+    expected[[3, 5, 4, 4], [4, 4, 3, 5]] = 30.0
+    made = apply(effect(kind, fraction=0.03), point)
+    np.testing.assert_allclose(made, expected, atol=1e-3)
+
+
+def test_brighter_fatter_grows_with_the_square_of_the_signal() -> None:
+    per_dn = 2e-6
+    deficits, covariances = [], []
+    levels = np.array([1000.0, 2000.0, 4000.0, 8000.0])
+    for s in levels:
+        before = white(np.sqrt(s), 512, s)
+        after = apply(effect("brighter_fatter", per_dn=per_dn), before)
+        assert after.mean() == pytest.approx(before.mean(), rel=1e-6)  # a flat keeps its mean
+        # The same noise before and after: the change is far more certain than each variance.
+        deficits.append((before.var() - after.var()) / s)
+        covariances.append((correlation(after, 0, 1) - correlation(before, 0, 1)) * after.var() / s)
+    f = per_dn * levels
+    np.testing.assert_allclose(deficits, 8 * f - 20 * f**2, rtol=SAME_NOISE)
+    np.testing.assert_allclose(covariances, 2 * f - 8 * f**2, rtol=SAME_NOISE)
+
+
+@pytest.mark.parametrize("cfa", [Cfa.RGGB, Cfa.MONO])
+def test_spatial_filtering_couples_sites_of_one_colour(cfa: Cfa) -> None:
+    step = 1 if cfa is Cfa.MONO else 2
+    made = apply(
+        effect("spatial_filtering", fraction=0.05),
+        white(mean=500),
+        grid=PixelGrid(SIDE, SIDE, cfa),
+    )
+    assert made.mean() == pytest.approx(white(mean=500).mean(), abs=1e-4)
+    expected = 2 * 0.8 * 0.05 / (0.8**2 + 4 * 0.05**2)
+    for dy, dx in ((0, step), (step, 0)):
+        assert abs(correlation(made, dy, dx) - expected) < Z_MAX * CORRELATION_ERROR
+    if step == 2:
+        assert abs(correlation(made, 0, 1)) < Z_MAX * CORRELATION_ERROR
+
+
+@pytest.mark.parametrize(("along", "lag"), [("rows", (0, 4)), ("columns", (4, 0))])
+@pytest.mark.parametrize("fraction", [0.3, -0.3])
+def test_readout_memory_correlates_at_its_lag_only(
+    along: str, lag: tuple[int, int], fraction: float
+) -> None:
+    one = effect("readout_memory", fraction=fraction, lag_pixels=4, along=along)
+    made = apply(one, white(mean=700.0), expected=700.0)
+    assert abs(made.mean() - 700) < Z_MAX * 13 / SIDE
+    for other in [(0, k) for k in range(1, 6)] + [(k, 0) for k in range(1, 6)]:
+        rho = fraction / (1 + fraction**2) if other == lag else 0.0
+        assert abs(correlation(made, *other) - rho) < Z_MAX * CORRELATION_ERROR, other
+
+
+def test_image_lag_correlates_shot_noise_in_time_and_leaves_a_trail() -> None:
+    f = 0.1
+    one = camera(effect("image_lag", fraction=f), slope=4.0)
+    stack = recorded(one, 2000.0, 24)
+    z = stack - 2000
+    rho = f * (1 - f) / ((1 - f) ** 2 + f**2)
+    n = z[1:].size
+    assert abs((z[1:] * z[:-1]).mean() / (z**2).mean() - rho) < Z_MAX / np.sqrt(n)
+    variance = 4.0 * 2000 * ((1 - f) ** 2 + f**2) + 1 / 12
+    assert abs((z**2).mean() / variance - 1) < Z_MAX * np.sqrt(2 * (1 + 2 * rho**2) / n)
+    still = camera(effect("image_lag", fraction=f))
+    grid = PixelGrid(4, 4, Cfa.MONO)
+    dark = np.zeros((4, 4), np.float32)
+    trail = still.expose(dark, Draw(1), Draw(1), 5, grid, earlier_clean=lambda k: dark + 1000 * k)
+    np.testing.assert_array_equal(trail, 100.0)
+
+
+def test_readout_memory_remembers_a_shifted_mean() -> None:
+    """Charge cut 100 DN below what the light gives: a tenth of it is missing once more."""
+    memory = effect("readout_memory", fraction=0.1, lag_pixels=2)
+    full = camera(memory, slope=0.0, intercept=4.0).model_copy(update={"saturation_dn": 900.0})
+    stack = recorded(full, 1000.0, 20)
+    rest = stack[:, :, 2:]
+    assert abs(rest.mean() - 890) < Z_MAX * 2.1 * 1.1 / np.sqrt(rest.size)
+    assert abs(stack[:, :, :2].mean() - 900) < Z_MAX * 2.1 / np.sqrt(stack[:, :, :2].size)

@@ -1,0 +1,89 @@
+"""Promise: measures of codes are exact, and what frames cannot tell is said to be unknown."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from dsis.cfa import Cfa
+from dsis.measures import Accumulator, measure, measure_exposure
+from stacks import SIGMA, Z_MAX, noise, one, recorded
+
+
+class TestCodes:
+    @given(step=st.integers(1, 64), offset=st.integers(0, 40))
+    @settings(max_examples=20, deadline=None)
+    def test_spacing_is_exact(self, step: int, offset: int) -> None:
+        codes = step * recorded(300 + noise(3, 20, 20)) + offset
+        assert measure(codes.astype(np.float32))["code_spacing"].value == step
+
+    def test_random_code_widths(self) -> None:
+        """Edges of codes moved so that widths scatter by 5 %: what the measure must return."""
+        widths = 1 + 0.05 * np.random.default_rng(11).normal(size=400)
+        edges = 500.0 + np.cumsum(widths)
+        z = 700 + 3 * noise(30, 128, 128)
+        found = measure((500 + np.searchsorted(edges, z)).astype(np.uint16))["code_imbalance"]
+        used = widths[100:300]
+        assert abs(found.value - used.std()) < Z_MAX * found.standard_error
+        assert found.departure > Z_MAX
+
+    def test_missing_resolution_is_no_imbalance(self) -> None:
+        codes = 4 * np.rint((1000 + 3 * noise(10, 128, 128)) / 4)
+        found = measure(codes.astype(np.uint16))
+        assert found["code_spacing"].value == 4
+        assert abs(found["code_imbalance"].departure) < Z_MAX
+
+    @pytest.mark.parametrize("sigma", [0.3, 1.5])
+    def test_too_little_noise_tells_no_code_width(self, sigma: float) -> None:
+        found = measure(recorded(1000.3 + noise(6, 64, 64) * sigma / SIGMA))["code_imbalance"]
+        assert not found.known
+        assert found.standard_error == np.inf
+
+    def test_values_that_are_no_codes(self) -> None:
+        found = measure((1000 + noise(4, 32, 32)).astype(np.float32))
+        assert not found["code_spacing"].known
+        assert not found["code_imbalance"].known
+        assert found["pixel_variance"].known
+
+    def test_clipped_shares(self) -> None:
+        stack = np.clip(recorded(1000 + noise(4, 32, 32)), 995, 1004)
+        channel = one(stack, white_level=1004.0, lowest_code=995.0)
+        assert channel.clipped_low == (stack <= 995).mean()
+        assert channel.clipped_high == (stack >= 1004).mean()
+        assert not channel.estimates["code_imbalance"].known
+        assert np.isnan(one(stack).clipped_high)
+
+
+class TestLimits:
+    def test_identical_frames_say_what_they_cannot(self) -> None:
+        found = measure(np.repeat(recorded(1000 + noise(1, 32, 32)), 5, axis=0))
+        assert found["pixel_variance"].value == 0.0
+        assert found["level"].known
+        for name in ("skewness", "kurtosis", "correlation_0_1", "spectral_peak", "variance_spread"):
+            assert not found[name].known, name
+
+    def test_two_frames_have_no_skew_and_no_correlation_in_time(self) -> None:
+        found = measure(recorded(1000 + noise(2, 32, 32)))
+        assert not found["skewness"].known
+        assert not found["frame_correlation"].known
+        assert found["kurtosis"].known
+
+    def test_refusals(self) -> None:
+        frame = recorded(1000 + noise(1, 8, 8))[0]
+        with pytest.raises(ValueError, match=r"1 frame\(s\), must have at least 2"):
+            measure(frame[None])
+        with pytest.raises(ValueError, match="has no frames"):
+            measure_exposure([])
+        sums = Accumulator(8, 8)
+        with pytest.raises(ValueError, match=r"frame 0 is \(7, 8\), must be \(8, 8\)"):
+            sums.add(frame[1:])
+        bad = frame.astype(np.float32)
+        bad[3, 3] = np.nan
+        with pytest.raises(ValueError, match="not finite"):
+            sums.add(bad)
+        with pytest.raises(ValueError, match="region"):
+            Accumulator(8, 8, region=(slice(5, 5), slice(None)))
+        with pytest.raises(ValueError, match="at least 2 x 2"):
+            Accumulator(3, 8, Cfa.RGGB)
+        with pytest.raises(ValueError, match="measure_channels"):
+            measure(np.zeros((2, 8, 8), np.float32), Cfa.RGGB)

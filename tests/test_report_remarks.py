@@ -1,0 +1,121 @@
+"""Promise: the report says what must be said of the votes, and marks simulated ones everywhere."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.stats import beta
+
+import analysis
+from analysis.report import Options, analyse
+from analysis.scale import Description, Scale
+from opinions import MARK, PICTURES, Page, make_votes, marks_in_figure, page, report, table
+
+
+@pytest.mark.parametrize("share", [1.0, 0.5])
+def test_simulated_votes_are_marked_in_every_table_and_figure(tmp_path, share):
+    votes = make_votes()
+    robots = votes["observer"].str[1:].astype(int) <= share * 18
+    out = report(tmp_path, votes.assign(simulated=robots))
+    mark = MARK if share == 1 else f"50 % {MARK}"
+    parsed = Page(page(out))
+    assert len(parsed.captions) == parsed.shown
+    assert all(f"{mark}." in caption for caption in parsed.captions)
+    assert f'role="alert">{mark}.' in page(out)
+    texts, strong, pale = marks_in_figure(out)
+    assert texts >= 2  # title and across
+    assert strong > 500
+    assert pale > 5000
+    assert mark.encode() in (out / "mos.png").read_bytes()  # among its properties
+    for name in PICTURES:
+        assert mark in (out / f"{name}.svg").read_text()
+    for name in ("mos.csv", "observers.csv", "removed_votes.csv"):
+        flags = pd.read_csv(out / name)["simulated"]
+        assert flags.dtype == bool
+        assert flags.all() if share == 1 or name == "mos.csv" else flags.any()
+    assert "say nothing about what people see" in parsed.remarks
+
+
+# Votes on 24 stimuli by sixteen observers, nothing remarkable about them.
+TYPICAL = np.clip(
+    np.rint(np.random.default_rng(0).normal(np.linspace(1.8, 4.2, 24)[:, None], 0.5, (24, 16))),
+    1,
+    5,
+).tolist()
+
+
+@pytest.mark.parametrize(
+    ("votes", "remark"),
+    [
+        (table([row[:14] for row in TYPICAL]), "14 observers: with fewer than 15"),
+        (table([[5, 4, 5, 5, 1], *TYPICAL]), "cannot remove anything where there are 5 votes"),
+        (table([[5, 5, 5, 5, 5, 5, 5, 1]] * 3), "removes 12.5 % of the votes, more than 10 %"),
+        (table([[4] * 16, *TYPICAL]), "All votes are equal on s0"),
+        (table([[4], *TYPICAL]), "A single vote has no interval of Student's: s0"),
+        (table([[5] * 15 + [4], *TYPICAL]), "The interval leaves the scale on s0"),
+        (table([[4] * 16] * 2), "No correlation exists for o0"),
+        (table(TYPICAL), ""),
+        (table([[5, 4, 4], *TYPICAL]), "Not all sequences have the same number of votes"),
+        (
+            pd.concat([table(TYPICAL), table(TYPICAL, repetition=2)]),
+            "shown repeatedly to the same observers",
+        ),
+        (
+            pd.concat([table(TYPICAL, lab="x"), table(TYPICAL, lab="y")]),
+            "Votes of 2 laboratories are pooled",
+        ),
+        (table([[4, 5]]), "finds no inconsistency"),
+        (table([[1, 5, 1, 2], [2, 1, 2, 3], [3, 3, 2, 4]]), "Screening proposes to reject o2"),
+        (
+            table([[1, 5, 1, 2], [2, 1, 2, 3], [3, 3, 2, 4]]),
+            "over 3 sequences is uncertain by 0.36",
+        ),
+    ],
+)
+def test_remarks(votes, remark):
+    found = " ".join(analyse(votes, Description(Scale(1, 5))).remarks)
+    assert remark in found if remark else found == ""
+
+
+def test_trimmed_votes_that_all_agree_have_the_binomial_interval_of_their_own():
+    """One vote far off is removed; fifteen equal ones are left, which Student gives no width."""
+    rows = [[8] * 15 + [2], [5, 6, 7, 8] * 4]
+    scores = analysis.score_table(table(rows), Scale(1, 10)).set_index("stimulus")
+    agreed = scores.loc["s0"]
+    assert (agreed["n_removed"], agreed["mos_trimmed"], agreed["sd_trimmed"]) == (1, 8, 0)
+    # 15 votes at 7/9 of the scale: k = 35/3 of 15 in the beta quantiles of Clopper and Pearson
+    k = 15 * 7 / 9
+    expected = (1 + 9 * beta.ppf(0.025, k, 16 - k), 1 + 9 * beta.ppf(0.975, k + 1, 15 - k))
+    assert (agreed["ci_trimmed_low"], agreed["ci_trimmed_high"]) == pytest.approx(expected)
+
+
+def test_how_few_votes_no_rule_can_remove_follows_the_threshold():
+    """Of four votes the farthest lies exactly 1.5 sd off, of five 1.79."""
+    votes = table([[5, 5, 5, 1], [5, 5, 5, 5, 1], *TYPICAL])
+    results = analyse(votes, Description(Scale(1, 5)), Options(threshold=1.5))
+    remark = "The 1.5\u03c3 rule cannot remove anything where there are 4 votes or fewer: s0."
+    assert remark in results.remarks
+    assert results.scores.set_index("stimulus").loc[["s0", "s1"], "n_removed"].tolist() == [0, 1]
+
+
+def test_stimuli_that_share_a_condition_are_named():
+    """Two takes of one condition, or blank contents: no contrast, and never silently."""
+    votes = make_votes()
+    take = votes[votes["stimulus"] == "city__sd__none"].assign(stimulus="city-take-2")
+    results = analyse(pd.concat([votes, take], ignore_index=True), Description(Scale(1, 10)))
+    assert results.contrasts.empty
+    remark = "city-take-2, city__sd__none are the same condition (content city, noise sd, "
+    assert any(remark in one and "No comparison" in one for one in results.remarks)
+    tests = votes[votes["kind"] == "test"].assign(content="")
+    blank = analyse(tests, Description(Scale(1, 10)))
+    assert sum("(content blank, " in one for one in blank.remarks) == 4
+    sound = analyse(votes, Description(Scale(1, 10)))
+    assert not any("No comparison" in one for one in sound.remarks)
+
+
+def test_votes_that_spread_too_much_are_flagged(shared_data):
+    votes = pd.read_csv(shared_data / "votes" / "nflx_public_last4outliers_votes.csv")
+    votes = votes.rename(columns={"subject": "observer"})
+    results = analyse(votes, Description(Scale(1, 5)), Options())
+    found = " ".join(results.remarks)
+    assert "SOS parameter a = 0.26, over 0.25" in found
+    assert "Screening proposes to reject s27, s28, s29, s30" in found

@@ -39,7 +39,7 @@ def draw_observers(
     flagged
         (observer,): drawn in red, because a screen would reject them.
     simulated_share, path
-        As for `analysis.figures.draw_mos`.
+        As for `analysis.figures_mos.draw_mos`.
     """
     columns = (("bias", "bias, grades"), ("inconsistency", "inconsistency, grades"))
     x = np.arange(len(people))
@@ -90,7 +90,7 @@ def draw_scale_use(
     names
         How to call the observers, in the order of `index_votes(votes).observers`.
     scale, simulated_share, path
-        As for `analysis.figures.draw_mos`.
+        As for `analysis.figures_mos.draw_mos`.
     """
     scored = index_votes(votes)
     columns = min(_grades(scored.vote, scale), GRADES_SHOWN)
@@ -150,7 +150,7 @@ def draw_flagged(
     flagged
         (observer,): whom to draw; the first `SHOWN`.
     scale, simulated_share, path
-        As for `analysis.figures.draw_mos`.
+        As for `analysis.figures_mos.draw_mos`.
     """
     scored = index_votes(votes)
     chosen = np.flatnonzero(flagged)[:SHOWN]

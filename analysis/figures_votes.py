@@ -48,7 +48,7 @@ def draw_votes(
     votes, removed
         Table of votes; `analysis.remove_outliers(votes).removed`.
     scale, simulated_share, path
-        As for `analysis.figures.draw_mos`.
+        As for `analysis.figures_mos.draw_mos`.
     """
     scored = index_votes(votes)
     mean = moments(scored.stimulus, scored.vote, 1).mean
@@ -172,7 +172,7 @@ def draw_order(
     effects
         `analysis.order_effects`.
     simulated_share, path
-        As for `analysis.figures.draw_mos`.
+        As for `analysis.figures_mos.draw_mos`.
     """
     known = ~np.isnan(place)
     place, residual = place[known], residual[known]
@@ -214,7 +214,7 @@ def draw_contrasts(contrasts: pd.DataFrame, simulated_share: float, path: Path) 
     contrasts
         `analysis.test_contrasts`; red: significant after Holm (paired t).
     simulated_share, path
-        As for `analysis.figures.draw_mos`.
+        As for `analysis.figures_mos.draw_mos`.
     """
     table = contrasts.sort_values(["question", "treatment"], kind="stable").reset_index(drop=True)
     y = np.arange(len(table), dtype=np.float64)

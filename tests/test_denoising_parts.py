@@ -13,16 +13,14 @@ from scipy.stats import multivariate_normal
 from analysis.denoising.bls_gsm import LOG_Z, mixture_of, neighbourhood_covariance
 from analysis.denoising.bls_gsm_estimate import estimate_rows
 from analysis.denoising.bm3d import GAMMA, REACH, _reach, _Stage
-from analysis.denoising.bm3d_filtering import (
-    MOST,
-    Groups,
+from analysis.denoising.bm3d_filtering import filter_groups
+from analysis.denoising.bm3d_groups import MOST, Groups, Sums, bit_reversed
+from analysis.denoising.bm3d_matching import match_blocks
+from analysis.denoising.bm3d_shrinkage import (
     Shrinkage,
-    bit_reversed,
     combine_covariances,
     fill_covariances,
-    filter_groups,
 )
-from analysis.denoising.bm3d_matching import match_blocks
 from analysis.denoising.bm3d_transforms import BLOCK, bior15, coefficient_covariances, dct
 from analysis.denoising.opponent import image_of, planes_of
 from analysis.denoising.pyramid import Grid, Pyramid, good_odd_size
@@ -180,8 +178,9 @@ def test_a_group_is_shrunk_and_weighted_as_published(wiener, members):
     rule = Shrinkage(forward, np.ascontiguousarray(forward.T), covariance, *numbers, weights)
     places = (BLOCK * np.arange(members, dtype=np.int32)).reshape(1, 1, -1)
     groups = Groups(places, np.full((1, 1), members, np.int32), bit_reversed())
-    total, weight = np.zeros_like(noisy), np.zeros_like(noisy)
-    filter_groups(noisy, basic if wiener else basic[:0], groups, rule, 0, total, weight)
+    sums = Sums(0, np.zeros_like(noisy), np.zeros_like(noisy))
+    filter_groups(noisy, basic if wiener else basic[:0], groups, rule, sums)
+    _, total, weight = sums
 
     def coefficients(image):
         split = image[0].astype(np.float64).reshape(BLOCK, members, BLOCK).swapaxes(0, 1)
@@ -312,3 +311,17 @@ def test_a_grid_crops_and_adds_back():
     kept = np.abs(back) > 0
     assert kept.sum() == 5 * 4
     np.testing.assert_array_equal(back[kept], spectrum[kept])
+
+
+def test_the_lags_of_a_band_are_those_of_the_whole_transform():
+    """Five lags by sums over the frequencies, against all lags by another's inverse FFT."""
+    grid, generator = Grid(45, 63), np.random.default_rng(5)
+    power = np.abs(scipy.fft.rfft2(generator.normal(size=(45, 63)))) ** 2
+    a, b = (
+        np.abs(scipy.fft.rfft2(generator.normal(size=(45, 63)))).astype(np.float32)
+        for _ in range(2)
+    )
+    whole = scipy.fft.irfft2(power * a * b, (45, 63), norm="forward")
+    lag = np.arange(-2, 3)
+    found = grid.autocovariance(power, a, b)
+    np.testing.assert_allclose(found, whole[lag[:, None], lag], atol=1e-12 * whole[0, 0])

@@ -1,4 +1,6 @@
-"""The two arguments of a denoiser, checked in one place."""
+"""What a denoiser is, and its two arguments, checked in one place."""
+
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -6,6 +8,36 @@ from numpy.typing import ArrayLike, NDArray
 from analysis.denoising.spectrum import NoiseSpectrum
 
 Noise = ArrayLike | NoiseSpectrum
+
+
+class Denoiser(Protocol):
+    """A function (image, noise) -> image: `bm3d`, `bls_gsm`, or anything that keeps to the same."""
+
+    def __call__(
+        self, image: NDArray[np.float32], noise: Noise, *, threads: int = 1
+    ) -> NDArray[np.float32]:
+        """Remove additive stationary Gaussian noise.
+
+        Parameters
+        ----------
+        image
+            (row, column) or (row, column, 3), any unit and range; nothing is clipped.
+        noise
+            Standard deviation in the unit of the image, one for all channels or three, or the
+            noise's `NoiseSpectrum`.
+        threads
+            Number of threads; the result does not depend on it.
+
+        Returns
+        -------
+        NDArray[np.float32]
+            The estimate, shape and unit of `image`.
+
+        Raises
+        ------
+        ValueError
+            Where an argument is not as said above, or the image too small.
+        """
 
 
 def checked(

@@ -25,28 +25,7 @@ SMALLEST = 33
 
 
 def bls_gsm(image: NDArray[np.float32], noise: Noise, *, threads: int = 1) -> NDArray[np.float32]:
-    """Remove additive stationary Gaussian noise.
-
-    Parameters
-    ----------
-    image
-        (row, column) or (row, column, 3), at least 33 x 33, any unit and range; nothing is clipped.
-    noise
-        Standard deviation in the unit of the image, one for all channels or three, or the noise's
-        `NoiseSpectrum`.
-    threads
-        Number of threads; the result does not depend on it.
-
-    Returns
-    -------
-    NDArray[np.float32]
-        The estimate, shape and unit of `image`.
-
-    Raises
-    ------
-    ValueError
-        Where an argument is not as said above.
-    """
+    """Remove additive stationary Gaussian noise: a `Denoiser`, for images of 33 x 33 and more."""
     given, spectrum = checked(image, noise, SMALLEST)
     rows, columns = given.shape[:2]
     octaves = max(1, int(np.ceil(np.log2(min(rows, columns)))) - 4)
@@ -123,20 +102,14 @@ def neighbourhood_covariance(
     level
         Where they are sampled.
     """
-    to_own = _lags(power * own**2, level)
+    to_own = level.grid.autocovariance(power, own, own)
     y, x = np.divmod(np.arange(9), 3)
     spatial = to_own[y[:, None] - y + 2, x[:, None] - x + 2]
     if parent is None:
         return np.asarray(spatial)
-    to_parent = _lags(power * own * parent, level)[1:4, 1:4].reshape(-1, 1)
-    variance = _lags(power * parent**2, level)[2:3, 2:3]
+    to_parent = level.grid.autocovariance(power, own, parent)[1:4, 1:4].reshape(-1, 1)
+    variance = level.grid.autocovariance(power, parent, parent)[2:3, 2:3]
     return np.block([[spatial, to_parent], [to_parent.T, variance]])
-
-
-def _lags(weighted: NDArray[np.float64], level: Level) -> NDArray[np.float64]:
-    """Return the covariance at lags -2..2 along rows and columns of a power on a half spectrum."""
-    lag = np.arange(-2, 3)
-    return np.asarray(level.grid.autocovariance(weighted)[lag[:, None], lag])
 
 
 def mixture_of(c_w: NDArray[np.float64], c_y: NDArray[np.float64]) -> Mixture:

@@ -15,14 +15,15 @@ is filtered as in 2007, its blocks taken to be independent though they may overl
 """
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.denoising.arguments import Noise, checked
-from analysis.denoising.bm3d_filtering import MOST, Groups, Shrinkage, bit_reversed, filter_groups
+from analysis.denoising.bm3d_filtering import filter_groups
+from analysis.denoising.bm3d_groups import MOST, Groups, Sums, bit_reversed
 from analysis.denoising.bm3d_matching import match_blocks
+from analysis.denoising.bm3d_shrinkage import Shrinkage
 from analysis.denoising.bm3d_transforms import BLOCK, bior15, coefficient_covariances, dct
 from analysis.denoising.opponent import image_of, planes_of
 from analysis.denoising.spectrum import NoiseSpectrum
@@ -40,28 +41,7 @@ LEAST_VARIANCE = 1e-6  # of a coefficient; where a spectrum says 0 a weight woul
 
 
 def bm3d(image: NDArray[np.float32], noise: Noise, *, threads: int = 1) -> NDArray[np.float32]:
-    """Remove additive stationary Gaussian noise.
-
-    Parameters
-    ----------
-    image
-        (row, column) or (row, column, 3), at least 8 x 8, any unit and range; nothing is clipped.
-    noise
-        Standard deviation in the unit of the image, one for all channels or three, or the noise's
-        `NoiseSpectrum`.
-    threads
-        Number of threads; the result does not depend on it.
-
-    Returns
-    -------
-    NDArray[np.float32]
-        The estimate, shape and unit of `image`.
-
-    Raises
-    ------
-    ValueError
-        Where an argument is not as said above.
-    """
+    """Remove additive stationary Gaussian noise: a `Denoiser`, for images of 8 x 8 and more."""
     given, spectrum = checked(image, noise, BLOCK)
     planes, spectrum = planes_of(given, spectrum)
     unit = np.sqrt(float(np.trace(spectrum.at_lag_zero)) / len(spectrum.at_lag_zero))
@@ -112,7 +92,7 @@ class _Stage:
     def estimate(self, threads: int) -> NDArray[np.float32]:
         """Return the estimate, (channel, row, column): bands are filtered, then added in order."""
         height = self.planes.shape[1]
-        bands: list[_Band | None] = [None] * -(-height // ROWS_PER_BLOCK)
+        bands: list[Sums | None] = [None] * -(-height // ROWS_PER_BLOCK)
 
         def work(first: int, last: int) -> None:
             for top in range(first, last, ROWS_PER_BLOCK):
@@ -122,12 +102,12 @@ class _Stage:
         total, weight = np.zeros_like(self.planes), np.zeros_like(self.planes)
         for band in bands:
             if band is not None:
-                rows = slice(band.start, band.start + band.total.shape[1])
+                rows = slice(band.top, band.top + band.total.shape[1])
                 total[:, rows] += band.total
                 weight[:, rows] += band.weight
         return total / weight
 
-    def _band(self, top: int) -> "_Band":
+    def _band(self, top: int) -> Sums:
         """Filter the groups whose reference blocks begin in the rows from `top`."""
         _, height, width = self.planes.shape
         rows, columns = (_corners(size, self.step) for size in (height, width))
@@ -139,18 +119,10 @@ class _Stage:
         start = max(0, top - REACH)
         stop = min(height, top + ROWS_PER_BLOCK + REACH + BLOCK)
         total = np.zeros((len(self.planes), stop - start, width), np.float32)
-        band = _Band(start, total, np.zeros_like(total))
+        sums = Sums(start, total, np.zeros_like(total))
         groups = Groups(places, counts, bit_reversed())
-        filter_groups(self.planes, self.basic, groups, self.shrinkage, *band)
-        return band
-
-
-class _Band(NamedTuple):
-    """Sums of the weighted estimates of rows `start`.. and of their weights."""
-
-    start: int
-    total: NDArray[np.float32]
-    weight: NDArray[np.float32]
+        filter_groups(self.planes, self.basic, groups, self.shrinkage, sums)
+        return sums
 
 
 def _corners(size: int, step: int) -> NDArray[np.intp]:

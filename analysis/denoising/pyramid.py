@@ -22,6 +22,8 @@ import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
+from dsis.compiled import kernel
+
 ORIENTATIONS = 8
 Scalar = TypeVar("Scalar", bound=np.generic)
 
@@ -55,10 +57,28 @@ class Grid:
         size = (self.rows, self.columns)
         return cast("NDArray[np.float32]", scipy.fft.irfft2(spectrum, size, norm="forward"))
 
-    def autocovariance(self, power: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the covariance at every lag of a power on the half spectrum; lag 0 first."""
-        size = (self.rows, self.columns)
-        return np.asarray(scipy.fft.irfft2(power, size, norm="forward"))
+    def autocovariance(
+        self,
+        power: NDArray[np.float64],
+        a: NDArray[np.float32],
+        b: NDArray[np.float32],
+    ) -> NDArray[np.float64]:
+        """Return the covariance of two bands of one image at lags -2..2, (5, 5), lag 0 inside.
+
+        `power` of the image, `a` and `b` of the bands' filters, all real and even, on the half
+        spectrum, (row, column): the sum of P A B cos(2 pi (f dy + g dx)) over all frequencies f, g.
+        """
+        turn = 2 * np.pi * np.arange(self.rows) / self.rows
+        along_rows = np.stack([np.cos(turn), np.cos(2 * turn), np.sin(turn), np.sin(2 * turn)])
+        sums = np.zeros((5, self.columns // 2 + 1))
+        sum_rows(power, a, b, along_rows, sums)
+        sums[:, 1:] *= 2  # the other half
+        turn = 2 * np.pi * np.arange(sums.shape[1]) / self.columns * np.arange(-2, 3)[:, None]
+        even, odd = (
+            sums[[2, 1, 0, 1, 2]],
+            sums[[4, 3, 0, 3, 4]] * np.sign(np.arange(-2, 3))[:, None],
+        )
+        return np.asarray((even[:, None] * np.cos(turn) - odd[:, None] * np.sin(turn)).sum(2))
 
 
 @dataclass(frozen=True)
@@ -123,6 +143,25 @@ def polar(full: Grid, grid: Grid) -> tuple[NDArray[np.float64], NDArray[np.float
     fy = np.fft.fftfreq(grid.rows, 1 / grid.rows)[:, None] * (2 * np.pi / full.rows)
     fx = np.fft.rfftfreq(grid.columns, 1 / grid.columns) * (2 * np.pi / full.columns)
     return np.hypot(fy, fx), np.arctan2(fy, fx)
+
+
+@kernel
+def sum_rows(
+    power: NDArray[np.float64], a: NDArray[np.float32], b: NDArray[np.float32],
+    weights: NDArray[np.float64], sums: NDArray[np.float64],
+) -> None:  # fmt: skip
+    """Add to sums[0] the sum over the rows of P A B, to sums[1 + k] that times weights[k, row]."""
+    for y in range(power.shape[0]):
+        p, q, r = power[y], a[y], b[y]
+        w0, w1, w2, w3 = weights[0, y], weights[1, y], weights[2, y], weights[3, y]
+        for i in range(power.shape[1]):
+            x = np.uintp(i)
+            value = p[x] * q[x] * r[x]
+            sums[0, x] += value
+            sums[1, x] += w0 * value
+            sums[2, x] += w1 * value
+            sums[3, x] += w2 * value
+            sums[4, x] += w3 * value
 
 
 def good_odd_size(least: int) -> int:

@@ -10,12 +10,12 @@ generalized Anscombe transformation for Poisson-Gaussian noise", IEEE Trans. Ima
 """
 
 from dataclasses import dataclass
-from typing import Literal, Protocol, get_args
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from analysis.denoising.arguments import Noise
+from analysis.denoising.arguments import Denoiser
 from analysis.denoising.spectrum import NoiseSpectrum
 
 Shot = Literal["gaussian", "poisson"]
@@ -24,15 +24,6 @@ NODES = (
     4096  # of the tabulated inverse: the error of its chords stays below 0.01 standard deviations
 )
 DEVIATES = np.linspace(-6, 6, 121)
-
-
-class Denoiser(Protocol):
-    """A function as `bm3d` and `bls_gsm` are."""
-
-    def __call__(
-        self, image: NDArray[np.float32], noise: Noise, *, threads: int = 1
-    ) -> NDArray[np.float32]:
-        """Return the estimate."""
 
 
 @dataclass(frozen=True)
@@ -177,10 +168,8 @@ def stabilised(
 
     Parameters
     ----------
-    denoiser
-        `bm3d` or `bls_gsm`.
-    image
-        (row, column) or (row, column, 3), above black; noise variance slope * x + intercept.
+    denoiser, image, threads
+        See `Denoiser`; the image above black, its noise of variance slope * x + intercept.
     slope, intercept, lower
         One number, or one a read-out segment, (segment,); for channels of different noise (white
         balance, demosaicking) (segment, 3). `lower` is where a segment begins, the first at -inf.
@@ -188,13 +177,6 @@ def stabilised(
         "gaussian" or "poisson": which distribution the shot noise has.
     correlation
         Spectrum of the noise where it is not white; only its correlation counts.
-    threads
-        Number of threads; the result does not depend on it.
-
-    Returns
-    -------
-    NDArray[np.float32]
-        The estimate, shape and unit of `image`.
 
     Raises
     ------

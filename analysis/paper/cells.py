@@ -1,6 +1,6 @@
 """The fields that Table 2 denoises: two kinds of noise, at stage 2 or 3, demosaicked or not."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -53,12 +53,12 @@ class Cell:
         return np.asarray(np.sqrt(square.mean(axis=(0, 1))))
 
 
-def cells(city: Scene, frame: int) -> Iterator[Cell]:
-    """Yield the twelve fields of a frame; stages 2 and 3 carry the same noise."""
+def cells(city: Scene, frame: int, methods: Sequence[str] = ALL_METHODS) -> Iterator[Cell]:
+    """Yield the fields of a frame, three for each method; stages 2 and 3 carry the same noise."""
     clean = city.clean(frame)
     reference = city.rendering.reference(clean)
     white, noisy = city.white(reference, frame), city.noisy(clean, frame)
-    for method in ALL_METHODS:
+    for method in methods:
         seen = [city_display(city, x, method) for x in (white, reference)]
         yield Cell("awgn", 3, method, *seen)
         balanced = [city_balanced(city, x, method) for x in (noisy, clean)]

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from analysis.figures import draw_mos
+from analysis.figures_mos import draw_mos
 from analysis.paper.part import Part, Picture, Row
 from analysis.paper.published import MOS_LOSS, OBSERVERS, REMOVED_SHARE
 from analysis.paper.scene import Scene, scene

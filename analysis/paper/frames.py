@@ -33,13 +33,14 @@ class FrameScore:
     Attributes
     ----------
     psnr_db, psnr_still_db
-        Against the reference, and against the noise-free frame that went the same way.
+        Against the reference, and against the noise-free frame that went the same way; None where
+        that was not measured (`Setting.compared_frames`).
     factor, factor_still
         Of the true standard deviation, for the one and for the other.
     """
 
     psnr_db: float
-    psnr_still_db: float
+    psnr_still_db: float | None
     factor: float
     factor_still: float
 
@@ -56,7 +57,9 @@ def read_frames(folder: Path) -> list[dict[Key, FrameScore]]:
             if int(number) == len(frames):
                 frames.append({})
             key = (noise, int(stage), method, name, adapted == "true")
-            frames[int(number)][key] = FrameScore(*map(float, values))
+            first, still, *factors = values
+            score = FrameScore(float(first), float(still) if still else None, *map(float, factors))
+            frames[int(number)][key] = score
     return frames
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 from analysis.paper.claims import recompute as claims
+from analysis.paper.denoised import measure as denoised_frames
 from analysis.paper.equation5 import recompute as equation5
 from analysis.paper.fig1 import recompute as fig1
 from analysis.paper.fig2 import recompute as fig2
@@ -25,6 +26,8 @@ from dsis.outdir import UNFINISHED, result_folder
 
 PAGE = "paper.html"
 WRITTEN = frozenset({".html", ".csv", ".md", ".svg", ".png", ".new"})
+
+DENOISED = frozenset({"claims", "table2"})  # the parts that need Table 2's frames
 
 Recompute: TypeAlias = Callable[[Setting, Path], Part]
 
@@ -79,19 +82,34 @@ def write_paper(
         raise InputError([Fault("", "NAME", f"is {name!r}, {allowed}") for name in unknown])
     wanted = [name for name in PARTS if name in names or not names]
     _check_votes(setting, wanted)
+    frames = 0 if DENOISED.isdisjoint(wanted) else setting.denoised_frames
+    # The claims stand first on the page, and need what the others compute.
+    order = sorted(wanted, key=lambda name: name == "claims")
     parts: dict[str, Part] = {}
+
+    def tell(done: int, what: str) -> None:
+        if progress is not None:
+            progress(done, len(wanted) + frames, what)
+
+    def tell_frame(frame: int) -> None:
+        tell(frame, f"frame {frame + 1} of {frames} of table2")
+
     with result_folder(out, PAGE, keep=_not_ours, resume=_digest(setting, wanted)) as folder:
-        # The claims stand first on the page, and need what the others compute.
-        for done, name in enumerate(sorted(wanted, key=lambda name: name == "claims")):
-            if progress is not None:
-                progress(done, len(wanted), name)
+        if frames:  # they take longest, and come first: they alone outlast an interruption
+            denoised_frames(setting, folder, tell_frame)
+        for done, name in enumerate(order):
+            tell(frames + done, name)
             parts[name] = PARTS[name](setting, folder)
-            for table in parts[name].all_tables():
-                (folder / f"{table.name}.csv").write_bytes(table.csv().encode())
-                (folder / f"{table.name}.md").write_bytes(table.markdown().encode())
+            _write_tables(parts[name], folder)
         found = tuple(parts[name] for name in wanted)
         (folder / PAGE).write_bytes(render(found, setting, folder).encode())
     return found
+
+
+def _write_tables(part: Part, folder: Path) -> None:
+    for table in part.all_tables():
+        (folder / f"{table.name}.csv").write_bytes(table.csv().encode())
+        (folder / f"{table.name}.md").write_bytes(table.markdown().encode())
 
 
 def _check_votes(setting: Setting, wanted: Sequence[str]) -> None:

@@ -1,16 +1,16 @@
 """The page of a report: HTML that holds its style and its figures."""
 
-from base64 import b64encode
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import jinja2
 import numpy as np
 import pandas as pd
 
-from analysis.figures import DEMOSAICKERS, NOISES, condition_name, has_conditions, simulated_mark
+from analysis.figures import DEMOSAICKERS, NOISES, condition_name, simulated_mark
+from analysis.figures_mos import has_conditions
 from analysis.inference.design import CELL
+from analysis.page import embedded, render_page
 from analysis.report.methods import methods
 from analysis.report.remarks import observer_name
 from analysis.report.results import Results
@@ -22,56 +22,55 @@ from dsis import __version__
 REMOVED_SHOWN = 200
 SCORES_SHOWN = 300
 EFFECTS_SHOWN = 60
+TEMPLATE = Path(__file__).with_name("report.html.jinja")
 
 
 def render(
     results: Results, test: Description, votes_name: str, figures: Mapping[str, bytes]
 ) -> str:
     """Return the page; `figures` holds the SVG of each figure by name."""
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(Path(__file__).parent),
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        undefined=jinja2.StrictUndefined,
-    )
-    environment.filters["grade"] = _grade
-    environment.filters["percent"] = lambda share: f"{100 * share:.1f} %"
-    environment.filters["chance"] = _chance
     paragraphs, references = methods(results, test.scale)
-    return environment.get_template("report.html.jinja").render(
-        title=test.title or "Mean opinion scores",
-        scale=test.scale,
-        votes_name=votes_name,
-        counts=results.counts,
-        options=results.options,
-        mark=simulated_mark(results.counts.simulated_share),
-        remarks=results.remarks,
-        conclusions=results.conclusions,
-        figures={name: b64encode(svg).decode("ascii") for name, svg in figures.items()},
-        conditions=has_conditions(results.scores),
-        levels=len(results.scores["level"].dropna().unique()) > 1,
-        scores=_named(results.scores)[:SCORES_SHOWN],
-        more_scores=max(0, len(results.scores) - SCORES_SHOWN),
-        n_removed=int(results.scores["n_removed"].sum()),
-        dmos=[row | {"kind": "test"} for row in _named(results.dmos)][:SCORES_SHOWN],
-        models=_rows(results.models),
-        sos=results.sos,
-        retest=results.retest,
-        order=_rows(results.order),
-        contrasts=_compared(results.contrasts)[:EFFECTS_SHOWN],
-        effects=_compared(averages(results.modelled.effects))[:EFFECTS_SHOWN],
-        modelled=results.modelled,
-        stimuli=results.stimuli,
-        observers=_observer_rows(results),
-        proposal=_with_names(results.proposal),
-        threshold=float(results.correlation["threshold"].iloc[0]),
-        removed=_with_names(results.removed)[:REMOVED_SHOWN],
-        methods=paragraphs,
-        references=references,
-        tables={name: codebook(columns) for name, columns in columns_of(results.options).items()},
-        version=__version__,
-    )
+    values = {
+        "title": test.title or "Mean opinion scores",
+        "scale": test.scale,
+        "votes_name": votes_name,
+        "counts": results.counts,
+        "options": results.options,
+        "mark": simulated_mark(results.counts.simulated_share),
+        "remarks": results.remarks,
+        "conclusions": results.conclusions,
+        "figures": {name: embedded(svg) for name, svg in figures.items()},
+        "conditions": has_conditions(results.scores),
+        "levels": len(results.scores["level"].dropna().unique()) > 1,
+        "scores": _named(results.scores)[:SCORES_SHOWN],
+        "more_scores": max(0, len(results.scores) - SCORES_SHOWN),
+        "n_removed": int(results.scores["n_removed"].sum()),
+        "dmos": [row | {"kind": "test"} for row in _named(results.dmos)][:SCORES_SHOWN],
+        "models": _rows(results.models),
+        "sos": results.sos,
+        "retest": results.retest,
+        "order": _rows(results.order),
+        "contrasts": _compared(results.contrasts)[:EFFECTS_SHOWN],
+        "effects": _compared(averages(results.modelled.effects))[:EFFECTS_SHOWN],
+        "modelled": results.modelled,
+        "stimuli": results.stimuli,
+        "observers": _observer_rows(results),
+        "proposal": _with_names(results.proposal),
+        "threshold": float(results.correlation["threshold"].iloc[0]),
+        "removed": _with_names(results.removed)[:REMOVED_SHOWN],
+        "methods": paragraphs,
+        "references": references,
+        "tables": {
+            name: codebook(columns) for name, columns in columns_of(results.options).items()
+        },
+        "version": __version__,
+    }
+    filters = {
+        "grade": _grade,
+        "percent": lambda share: f"{100 * share:.1f} %",
+        "chance": _chance,
+    }
+    return render_page(TEMPLATE, values, filters)
 
 
 def _grade(value: Any, digits: int = 2) -> str:

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from analysis.figures import draw_mos
+from analysis.figures_mos import draw_mos
 from analysis.figures_observers import draw_flagged, draw_observers, draw_scale_use
 from analysis.figures_votes import draw_contrasts, draw_order, draw_votes
 from analysis.models import p910

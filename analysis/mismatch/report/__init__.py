@@ -1,12 +1,10 @@
 """The report of a diagnosis: one self-contained page that needs no network."""
 
-from base64 import b64encode
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import jinja2
 import numpy as np
 
 from analysis.mismatch.evidence import Evidence
@@ -32,6 +30,7 @@ from analysis.mismatch.report.words import (
     statistic_words,
     unit,
 )
+from analysis.page import embedded, render_page
 from dsis import __version__
 
 HEADLINES = {
@@ -40,6 +39,7 @@ HEADLINES = {
     "omitted_physics": "The simulation leaves out physics",
     "unexplained": "Something differs that is not explained",
 }
+TEMPLATE = Path(__file__).with_name("report.html.jinja")
 _FIRST_PAGE = 8  # kinds of departure listed before the details
 _SAID = 3  # sentences below a picture
 
@@ -82,14 +82,7 @@ def render(
     finding: Finding, shown: Sequence[dict[str, Any]], ladder_svg: str, origin: str = ""
 ) -> str:
     """Return the page: HTML that holds its style and its figures."""
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(Path(__file__).parent),
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        undefined=jinja2.StrictUndefined,
-    )
-    environment.filters |= {
+    filters: dict[str, Callable[..., Any]] = {
         "plain": plain,
         "gain": gain,
         "statistic": statistic_words,
@@ -101,26 +94,27 @@ def render(
     }
     evidence = finding.evidence if isinstance(finding.evidence, Evidence) else Evidence()
     differences = _differences([*finding.mismatches, *_only_unexplained(finding)])
-    return environment.get_template("report.html.jinja").render(
-        finding=finding,
-        headline=HEADLINES[finding.verdict],
-        verdict=verdict(finding),
-        origin=[line for line in origin.splitlines() if line],
-        effects=[(e, _parameters(e.parameters.items())) for e in finding.omitted_physics],
-        differences=differences[:_FIRST_PAGE],
-        more=len(differences) - _FIRST_PAGE,
-        mismatches=strongest(finding.mismatches),
-        unexplained=strongest(finding.unexplained),
-        errors=[(e, measured(e.recorded, e.standard_error)) for e in finding.parameter_errors],
-        considered=considered(finding),
-        proof=finding.proof,
-        locked=_locked(finding),
-        evidence=evidence,
-        pictures=shown,
-        ladder=ladder_svg,
-        interval=interval,
-        version=__version__,
-    )
+    values = {
+        "finding": finding,
+        "headline": HEADLINES[finding.verdict],
+        "verdict": verdict(finding),
+        "origin": [line for line in origin.splitlines() if line],
+        "effects": [(e, _parameters(e.parameters.items())) for e in finding.omitted_physics],
+        "differences": differences[:_FIRST_PAGE],
+        "more": len(differences) - _FIRST_PAGE,
+        "mismatches": strongest(finding.mismatches),
+        "unexplained": strongest(finding.unexplained),
+        "errors": [(e, measured(e.recorded, e.standard_error)) for e in finding.parameter_errors],
+        "considered": considered(finding),
+        "proof": finding.proof,
+        "locked": _locked(finding),
+        "evidence": evidence,
+        "pictures": shown,
+        "ladder": ladder_svg,
+        "interval": interval,
+        "version": __version__,
+    }
+    return render_page(TEMPLATE, values, filters)
 
 
 def _differences(mismatches: Iterable[Mismatch]) -> list[Difference]:
@@ -181,4 +175,4 @@ def _shown(picture: Picture, figures: Path) -> dict[str, Any]:
 
 
 def _embedded(picture: Picture, figures: Path) -> str:
-    return b64encode(save(picture, figures)).decode("ascii")
+    return embedded(save(picture, figures))

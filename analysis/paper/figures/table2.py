@@ -13,8 +13,8 @@ from analysis.figures import COLOURS, DEMOSAICKERS, GREY, INK, MARKS
 from analysis.paper.figures.style import draw
 
 if TYPE_CHECKING:
+    from analysis.paper.denoised import Score
     from analysis.paper.frames import Key
-    from analysis.paper.table2 import Score
 
 KINDS = {("awgn", 3): "AWGN / 3", ("sd", 3): "SD / 3", ("sd", 2): "SD / 2"}
 REFERENCES: dict[str, Callable[["Score"], float]] = {

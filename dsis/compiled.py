@@ -7,6 +7,7 @@ every processor that rounds as IEEE 754 says.
 """
 
 import hashlib
+import inspect
 import os
 import shutil
 import sys
@@ -18,7 +19,9 @@ from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba
-from numba.core import event
+from numba.core import event, types
+from numba.extending import intrinsic
+from numba.misc.appdirs import AppDirs
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -51,9 +54,7 @@ def kernel(function: F) -> F:
     """
     settings: Any = numba.config
     default = settings.CACHE_DIR
-    folder = _cache(Path(function.__code__.co_filename).parent)
-    if not default and os.access(folder.parent, os.W_OK):
-        settings.CACHE_DIR = str(folder)
+    settings.CACHE_DIR = str(_cache(Path(function.__code__.co_filename).parent, default))
     try:
         compiled = numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=False)(function)
     finally:
@@ -62,16 +63,21 @@ def kernel(function: F) -> F:
 
 
 @lru_cache(maxsize=64)
-def _cache(package: Path) -> Path:
+def _cache(package: Path, given: str) -> Path:
     """Return where the compiled kernels of a folder lie; old ones are removed.
 
     The compiler's own cache looks at the file of a kernel only, and would keep what calls another.
+    They lie beside the sources, else in the user's cache; in `given` (NUMBA_CACHE_DIR) if not "".
     """
     stamp = hashlib.blake2b(digest_size=6)
-    for file in sorted(package.glob("*.py")):
+    for file in (Path(__file__), *sorted(package.glob("*.py"))):
         stat = file.stat()
         stamp.update(f"{file.name} {stat.st_size} {stat.st_mtime_ns}\n".encode())
     caches = package / "__pycache__"
+    if given or not os.access(caches if caches.exists() else package, os.W_OK):
+        place = hashlib.blake2b(str(package.resolve()).encode(), digest_size=6).hexdigest()
+        shared = given or AppDirs("dsis", appauthor=False).user_cache_dir  # type: ignore[no-untyped-call] # numba has no types
+        caches = Path(shared) / f"{package.name}-{place}"
     wanted = caches / f"kernels-{stamp.hexdigest()}"
     if not wanted.exists():
         for earlier in caches.glob("kernels-*"):
@@ -85,10 +91,35 @@ def inlined(function: F) -> F:
 
     It must stand in the file of the kernels that call it: the cache on disk follows that file only.
     """
-    compiled = numba.njit(nogil=True, error_model="numpy", fastmath=False, inline="always")(
+    compiled = numba.njit(nogil=True, error_model="numpy", fastmath=False, forceinline=True)(
         function
     )
     return cast("F", compiled)
+
+
+def emitted(emit: Callable[..., object]) -> Callable[..., None]:
+    """Make a function for kernels out of one that emits LLVM instructions.
+
+    For what Python cannot say, stores past the cache for example. `emit` is called with an
+    `llvmlite.ir.IRBuilder` and the kernel's arguments: numbers, and pointers to the first element
+    of arrays, which must be contiguous.
+    """
+
+    def typed(typing: object, *kinds: Any) -> tuple[Any, Callable[..., Any]]:
+        del typing
+
+        def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+            def plain(kind: Any, value: Any) -> Any:
+                array = isinstance(kind, types.Array)
+                return context.make_array(kind)(context, builder, value).data if array else value
+
+            emit(builder, *map(plain, signature.args, values))
+            return context.get_dummy_value()
+
+        return types.void(*kinds), generate
+
+    typed.__signature__ = inspect.signature(emit)  # type: ignore[attr-defined] # what calls are checked against
+    return cast("Callable[..., None]", intrinsic(typed))
 
 
 def over_rows(work: Callable[[int, int], None], rows: int, threads: int = 1) -> None:
@@ -106,11 +137,18 @@ def over_rows(work: Callable[[int, int], None], rows: int, threads: int = 1) -> 
     if threads <= 1 or rows <= ROWS_PER_BLOCK:
         work(0, rows)
         return
-    blocks = [(r, min(r + ROWS_PER_BLOCK, rows)) for r in range(0, rows, ROWS_PER_BLOCK)]
-    with ThreadPoolExecutor(threads) as pool:
+    blocks = iter(range(0, rows, ROWS_PER_BLOCK))  # shared: each block goes to who asks first
+
+    def take() -> None:
         try:
-            for done in [pool.submit(work, first, last) for first, last in blocks]:
-                done.result()
-        except BaseException:
-            pool.shutdown(cancel_futures=True)  # who interrupts does not wait for every block
-            raise
+            for first in blocks:
+                work(first, min(first + ROWS_PER_BLOCK, rows))
+        finally:
+            for _ in blocks:  # who fails or is interrupted does not wait for every block
+                pass
+
+    with ThreadPoolExecutor(threads - 1) as pool:
+        others = [pool.submit(take) for _ in range(threads - 1)]
+        take()
+        for other in others:
+            other.result()

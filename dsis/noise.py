@@ -40,7 +40,8 @@ class Segments:
     @classmethod
     def of(cls, segments: Sequence[tuple[float, float, float]]) -> "Segments":
         """Return segments from (lower_dn, slope_dn, intercept_dn2) in ascending order."""
-        lower, slope, intercept = np.asarray(segments, np.float32).T
+        # Contiguous, so that two segments need no kernels of their own.
+        lower, slope, intercept = np.ascontiguousarray(np.asarray(segments, np.float32).T)
         return cls(lower, slope, intercept)
 
     def index(self, signal_dn: NDArray[np.float32]) -> NDArray[np.intp]:
@@ -65,7 +66,7 @@ def awgn(
     out = np.empty(image.shape, np.float32)
     for top, end in _spans(0, grid.rows, out):
         _add_white(
-            image[top:end].reshape(-1),
+            _flat(image[top:end]),
             draw.normal_rows("awgn", grid, frame, top, end).reshape(-1),
             out[top:end].reshape(-1),
             np.float32(sigma),
@@ -87,7 +88,7 @@ def shot_noise(
     def block(first: int, last: int) -> None:
         for top, end in _spans(first, last, out):
             _add_shot(
-                expected_dn[top:end].reshape(-1),
+                _flat(expected_dn[top:end]),
                 draw.normal_rows("shot_noise", grid, frame, top, end).reshape(-1),
                 out[top:end].reshape(-1),
                 segments.lower_dn,
@@ -115,8 +116,8 @@ def read_noise(
     def block(first: int, last: int) -> None:
         for top, end in _spans(first, last, out):
             _add_read(
-                signal_dn[top:end].reshape(-1),
-                expected_dn[top:end].reshape(-1),
+                _flat(signal_dn[top:end]),
+                _flat(expected_dn[top:end]),
                 draw.normal_rows("read_noise", grid, frame, top, end).reshape(-1),
                 out[top:end].reshape(-1),
                 segments.lower_dn,
@@ -148,6 +149,11 @@ def _spans(first: int, last: int, field: NDArray[np.float32]) -> Iterator[tuple[
     rows = max(1, _SAMPLES_IN_CACHE * len(field) // max(1, field.size))
     for top in range(first, last, rows):
         yield top, min(top + rows, last)
+
+
+def _flat(rows: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return rows as one line that could be written: read-only ones need kernels of their own."""
+    return np.require(rows.reshape(-1), requirements=["C", "W"])
 
 
 @kernel

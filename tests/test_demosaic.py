@@ -8,7 +8,7 @@ from OpenImageIO import UINT8, ImageBuf
 from scipy import ndimage
 
 from dsis.cfa import Cfa, mosaic, pattern
-from dsis.demosaic import METHODS, demosaic
+from dsis.demosaic import METHODS, bilinear, demosaic
 from dsis.demosaic.lu_tan import lu_tan
 
 BAYER = [cfa for cfa in Cfa if cfa is not Cfa.MONO]
@@ -305,6 +305,28 @@ def test_threads_change_no_byte(name, threads):
     assert run(name, samples, Cfa.GBRG, threads=threads).tobytes() == alone.tobytes()
 
 
+@given(
+    cfa=st.sampled_from(BAYER),
+    shape=st.tuples(st.integers(8, 12), st.one_of(st.integers(8, 24), st.integers(25, 90))),
+    offset=st.integers(0, 16),
+    past_the_cache=st.booleans(),
+)
+@settings(deadline=None, derandomize=True, max_examples=60)  # the first example compiles
+def test_bilinear_writes_the_same_anywhere_in_memory(cfa, shape, offset, past_the_cache):
+    samples = noise(*shape)
+    size = 3 * samples.size
+    space = np.full(size + 40, np.nan, np.float32)
+    out = space[offset : offset + size].reshape(*shape, 3)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(bilinear, "_CACHED_BYTES", 0 if past_the_cache else 1 << 40)
+        demosaic(samples, cfa, "bilinear", out=out)
+    expected = bilinear_reference(samples, cfa, 1.0)
+    error = ERROR["bilinear"] * np.abs(samples).max()
+    np.testing.assert_allclose(out, expected, rtol=0, atol=error)
+    assert np.isnan(space[:offset]).all()
+    assert np.isnan(space[offset + size :]).all()
+
+
 # Arguments.
 
 
@@ -351,6 +373,9 @@ def test_refuses_an_unknown_method_a_wrong_scale_and_an_overlap():
             demosaic(samples, Cfa.RGGB, "dlmmse", full_scale=full_scale)
         with pytest.raises(ValueError, match="full_scale"):
             demosaic(samples, Cfa.RGGB, "lu_tan", full_scale=full_scale)
+    bytes_between = np.zeros(4 * 243 + 1, np.uint8)[1:].view(np.float32).reshape(9, 9, 3)
+    with pytest.raises(ValueError, match="aligned"):
+        demosaic(samples, Cfa.RGGB, "bilinear", out=bytes_between)
     image = noise(9, 9, 3)
     with pytest.raises(ValueError, match="overlaps"):
         demosaic(image[..., 0], Cfa.RGGB, "bilinear", out=image)

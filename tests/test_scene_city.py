@@ -9,12 +9,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from dsis.scenes import Strip, panorama, preset_strip, render
 from dsis.scenes.city import light as sunlight
-from dsis.scenes.city import panorama, render
 from dsis.scenes.city.cells import sort_into_cells
 from dsis.scenes.city.lighting import Light
+from dsis.scenes.city.panorama import city
 from dsis.scenes.city.patterns import bars, smooth
-from dsis.scenes.city.plan import Ground, street_plan
+from dsis.scenes.city.plan import Ground, is_bridged, street_plan
 from dsis.scenes.city.rays import outward, trace
 from dsis.scenes.city.solids import DETAILED_M, Kind, Solid, table
 from dsis.scenes.city.streets import plan_place
@@ -27,40 +28,27 @@ EXAMPLES = settings(max_examples=60, deadline=None)
 
 @cache
 def quick() -> NDArray[np.float32]:
-    image = render(1, 270, 600)
-    image.flags.writeable = False
-    return image
+    """Return what comes with dsis: `test_scenes_shipped.py` holds it against the renderer."""
+    return panorama(preset_strip("quick", "city", 1))
 
 
 def pixels() -> NDArray[np.float32]:
     """Return the picture as a sensor of half the resolution has it."""
-    means: NDArray[np.float32] = quick().reshape(135, 2, 300, 2, 3).mean(axis=(1, 3))
+    means: NDArray[np.float32] = quick().reshape(270, 2, 730, 2, 3).mean(axis=(1, 3))
     return means
 
 
-def test_the_same_bytes_from_any_threads_and_any_call_and_more_of_the_same_when_wider() -> None:
-    told: list[tuple[int, int]] = []
-    first = render(5, 48, 200, samples=2)
-    again = render(5, 48, 200, samples=2, threads=2, progress=lambda *done: told.append(done))
-    assert first.dtype == np.float32
-    assert first.shape == (48, 200, 3)
-    assert first.tobytes() == again.tobytes()
-    assert max(told) == (200, 200)
-    assert len(set(told)) == len(told) > 4
-    narrow = render(5, 48, 60, samples=2)
-    assert narrow.tobytes() == np.ascontiguousarray(first[:, :60]).tobytes()
-    other = render(6, 48, 60, samples=2)
-    assert np.abs(other - narrow).mean() > 0.03
-    # The same points in every pixel: more of them sharpen edges, surfaces do not sparkle.
-    fine = render(5, 48, 60, samples=12)
-    difference = np.abs(narrow - fine).max(axis=2)
+def test_more_samples_sharpen_edges_and_surfaces_do_not_sparkle() -> None:
+    """The same points in every pixel; the sky is painted once, whatever the samples."""
+    coarse, fine = (render(Strip("city", 5, 48, 40, samples)) for samples in (2, 12))
+    difference = np.abs(coarse - fine).max(axis=2)
     assert np.median(difference) < 0.03
-    assert difference[:8].max() < 1e-5  # the sky: painted once, whatever the samples
+    assert difference[:8].max() < 1e-5
 
 
 def test_a_wide_pan_meets_no_end() -> None:
     """More than half a turn: everywhere a city, no column far darker than others."""
-    image = render(3, 32, 300, samples=1, ambient=1)
+    image = render(Strip("city", 3, 32, 300, 1, 1))
     assert np.isfinite(image).all()
     columns = image[16:].mean(axis=(0, 2))
     assert np.percentile(columns, 2) > 0.2 * np.median(columns)
@@ -81,7 +69,7 @@ def test_exposure_and_range() -> None:
 
 def test_shadows_are_bluer_than_sunlight() -> None:
     """Roofs and streets share their colours; what the sky alone lights is bluer."""
-    city = pixels()[60:]
+    city = pixels()[120:, :600]  # below the sky, and not only the river
     luminance = city @ REC709_LUMINANCE
     low, high = np.percentile(luminance, [30, 70])
     blueness = city[..., 2] / luminance
@@ -101,6 +89,10 @@ def test_the_plan_has_a_river_and_houses_and_no_overlap() -> None:
     plan = street_plan(7)
     assert (plan.grounds == Ground.RIVER).all(axis=1).sum() == 1
     assert (plan.grounds == Ground.HOUSES).mean() > 0.5
+    bridged = [j for j in range(60) if is_bridged(7, j)]
+    assert 5 <= len(bridged) <= 20
+    assert min(np.diff(bridged)) >= 3
+    assert len(set(np.diff(bridged))) > 1
     for low, high in ((plan.a_low, plan.a_high), (plan.b_low, plan.b_high)):
         assert (high > low).all()
         assert (low[1:] - high[:-1] >= 10).all()  # streets
@@ -184,7 +176,7 @@ def test_perspective_and_shadow_have_the_right_size() -> None:
     image = np.zeros((300, 200, 3), np.float32)
     points = np.full((4, 2), 0.5)
     trace_columns(image, rows, cells, street_plan(1), light, points, 74.0, -100 * pixel, horizon,
-                  pixel, 0, 200)  # fmt: skip
+                  pixel)  # fmt: skip
     seen = image[..., 1] > 0
     height, width = 2000 * (124 - 74) / 490, 2000 * 2 * math.atan(10 / 490)
     assert seen[:, 100].sum() == pytest.approx(height, abs=1.1)
@@ -234,6 +226,6 @@ def test_noise_is_bounded_and_continuous(x: float, y: float, seed: int) -> None:
 
 
 def test_near_blocks_are_furnished() -> None:
-    solids = panorama.city(street_plan(1), 0.2)
+    solids = city(street_plan(1), 0.2)
     near = {s.kind for s in solids if math.hypot(s.x, s.y) < DETAILED_M}
     assert near == set(Kind)

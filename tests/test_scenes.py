@@ -1,6 +1,8 @@
 """City and Landscape: reproducible, free of grain, with the range and the detail a test needs."""
 
 import math
+from collections.abc import Iterator
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -10,6 +12,7 @@ from scipy.ndimage import sobel
 
 from dsis.errors import InputError
 from dsis.scenes import SCENES, Strip, panorama, preset_strip, render
+from dsis.workers import Workers, workers
 
 REC709_LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)  # ITU-R BT.709-6, item 3.2
 SCENE = pytest.mark.parametrize("name", SCENES)
@@ -42,22 +45,35 @@ def spatial_information(luma: NDArray[np.float32]) -> float:
 
 
 @SCENE
-def test_a_seed_fixes_every_byte_and_a_wider_strip_shows_more_of_the_same(name: str) -> None:
-    """To the last bit, on one thread and two: the cache serves a part of a wider panorama."""
+def test_a_seed_fixes_every_byte_whoever_renders_and_a_wider_strip_shows_more_of_the_same(
+    name: str, processes: Workers
+) -> None:
+    """To the last bit, on one thread, two, and two processes: the cache serves a part of each."""
     told: list[tuple[int, int, str]] = []
-    wide = render(Strip(name, 5, 48, 135), 2, lambda *words: told.append(words))
-    narrow = render(Strip(name, 5, 48, 64), 1)
+    strip = Strip(name, 3, 48, 135)
+    wide = render(strip, 2, lambda *words: told.append(words))
+    apart = render(strip, pool=processes)
+    narrow = render(replace(strip, columns=64), 1)
     assert narrow.dtype == np.float32
     assert narrow.shape == (48, 64, 3)
+    assert wide.tobytes() == apart.tobytes()
     assert wide[:, :64].tobytes() == narrow.tobytes()
     assert [done for done, _, _ in told] == sorted(done for done, _, _ in told)
+    assert len(told) == 3
     assert told[-1] == (135, 135, name)
 
 
 @SCENE
 def test_another_seed_is_another_place(name: str) -> None:
-    one, other = (render(Strip(name, seed, 45, 31)) for seed in (0, 2**63 - 1))
+    one = rendered(name, 90, 100)[:, :31]
+    other = render(Strip(name, 2**63 - 1, 90, 31))
     assert np.abs(one - other).mean() > 0.02
+
+
+@pytest.fixture(scope="module")
+def processes() -> Iterator[Workers]:
+    with workers(2, kind="processes") as pool:
+        yield pool
 
 
 @SCENE

@@ -102,6 +102,40 @@ def test_other_code_finds_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     assert ask.times == 2
 
 
+def test_what_other_code_made_of_the_scene_is_removed_and_said(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    ask = Renderer()
+    others = [Strip("city", 7, 32, 60), Strip("city", 8, 33, 40, samples=2)]
+    for strip in (*others, Strip("landscape", 7, 32, 40)):
+        ask(strip)
+    (folder / "city-7.exr").write_bytes(b"somebody's own")
+    before = {path.name for path in folder.iterdir()}
+    assert "another version" not in caplog.text
+    monkeypatch.setattr(cache, "code_version", lambda _scene: "0123456789abcdef")
+    ask(STRIP)
+    left = {path.name for path in folder.iterdir()}
+    gone = {name.rsplit("-", 1)[0] for name in before - left}
+    assert gone == {"city-7-32x60-s4a4", "city-8-33x40-s2a4"}
+    assert {"city-7.exr"} < left
+    assert is_kept(STRIP)
+    assert f"{folder}: removed 2 of city that another version of dsis rendered, 0 MB" in caplog.text
+    assert len(caplog.records) == 1
+
+
+def test_what_other_code_is_rendering_is_left_alone(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    ask, new = Renderer(), "0123456789abcdef"
+    ask(STRIP)
+    held = {path.name for path in folder.iterdir()}
+    with cache._held(STRIP):
+        monkeypatch.setattr(cache, "code_version", lambda _scene: new)
+        ask(STRIP)
+    assert held < {path.name for path in folder.iterdir()}
+    assert caplog.text == ""
+
+
 def test_the_code_version_follows_what_renders(tmp_path: Path) -> None:
     """Every source that a scene's renderer may use counts; the keeping of panoramas does not."""
     package = tmp_path / "dsis" / "scenes"
@@ -132,8 +166,11 @@ def test_the_code_version_follows_what_renders(tmp_path: Path) -> None:
 
 
 def test_nothing_else_of_dsis_renders() -> None:
-    """What renderers import from outside their package is in the code version too, or errors."""
-    known = {"errors", *(name.removesuffix(".py") for name in renderer.OUTSIDE)}
+    """What renderers import from outside their package is in the code version too.
+
+    But for errors, and for the workers, who decide no byte.
+    """
+    known = {"errors", "workers", *(name.removesuffix(".py") for name in renderer.OUTSIDE)}
     folder = Path(renderer.__file__).parent
     for path in folder.rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):

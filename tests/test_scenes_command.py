@@ -41,14 +41,21 @@ def test_the_file_is_the_panorama(
     assert [path.name for path in out.parent.iterdir() if path.is_file()] == [out.name]
 
 
-def test_jobs_and_runs_give_the_same_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_jobs_runs_and_a_cluster_give_the_same_bytes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    distributed = pytest.importorskip("distributed")
     files = []
-    for run, jobs in enumerate(("1", "2", "2")):
-        monkeypatch.setenv("DSIS_CACHE", str(tmp_path / f"cache{run}"))  # each renders
-        out = tmp_path / f"{run}.exr"
-        ask = ["scenes", "city", "--preset", "quick", "--seed", "5", "--jobs", jobs]
-        assert main([*ask, "--out", str(out)]) == 0
-        files.append(out.read_bytes())
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=2, processes=False, protocol="tcp", dashboard_address=None
+    ) as cluster:
+        by = (["--jobs", "1"], ["--jobs", "2"], ["--scheduler", cluster.scheduler_address])
+        for run, workers in enumerate(by):
+            monkeypatch.setenv("DSIS_CACHE", str(tmp_path / f"cache{run}"))  # each renders
+            out = tmp_path / f"{run}.exr"
+            ask = ["scenes", "landscape", "--preset", "quick", "--seed", "5", *workers]
+            assert main([*ask, "--out", str(out)]) == 0
+            files.append(out.read_bytes())
     assert files[0] == files[1] == files[2]
 
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from dsis.optics import Optics, Pan, through_optics
-from dsis.scenes import SCENES, Strip, panorama
+from dsis.scenes import SCENES, panorama, preset_strip
 from dsis.spec import Sequence
 from dsis.stimuli.source import Slices, Window
 
@@ -28,7 +28,9 @@ ROUTES_AGREE = 1e-5  # of a white surface: what a float32 Fourier transform of t
 
 
 def strip(name: str, scale: int = 2) -> Light:
-    return panorama(Strip(name, 1, scale * ROWS, scale * (COLUMNS + TRAVEL)))
+    """Return a part, below the sky, of a panorama that comes with dsis."""
+    whole = panorama(preset_strip("quick", name, 1))
+    return whole[150 : 150 + scale * ROWS, 400 : 400 + scale * (COLUMNS + TRAVEL)]
 
 
 def pan(image: Light, speed: float, frames: int = 5, scale: int = 2) -> list[Light]:

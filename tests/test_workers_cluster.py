@@ -18,28 +18,12 @@ from dsis.imagefile import write
 from dsis.spec import read_spec
 from dsis.stimuli import build_stimuli
 from dsis.workers import WorkersLostError, _refuse_unlike, versions, workers
+from folder_bytes import every_byte
+from written_spec import write_spec
 
 distributed = pytest.importorskip("distributed")
 
 SECONDS = 60.0  # in which a cluster of this machine must stand, however busy it is
-SPEC = """\
-schema = "dsis-test/1"
-seed = 3
-formats = ["player", "png8"]
-sequence = {width = 64, height = 48, fps = 25, seconds = 0.64}
-content = [{name = "picture", files = "picture.exr", pan_px_per_frame = 0.5}]
-camera = {model = "cameras/dual_gain_cinema.toml"}
-awgn = {match = "psnr"}
-conditions = {noise = ["awgn", "sd"], demosaic = ["none", "dlmmse"], levels = [0]}
-session = {reference_s = 0.64, test_s = 0.64, training = 0}
-[color]
-[optics]
-f_number = 5.6
-wavelength_nm = 550
-pitch_um = 8.25
-low_pass_spot_separation_px = 0.75
-fill_factor = 1.0
-"""
 
 
 @pytest.fixture(scope="module")
@@ -47,8 +31,14 @@ def spec(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("spec")
     light = np.random.default_rng(0).uniform(0, 1, (56, 104, 3)).astype(np.float32)
     write(folder / "picture.exr", light, "exr")
-    (folder / "spec.toml").write_text(SPEC, encoding="utf-8")
-    return folder / "spec.toml"
+    return write_spec(
+        folder / "spec.toml",
+        formats=["player", "png8"],
+        sequence={"seconds": 0.64},
+        content=[{"name": "picture", "files": "picture.exr", "pan_px_per_frame": 0.5}],
+        conditions={"demosaic": ["none", "dlmmse"]},
+        session={"reference_s": 0.64, "test_s": 0.64},
+    )
 
 
 @pytest.fixture(scope="module")
@@ -91,14 +81,6 @@ def joined(folder: Path, contact: str) -> Any:
     client = distributed.Client(scheduler_file=contact, timeout=SECONDS, set_as_default=False)
     client.wait_for_workers(2, timeout=SECONDS)
     return client
-
-
-def every_byte(folder: Path) -> dict[str, bytes]:
-    return {
-        str(path.relative_to(folder)): path.read_bytes()
-        for path in sorted(folder.rglob("*"))
-        if path.is_file()
-    }
 
 
 def test_two_worker_processes_give_the_same_bytes(

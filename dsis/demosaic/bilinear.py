@@ -9,10 +9,11 @@ from numpy.typing import NDArray
 
 from dsis.cfa import Cfa
 from dsis.compiled import inlined, kernel, over_rows
+from dsis.demosaic.bilinear_block import PIXELS, fence, store, stream
 from dsis.demosaic.borders import Frame, frame
 
 MARGIN = 1
-_SPAN = 512  # columns: what a span reads and writes stays in the first-level cache
+_CACHED_BYTES = 1 << 24  # what is larger has left the caches before anyone reads it
 _HALF = np.float32(0.5)
 _QUARTER = np.float32(0.25)
 
@@ -48,44 +49,27 @@ def bilinear(
         Where an argument is not as said above.
     """
     given = frame(mosaic, cfa, MARGIN, out)
-    over_rows(lambda first, last: _rows(given, first, last), mosaic.shape[0], threads)
+    large = given.out.nbytes > _CACHED_BYTES
+    over_rows(lambda first, last: _rows(given, large, first, last), mosaic.shape[0], threads)
     return given.out
 
 
 @kernel
-def _rows(given: Frame, first: int, last: int) -> None:
-    """Demosaick rows first..last-1, a span of columns at a time that stays in the first cache."""
+def _rows(given: Frame, past_the_cache: bool, first: int, last: int) -> None:
+    """Demosaick rows first..last-1 in blocks; the first and the last overlap their neighbours."""
     width = given.mosaic.shape[1]
-    own, green, other = (
-        np.empty(_SPAN, np.float32),
-        np.empty(_SPAN, np.float32),
-        np.empty(_SPAN, np.float32),
-    )
+    wide = width >= PIXELS + 2
+    end = width - 1 - PIXELS
     for y in range(first, last):
         above, here, below = (
             given.mosaic[given.rows[y]],
             given.mosaic[given.rows[y + 1]],
             given.mosaic[given.rows[y + 2]],
         )
-        blue = (y + given.red_row) & 1  # whether the row's own colour is blue, not red
+        blue = ((y + given.red_row) & 1) != 0  # whether the row's own colour is blue, not red
         parity = (y + given.red_row + given.red_column) & 1  # of the columns that hold it
         line = given.out[y].reshape(-1)
-        for start in range(1, width - 1, _SPAN):
-            end = min(start + _SPAN, width - 1)
-            _span(
-                above[start - 1 : end + 1],
-                here[start - 1 : end + 1],
-                below[start - 1 : end + 1],
-                np.uint32((start + parity) & 1),
-                own,
-                green,
-                other,
-            )
-            if blue:
-                _interleave(other, green, own, line[3 * start : 3 * end])
-            else:
-                _interleave(own, green, other, line[3 * start : 3 * end])
-        for x in (0, width - 1):
+        for x in range(0, width, width - 1 if wide else 1):  # both ends, or all of a short row
             left, right = given.columns[x], given.columns[x + 2]
             beside, upright = here[left] + here[right], above[x] + below[x]
             diagonal = (above[left] + below[right]) + (above[right] + below[left])
@@ -96,37 +80,25 @@ def _rows(given: Frame, first: int, last: int) -> None:
             else:
                 pixel[2 * blue], pixel[1] = _HALF * beside, here[x]
                 pixel[2 - 2 * blue] = _HALF * upright
+        if wide:
+            store(above, here, below, np.uintp(1), line, blue, parity == 0)
+            x = _aligned(line)
+            green = ((x + parity) & 1) != 0
+            if past_the_cache:
+                for begin in range(x, end + 1, PIXELS):
+                    stream(above, here, below, np.uintp(begin), line, blue, green)
+            else:
+                for begin in range(x, end + 1, PIXELS):
+                    store(above, here, below, np.uintp(begin), line, blue, green)
+            store(above, here, below, np.uintp(end), line, blue, ((end + parity) & 1) != 0)
+    fence()
 
 
 @inlined
-def _span(
-    above: NDArray[np.float32],
-    here: NDArray[np.float32],
-    below: NDArray[np.float32],
-    parity: np.uint32,
-    own: NDArray[np.float32],
-    green: NDArray[np.float32],
-    other: NDArray[np.float32],
-) -> None:
-    """Fill the row's own colour, green and the other from three rows with one sample around.
+def _aligned(line: NDArray[np.float32]) -> int:
+    """Return the first pixel after pixel 0 that begins where a line of the cache does: 1..16.
 
-    Both kinds of sites are computed everywhere and one is chosen: no strides, all vector.
+    A pixel has 3 samples, a line of the cache 16, and 3 x 11 = 1 modulo 16.
     """
-    for i in range(np.uintp(here.size - 2)):
-        beside, upright = here[i] + here[i + 2], above[i + 1] + below[i + 1]
-        diagonal = (above[i] + below[i + 2]) + (above[i + 2] + below[i])
-        sampled = (np.uint32(i) & np.uint32(1)) == parity
-        own[i] = here[i + 1] if sampled else _HALF * beside
-        green[i] = _QUARTER * (beside + upright) if sampled else here[i + 1]
-        other[i] = _QUARTER * diagonal if sampled else _HALF * upright
-
-
-@inlined
-def _interleave(
-    red: NDArray[np.float32],
-    green: NDArray[np.float32],
-    blue: NDArray[np.float32],
-    line: NDArray[np.float32],
-) -> None:
-    for i in range(np.uintp(line.size // 3)):
-        line[3 * i], line[3 * i + 1], line[3 * i + 2] = red[i], green[i], blue[i]
+    samples = line[3:].ctypes.data >> 2
+    return 1 + ((-samples * 11) & (PIXELS - 1))

@@ -5,6 +5,7 @@ an even distance, so it keeps the colour of the filter. Kernels work on tiles th
 margin with them; `positions` says which sample each site of a tile is, and no loop needs a branch.
 """
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -75,26 +76,36 @@ def frame(
     elif out.shape != shape or out.dtype != np.float32:
         message = f"out is {out.dtype} {out.shape}, must be float32 {shape}"
         raise ValueError(message)
-    elif not (out.flags.c_contiguous and out.flags.writeable):
-        message = "out must be C-contiguous and writable"
+    elif not (out.flags.carray and out.flags.writeable):
+        message = "out must be C-contiguous, aligned and writable"
         raise ValueError(message)
     elif np.may_share_memory(mosaic, out):
         message = "out overlaps mosaic"
         raise ValueError(message)
-    red_row, red_column = np.argwhere(pattern(cfa) == RED)[0]
+    red_row, red_column = _red(cfa)
     return Frame(
         # Writable too, so that a read-only array needs no kernels of its own.
-        np.require(mosaic, requirements=["C", "W"]),
+        np.require(mosaic, requirements=["C", "A", "W"]),
         positions(mosaic.shape[0], margin),
         positions(mosaic.shape[1], margin),
-        int(red_row),
-        int(red_column),
+        red_row,
+        red_column,
         out,
     )
 
 
+@lru_cache(maxsize=4)
+def _red(cfa: Cfa) -> tuple[int, int]:
+    row, column = np.argwhere(pattern(cfa) == RED)[0]
+    return int(row), int(column)
+
+
+@lru_cache(maxsize=16)
 def positions(count: int, margin: int) -> NDArray[np.int64]:
-    """Return the sample at each site -margin .. count + margin - 1 of a reflected line: int64."""
+    """Return the sample at each site -margin .. count + margin - 1 of a reflected line: int64.
+
+    The array is shared, to be read only.
+    """
     period = 2 * (count - 1)
     site = np.arange(-margin, count + margin) % period
     return np.minimum(site, period - site)

@@ -33,7 +33,7 @@ MARGIN = 12  # 2 primary difference + 4 smoothing + 4 window + 2 colour differen
 ROWS = 64 + 2 * MARGIN  # of a tile
 PITCH = 256  # columns of a tile
 
-_U = np.uintp
+_U, _I = np.uintp, np.intp
 _QUARTER, _TWO = np.float32(0.25), np.float32(2)
 _S0, _S1, _S2, _S3, _S4 = (np.float32(weight / 128) for weight in (26, 23, 15, 9, 4))
 _NINTH, _EIGHTH = np.float32(1 / 9), np.float32(1 / 8)
@@ -111,9 +111,9 @@ def _rows(given: Frame, e: np.float32, first: int, last: int) -> None:
             height, width = min(last - y, ROWS - 2 * MARGIN), min(columns - x, PITCH - 2 * MARGIN)
             tile = _Tile(y, x, height, width, signed, d, s, square, own, error, other)
             _load(given, tile)
-            _smooth(tile, 0, 1)
+            _smooth(tile, _I(0), _I(1))
             _estimate_along_rows(tile, e)
-            _smooth(tile, 1, 0)
+            _smooth(tile, _I(1), _I(0))
             _fuse_with_columns(tile, e)
             _average_diagonally(tile)
             for i in range(height):
@@ -133,7 +133,7 @@ def _load(given: Frame, tile: _Tile) -> None:
 
 
 @inlined
-def _smooth(tile: _Tile, di: int, dj: int) -> None:
+def _smooth(tile: _Tile, di: np.intp, dj: np.intp) -> None:
     """Fill `d`, `s` and `square` along one axis, where the neighbours lie in the tile."""
     signed, d, s, square = tile.signed, tile.d, tile.s, tile.square
     step = di * PITCH + dj
@@ -154,7 +154,7 @@ def _smooth(tile: _Tile, di: int, dj: int) -> None:
 
 
 @inlined
-def _estimate(tile: _Tile, e: np.float32, k: int, step: int) -> tuple[np.float32, np.float32]:
+def _estimate(tile: _Tile, e: np.float32, k: int, step: np.intp) -> tuple[np.float32, np.float32]:
     """Return the estimate x of the colour difference along one axis and its error variance v."""
     s, square = tile.s, tile.square
     here = s[_U(k)]
@@ -177,14 +177,14 @@ def _estimate(tile: _Tile, e: np.float32, k: int, step: int) -> tuple[np.float32
 def _estimate_along_rows(tile: _Tile, e: np.float32) -> None:
     for i in range(MARGIN - 2, tile.height + MARGIN + 2):
         for k in range(i * PITCH + MARGIN - 2, i * PITCH + tile.width + MARGIN + 2):
-            tile.own[_U(k)], tile.error[_U(k)] = _estimate(tile, e, k, 1)
+            tile.own[_U(k)], tile.error[_U(k)] = _estimate(tile, e, k, _I(1))
 
 
 @inlined
 def _fuse_with_columns(tile: _Tile, e: np.float32) -> None:
     for i in range(MARGIN - 2, tile.height + MARGIN + 2):
         for k in range(i * PITCH + MARGIN - 2, i * PITCH + tile.width + MARGIN + 2):
-            x_v, v_v = _estimate(tile, e, k, PITCH)
+            x_v, v_v = _estimate(tile, e, k, _I(PITCH))
             x_h, v_h = tile.own[_U(k)], tile.error[_U(k)]
             tile.own[_U(k)] = (v_v * x_h + v_h * x_v) / (v_h + v_v)
 

@@ -168,8 +168,8 @@ def _correlation(
     lags = products.shape[0]
     centre = lags // 2
     y, x = phase
-    scale, raw, values = np.empty_like(products), np.empty_like(products), np.empty_like(products)
-    rho = np.zeros_like(products)
+    scale, raw, values = np.empty((lags, lags)), np.empty((lags, lags)), np.empty((lags, lags))
+    rho = np.zeros((lags, lags))
     rho[centre, centre] = 1.0
     for i in range(lags):
         for j in range(lags):
@@ -182,7 +182,7 @@ def _correlation(
             for j in range(lags):
                 values[i, j] += raw[i, j]
                 # Lags within their own error would only add noise.
-                clear = np.abs(values[i, j]) > 3 / np.sqrt(max(pairs[i, j] * degrees, 1.0))
+                clear = np.abs(values[i, j]) > 3 / np.sqrt(_at_least_1(pairs[i, j] * degrees))
                 rho[i, j] = values[i, j] if clear and pairs[i, j] > 0 else 0.0
         values[centre, centre] = raw[centre, centre]
         rho[centre, centre] = 1.0
@@ -207,10 +207,16 @@ def _taken_off(rho: Array, size: tuple[int, int, int, int], off: Array) -> None:
         for x in range(step):
             whole = 0.0
             for i in range(y, lags, step):
-                rows[i] = _every(rho[i], x, step) / m
+                total = 0.0
+                for j in range(x, lags, step):
+                    total += rho[i, j]
+                rows[i] = total / m
                 whole += rows[i]
             for j in range(x, lags, step):
-                columns[j] = _every(rho[:, j], y, step) / n
+                total = 0.0
+                for i in range(y, lags, step):
+                    total += rho[i, j]
+                columns[j] = total / n
             both = whole * (1 - lost) / n
             for i in range(y, lags, step):
                 for j in range(x, lags, step):
@@ -218,11 +224,9 @@ def _taken_off(rho: Array, size: tuple[int, int, int, int], off: Array) -> None:
 
 
 @inlined
-def _every(line: Array, first: int, step: int) -> float:
-    total = 0.0
-    for i in range(first, line.size, step):
-        total += line[i]
-    return total
+def _at_least_1(count: float) -> float:
+    """Return the count, or 1; the built-in `max` takes longer to compile."""
+    return count if count > 1 else 1.0
 
 
 @kernel
@@ -232,7 +236,7 @@ def _inflation(values: Array, pairs: Array, degrees: int) -> float:
     for i in range(values.shape[0]):
         for j in range(values.shape[1]):
             if (i != centre or j != centre) and pairs[i, j] > 0:
-                total += values[i, j] ** 2 - 1 / max(pairs[i, j] * degrees, 1.0)
+                total += values[i, j] ** 2 - 1 / _at_least_1(pairs[i, j] * degrees)
     return total
 
 
@@ -247,7 +251,7 @@ def _bartlett(observed: Array, pairs: Array, degrees: int, lags: NDArray[np.int6
     for i in range(size):
         for j in range(size):
             # Lags within their own error would only add noise: 80 lags of it.
-            least = 3 / np.sqrt(max(pairs[i, j] * degrees, 1.0))
+            least = 3 / np.sqrt(_at_least_1(pairs[i, j] * degrees))
             known[i, j] = observed[i, j] if pairs[i, j] > 0 else 0.0
             if i == centre and j == centre:
                 known[i, j] = 1.0

@@ -7,7 +7,7 @@ number of threads. A 2 x 2 phase is (row parity, column parity) within the array
 import numpy as np
 from numpy.typing import NDArray
 
-from dsis.compiled import kernel, over_rows
+from dsis.compiled import inlined, kernel, over_rows
 
 Frame = NDArray[np.float32]
 Sums = NDArray[np.float64]
@@ -46,16 +46,12 @@ def offsets(by_row: Sums, by_column: Sums, single: bool) -> tuple[Sums, Sums, Su
     """Return what to subtract from each pixel, and the mean of each phase (2, 2).
 
     Row means (row, column parity), and column means less the mean (row parity, column); `single`:
-    all phases are one channel.
+    all phases are one channel. Plain loops: array expressions take many times as long to compile.
     """
     rows, columns = by_row.shape[0], by_column.shape[1]
     of_rows, of_columns, means = np.empty((rows, 2)), np.empty((2, columns)), np.zeros((2, 2))
     if single:
-        means[:] = by_row.sum() / (rows * columns)
-        for y in range(rows):
-            of_rows[y] = (by_row[y, 0] + by_row[y, 1]) / columns
-        for x in range(columns):
-            of_columns[:, x] = (by_column[0, x] + by_column[1, x]) / rows - means[0, 0]
+        _offsets_of_one(by_row, by_column, of_rows, of_columns, means)
         return of_rows, of_columns, means
     down, across = ((rows + 1) // 2, rows // 2), ((columns + 1) // 2, columns // 2)
     for y in range(rows):
@@ -68,6 +64,25 @@ def offsets(by_row: Sums, by_column: Sums, single: bool) -> tuple[Sums, Sums, Su
         for x in range(columns):
             of_columns[p, x] = by_column[p, x] / down[p] - means[p, x & 1]
     return of_rows, of_columns, means
+
+
+@inlined
+def _offsets_of_one(
+    by_row: Sums, by_column: Sums, of_rows: Sums, of_columns: Sums, means: Sums
+) -> None:
+    """Write `offsets` where all phases are one channel."""
+    rows, columns = by_row.shape[0], by_column.shape[1]
+    total = 0.0
+    for y in range(rows):
+        total += by_row[y, 0]
+        total += by_row[y, 1]
+    for p in range(2):
+        for q in range(2):
+            means[p, q] = total / (rows * columns)
+        for y in range(rows):
+            of_rows[y, p] = (by_row[y, 0] + by_row[y, 1]) / columns
+        for x in range(columns):
+            of_columns[p, x] = (by_column[0, x] + by_column[1, x]) / rows - means[0, 0]
 
 
 @kernel
@@ -191,14 +206,16 @@ def mean_frame(
     y0, x0, step = place
     n, m = mean.shape
     rows, columns = np.zeros(n), np.zeros(m)
-    for t in range(frames):
-        rows += row_means[t]
-        columns += column_means[t]
-    rows /= frames
-    columns /= frames
-    level = rows.sum() / n
-    rows -= level
-    columns -= level
+    _over_frames(row_means, frames, rows)
+    _over_frames(column_means, frames, columns)
+    level = 0.0
+    for y in range(n):
+        level += rows[y]
+    level /= n
+    for y in range(n):
+        rows[y] -= level
+    for x in range(m):
+        columns[x] -= level
     by_row, by_column = np.zeros(n), np.zeros(m)
     for y in range(n):
         line, total = base[y0 + y * step, x0::step], sums[y0 + y * step, x0::step]
@@ -208,7 +225,21 @@ def mean_frame(
             into[x] = line[x] + (over[x] + level) + shift
             by_column[x] += line[x]
             by_row[y] += line[x]
-    return by_row / m + shift, by_column / n + shift
+    for y in range(n):
+        by_row[y] = by_row[y] / m + shift
+    for x in range(m):
+        by_column[x] = by_column[x] / n + shift
+    return by_row, by_column
+
+
+@inlined
+def _over_frames(series: Sums, frames: int, out: Sums) -> None:
+    """Write the mean over the first frames of a series (frame, line) to `out`, zeros before."""
+    for t in range(frames):
+        for i in range(out.size):
+            out[i] += series[t, i]
+    for i in range(out.size):
+        out[i] /= frames
 
 
 @kernel
@@ -225,5 +256,6 @@ def temporal_power(
     for y in range(rows):
         for x in range(bins):
             still = transform[y, x].real ** 2 + transform[y, x].imag ** 2
-            out[y, x] = max(power[y, x] - frames * still, 0.0) / share
+            left = power[y, x] - frames * still
+            out[y, x] = (left if left > 0 else 0.0) / share
     return out

@@ -39,10 +39,18 @@ def _line_means(image: Array) -> tuple[Array, Array, float]:
     """Return the means of rows, of columns, and of all pixels."""
     n, m = image.shape
     by_row, by_column = np.empty(n), np.zeros(m)
+    mean = 0.0
     for y in range(n):
-        by_row[y] = image[y].sum() / m
-        by_column += image[y]
-    return by_row, by_column / n, by_row.sum() / n
+        line, total = image[y], 0.0
+        for x in range(m):
+            total += line[x]
+        for x in range(m):
+            by_column[x] += line[x]
+        by_row[y] = total / m
+        mean += by_row[y]
+    for x in range(m):
+        by_column[x] /= n
+    return by_row, by_column, mean / n
 
 
 @kernel
@@ -91,15 +99,17 @@ def line_residuals(means: Array, series: Array, basis: Array) -> tuple[float, fl
     Means (line); series (frame, line), about its mean over frames.
     """
     frames, lines = series.shape
-    centre, line = np.zeros(lines), means.copy()
+    centre, line = np.zeros(lines), np.empty(lines)
     for t in range(frames):
-        centre += series[t]
-    centre /= frames
+        for i in range(lines):
+            centre[i] += series[t, i]
+    for i in range(lines):
+        line[i] = means[i]
     spatial = _outside(line, basis)
     temporal = 0.0
     for t in range(frames):
         for i in range(lines):
-            line[i] = series[t, i] - centre[i]
+            line[i] = series[t, i] - centre[i] / frames
         temporal += _outside(line, basis)
     return spatial, temporal
 

@@ -163,8 +163,11 @@ def _over_frames(transform: NDArray[np.complex128], lines: int) -> Array:
     for k in range(planes):
         for t in range(frames):
             for i in range(bins):
-                power[k, i] += transform[k, t, i].real ** 2 + transform[k, t, i].imag ** 2
-    return power / lines
+                re, im = transform[k, t, i].real, transform[k, t, i].imag
+                power[k, i] += re * re + im * im
+        for i in range(bins):
+            power[k, i] /= lines
+    return power
 
 
 def _lines(power: Array, frames: int, lines: int, size: int) -> tuple[float, float]:

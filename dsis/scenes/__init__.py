@@ -14,6 +14,7 @@ from dsis.scenes.presets import OVERSAMPLING, PRESETS, Preset, preset_strip
 from dsis.scenes.renderer import Progress, render
 from dsis.scenes.shipped import as_shipped, is_shipped
 from dsis.scenes.strip import FEWEST_ROWS, SCENES, Strip
+from dsis.workers import Workers
 
 __all__ = [
     "FEWEST_ROWS",
@@ -37,11 +38,15 @@ def is_ready(strip: Strip) -> bool:
 
 
 def panorama(
-    strip: Strip, *, threads: int = 1, progress: Progress | None = None
+    strip: Strip,
+    *,
+    threads: int = 1,
+    progress: Progress | None = None,
+    pool: Workers | None = None,
 ) -> NDArray[np.float32]:
     """Return the strip over which a window pans: shipped, from the cache, or rendered.
 
-    The same strip gives the same bytes, whatever the threads.
+    The same strip gives the same bytes, whoever renders it.
 
     Parameters
     ----------
@@ -50,7 +55,10 @@ def panorama(
     threads
         How many threads render.
     progress
-        Called with (parts done, parts in all, what is being done).
+        Called with (columns done, columns in all, the scene's name).
+    pool
+        Renders instead of threads, see `dsis.workers.workers`: processes, or a cluster. The cache
+        is that of this process.
 
     Returns
     -------
@@ -62,9 +70,11 @@ def panorama(
     ------
     InputError
         Where there is no such scene, or a number is out of range.
+    WorkersLostError
+        Workers die again and again.
     """
     strip.checked()
     ready = as_shipped(strip)
     if ready is not None:
         return ready
-    return kept_or_rendered(strip, lambda: render(strip, threads, progress))
+    return kept_or_rendered(strip, lambda: render(strip, threads, progress, pool))

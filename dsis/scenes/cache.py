@@ -4,7 +4,8 @@ Each is a float32 `.npy` with a `.json` beside it that holds its SHA-256. The na
 seed, size, sampling and the version of the code, so that other code never finds it. A wider
 panorama serves a narrower request, for its first columns are the same. Files appear under their
 names when they are whole; what is damaged is rendered again, and said. One process renders, others
-wait.
+wait. Where one is written, those of the same scene that other code made are removed, and that is
+said: the user's caches do not grow with every version.
 """
 
 import hashlib
@@ -20,7 +21,7 @@ from io import BytesIO
 from pathlib import Path
 
 import numpy as np
-from filelock import FileLock
+from filelock import FileLock, Timeout
 from numpy.typing import NDArray
 
 from dsis.scenes.renderer import code_version
@@ -81,6 +82,7 @@ def kept_or_rendered(strip: Strip, render: Callable[[], Light]) -> Light:
             if image is None:
                 image = render()
                 _keep(strip, image)
+                _remove_outdated(strip.scene)
     except OSError as error:
         _log.warning("%s: panoramas are not kept there (%s)", cache_folder(), error.strerror)
         image = render() if image is None else image
@@ -141,6 +143,23 @@ def _keep(strip: Strip, image: Light) -> None:
             unfinished.write_bytes(held)
 
 
+def _remove_outdated(scene: str) -> None:
+    """Remove a scene's panoramas of other code, but for those that a process is rendering now."""
+    name = re.compile(rf"({scene}-\d+-\d+x)\d+(-s\d+a\d+-([0-9a-f]{{16}}))\.(?:json|npy)")
+    folder, gone, size = cache_folder(), 0, 0
+    for path in sorted(folder.iterdir()):  # the record first: without it nobody looks for the rest
+        found = name.fullmatch(path.name)
+        if not found or found[3] == code_version(scene):
+            continue
+        with suppress(OSError, Timeout), _lock(f"{found[1]}any{found[2]}", timeout_s=0):
+            held = path.stat().st_size
+            path.unlink()
+            gone, size = gone + (path.suffix == ".npy"), size + held
+    if gone:
+        what = f"removed {gone} of {scene} that another version of dsis rendered"
+        _log.warning("%s: %s, %.0f MB", folder, what, size / 1e6)
+
+
 @contextmanager
 def _whole(path: Path) -> Iterator[Path]:
     """Yield a name to write to; it becomes `path` when the block ends well, else it is removed."""
@@ -157,5 +176,9 @@ def _held(strip: Strip) -> Iterator[None]:
     """Hold the right to render a scene of a seed and height; waits for whoever has it."""
     folder = cache_folder()
     folder.mkdir(parents=True, exist_ok=True)
-    with FileLock(folder / f".{_stem(strip, 'any')}.lock"):
+    with _lock(_stem(strip, "any")):
         yield
+
+
+def _lock(stem: str, timeout_s: float = -1) -> FileLock:
+    return FileLock(cache_folder() / f".{stem}.lock", timeout_s)

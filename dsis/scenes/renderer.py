@@ -1,17 +1,20 @@
-"""Which code renders a scene, and what identifies that code."""
+"""Which code renders a scene, who does the work, and what identifies the code."""
 
 import hashlib
 import platform
 from collections.abc import Callable
-from functools import cache
+from functools import cache, lru_cache, partial
 from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
+from threading import Lock
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dsis.scenes.strip import SCENES, Strip
+from dsis.workers import Workers, completed, workers
 
 Light = NDArray[np.float32]
 Progress = Callable[[int, int, str], None]
@@ -21,25 +24,53 @@ _NO_RENDERERS = ("__init__.py", "cache.py", "presets.py", "renderer.py", "shippe
 OUTSIDE = ("cfa.py", "compiled.py", "draw.py", "grid.py")
 """What renderers use of dsis beside `dsis.scenes`."""
 
+PART_COLUMNS = 64  # renderers sort what stands near once per part; always the same parts
+_one_prepares = Lock()
 
-def render(strip: Strip, threads: int = 1, progress: Progress | None = None) -> Light:
-    """Render a strip; float32 (row, column, 3), linear light, the same bytes on any threads."""
 
-    def tell(done: int, total: int) -> None:
-        if progress is not None:
-            progress(done, total, strip.scene)
+class Scene(Protocol):
+    """All that the pixels of one panorama need: how both kinds of scene are seen from here."""
 
+    def part(self, first: int, last: int) -> Light:
+        """Return the columns first..last-1, (row, column, 3)."""
+
+
+def render(
+    strip: Strip, threads: int = 1, progress: Progress | None = None, pool: Workers | None = None
+) -> Light:
+    """Render a strip; float32 (row, column, 3), linear light, the same bytes whoever renders.
+
+    `pool`, see `dsis.workers.workers`, does the work if it is given, else that many threads.
+    """
+    if pool is None:
+        with workers(threads) as own:
+            return render(strip, progress=progress, pool=own)
+    image = np.empty((strip.rows, strip.columns, 3), np.float32)
+    starts = range(0, strip.columns, PART_COLUMNS)
+    spans = [(first, min(first + PART_COLUMNS, strip.columns)) for first in starts]
+    done = 0
+    try:
+        for (first, last), light in completed(pool, partial(_part, strip), spans):
+            image[:, first:last] = light
+            done += last - first
+            if progress is not None:
+                progress(done, strip.columns, strip.scene)
+    finally:
+        _prepared.cache_clear()
+    return image
+
+
+def _part(strip: Strip, span: tuple[int, int]) -> Light:
+    with _one_prepares:
+        scene = _prepared(strip)
+    return scene.part(*span)
+
+
+@lru_cache(maxsize=1)
+def _prepared(strip: Strip) -> Scene:
     # A renderer is imported when it is needed: a command that renders nothing starts at once.
-    light: Light = import_module(f"dsis.scenes.{strip.scene}").render(
-        strip.seed,
-        strip.rows,
-        strip.columns,
-        samples=strip.samples,
-        ambient=strip.ambient,
-        threads=threads,
-        progress=tell,
-    )
-    return light
+    scene: Scene = import_module(f"dsis.scenes.{strip.scene}").prepared(strip)
+    return scene
 
 
 @cache

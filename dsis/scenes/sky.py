@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsis.cfa import Cfa
-from dsis.compiled import inlined, kernel, over_rows
+from dsis.compiled import inlined, kernel
 from dsis.draw import Draw
 from dsis.grid import PixelGrid
 from dsis.scenes.noise import noise
@@ -73,7 +73,7 @@ class SkyDome:
             np.maximum(1 - sine * sine, ZENITH_COSINE_SQUARED)
         )
         azimuths = np.arange(TABLE_SHAPE[1], dtype=np.float64) * (2 * np.pi / TABLE_SHAPE[1])
-        _paint(table, slopes, azimuths, sun, clouds, 2 * np.pi / TABLE_SHAPE[1], 0, TABLE_SHAPE[1])
+        _paint(table, slopes, azimuths, sun, clouds, 2 * np.pi / TABLE_SHAPE[1])
         irradiance = (np.pi * np.array(SUN_RADIANCE_RGB)).astype(np.float32)
         return cls(sun, irradiance, clouds, table)
 
@@ -83,7 +83,6 @@ def paint(
     slopes: NDArray[np.float64],
     azimuths: NDArray[np.float64],
     image: NDArray[np.float32],
-    threads: int = 1,
 ) -> None:
     """Paint the sky into a picture on a cylinder around the eye.
 
@@ -97,15 +96,9 @@ def paint(
         Of each column in radians, (column,).
     image
         Float32 (row, column, 3), overwritten.
-    threads
-        Number of threads; the bytes do not depend on it.
     """
     footprint = abs(float(slopes[1] - slopes[0])) if slopes.size > 1 else 1e-3
-
-    def columns(first: int, last: int) -> None:
-        _paint(image, slopes, azimuths, dome.sun_direction, dome.clouds, footprint, first, last)
-
-    over_rows(columns, azimuths.size, threads)
+    _paint(image, slopes, azimuths, dome.sun_direction, dome.clouds, footprint)
 
 
 def _clouds(seed: int) -> NDArray[np.float64]:
@@ -244,13 +237,11 @@ def _paint(
     sun: NDArray[np.float64],
     clouds: NDArray[np.float64],
     pixel_rad: float,
-    first: int,
-    last: int,
 ) -> None:
-    """Paint the columns first..last-1."""
+    """Paint every pixel."""
     seen = np.empty(clouds.shape[0], np.int64)
     sky, horizon, light = np.empty(3), np.empty(3), np.empty(4)
-    for column in range(first, last):
+    for column in range(azimuths.size):
         ax, ay = math.sin(azimuths[column]), math.cos(azimuths[column])
         _clear(horizon, 0.0, ax * sun[0] + ay * sun[1])
         count = 0

@@ -1,5 +1,5 @@
 """City: a panorama over a dense city, traced without chance."""
 
-from dsis.scenes.city.panorama import render
+from dsis.scenes.city.panorama import prepared
 
-__all__ = ["render"]
+__all__ = ["prepared"]

@@ -11,7 +11,7 @@ from dsis.scenes.city.houses import house, terrace
 from dsis.scenes.city.landmarks import bridge, church, slab
 from dsis.scenes.city.palette import one_of
 from dsis.scenes.city.pavements import people, street_sides
-from dsis.scenes.city.plan import BRIDGE_EVERY, Ground, Plan
+from dsis.scenes.city.plan import Ground, Plan, is_bridged
 from dsis.scenes.city.solids import DETAILED_M, Frame, Kind, Point, Solid
 from dsis.scenes.city.trees import tree
 
@@ -131,7 +131,7 @@ def _river(rng: np.random.Generator, plan: Plan, i: int, j: int) -> Iterator[Sol
         yield from parked(rng, plan.world(kerb + 5, b1), plan.world(kerb + 5, b0), 0.2)
         yield from people(rng, plan, (kerb - 4.5, kerb - 2), (b0, b1), 8)
     middle = (plan.a_low[i] + plan.a_high[i]) / 2
-    if j % BRIDGE_EVERY == 0 and j + 1 < plan.b_low.size:
+    if is_bridged(plan.seed, j) and j + 1 < plan.b_low.size:
         b = (b1 + plan.b_low[j + 1]) / 2
         (x0, y0), (x1, y1) = plan.world(plan.a_low[i], b), plan.world(plan.a_high[i], b)
         frame = Frame((x0 + x1) / 2, (y0 + y1) / 2, math.atan2(y1 - y0, x1 - x0))

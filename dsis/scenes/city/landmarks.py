@@ -12,6 +12,7 @@ from dsis.scenes.city.solids import Cover, Frame, Kind, Rgb, Solid
 
 STONE: Rgb = (0.42, 0.37, 0.29)
 DARK: Rgb = (0.05, 0.05, 0.055)
+PAINTS: tuple[Rgb, ...] = ((0.10, 0.17, 0.14), (0.13, 0.14, 0.16), (0.28, 0.31, 0.32))  # of steel
 
 
 def church(rng: np.random.Generator, frame: Frame) -> Iterator[Solid]:
@@ -62,15 +63,33 @@ def slab(
 
 
 def bridge(rng: np.random.Generator, frame: Frame, span: float) -> Iterator[Solid]:
-    """Yield a bridge along local x with piers, parapets and lamps."""
-    stone, half = one_of(rng, (STONE, (0.5, 0.48, 0.45))), span / 2 + 8
-    yield Solid(frame.x, frame.y, -1.4, frame.yaw, half, 7, 1.45, Kind.PLAIN, stone,
+    """Yield a bridge of stone, of concrete or of steel along local x, with parapets and lamps."""
+    form, half, wide = rng.random(), span / 2 + 8, rng.uniform(5.0, 8.5)
+    steel = form < 0.4
+    paint = one_of(rng, PAINTS if steel else (STONE, (0.5, 0.48, 0.45), (0.30, 0.20, 0.15)))
+    piers = int(rng.integers(1, 3) if form < 0.7 else rng.integers(3, 7))
+    thick = rng.uniform(0.9, 1.5) if piers < 3 else rng.uniform(1.6, 2.4)
+    yield Solid(frame.x, frame.y, 0.05 - thick, frame.yaw, half, wide, thick, Kind.PLAIN, paint,
                 (0.11, 0.11, 0.115))  # fmt: skip
-    for side in (-6.8, 6.8):
-        yield Solid(*frame.at(0, side), 0.05, frame.yaw, half, 0.25, 1.0, Kind.PLAIN, stone, stone)
-        for a in np.arange(-half + 6, half, 16.0):
+    every = rng.uniform(11, 24)
+    for side in (0.2 - wide, wide - 0.2):
+        yield Solid(*frame.at(0, side), 0.05, frame.yaw, half, 0.25, 1.0, Kind.PLAIN, paint, paint)
+        for a in np.arange(6 - half, half, every):
             place = frame.at(float(a), side)
             yield Solid(*place, 0, frame.yaw, 0.08, 0.08, 6.0, Kind.PLAIN, DARK, DARK)
             yield Solid(*place, 6.0, frame.yaw, 0.3, 0.3, 0.6, Kind.PLAIN, (0.8, 0.8, 0.75))
-    for a in np.linspace(-span / 2, span / 2, 5)[1:-1]:
-        yield Solid(*frame.at(float(a), 0), -6, frame.yaw, 1.8, 8.2, 5.4, Kind.PLAIN, stone, stone)
+        if steel:
+            yield from _girder(frame, side, span, rng.uniform(5.0, 7.5), paint)
+    foot = STONE if steel else paint
+    for a in np.linspace(-span / 2, span / 2, piers + 2)[1:-1]:
+        yield Solid(*frame.at(float(a), 0), -6, frame.yaw, rng.uniform(1.2, 2.2), wide + 1.2, 5.4,
+                    Kind.PLAIN, foot, foot)  # fmt: skip
+
+
+def _girder(frame: Frame, side: float, span: float, tall: float, paint: Rgb) -> Iterator[Solid]:
+    """Yield posts and the chord on top of them, above one side of a bridge."""
+    panels = round(span / tall)
+    for a in np.linspace(-span / 2, span / 2, panels + 1):
+        yield Solid(*frame.at(float(a), side), 0, frame.yaw, 0.22, 0.2, tall, Kind.PLAIN, paint)
+    yield Solid(*frame.at(0, side), tall, frame.yaw, span / 2 + 0.3, 0.3, 0.6, Kind.PLAIN, paint,
+                paint)  # fmt: skip

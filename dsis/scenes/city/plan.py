@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 REACH_M = 2700.0  # streets and blocks lie within this distance of the eye
 GRID_RAD = 0.13  # turn of the lattice, so that the river and its quays run away from the eye
 RIVER_A_M = (70.0, 172.0)  # the river's banks
-BRIDGE_EVERY = 3  # streets
 
 
 class Ground(IntEnum):
@@ -60,6 +59,16 @@ class Plan(NamedTuple):
             v = b - 30 * math.sin(u / 390 + self.bends[2])
         cos, sin = math.cos(GRID_RAD), math.sin(GRID_RAD)
         return cos * u - sin * v, sin * u + cos * v
+
+
+def is_bridged(seed: int, street: int) -> bool:
+    """Tell whether a street crosses the river: a fifth of them do, three apart or more.
+
+    It is the street behind the blocks of that number along the river.
+    """
+    around = range(street - 2, street + 3)
+    lots = [np.random.Generator(np.random.PCG64([seed, 4, n + 2])).random() for n in around]
+    return lots[2] == min(lots)
 
 
 def street_plan(seed: int) -> Plan:

@@ -327,9 +327,8 @@ def _shine(
 def trace_columns(
     image: NDArray[np.float32], table: Solid, cells: Cells, plan: Plan, light: Light,
     points: NDArray[np.float64], eye_m: float, left_rad: float, horizon_row: float, pixel: float,
-    first: int, last: int,
 ) -> None:  # fmt: skip
-    """Draw the city over the columns first..last-1 of a picture of the sky.
+    """Draw the city over a picture of the sky.
 
     Parameters
     ----------
@@ -347,7 +346,7 @@ def trace_columns(
     samples = points.shape[0]
     spot, total = np.empty(NUMBERS), np.empty(3)
     eye = (0.0, 0.0, eye_m)
-    for column in range(first, last):
+    for column in range(image.shape[1]):
         for row in range(image.shape[0]):
             found = 0
             total[:] = 0.0

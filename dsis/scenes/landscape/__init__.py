@@ -4,15 +4,12 @@ Traced without chance: every pixel has the same sub-pixel points and directions 
 """
 
 import math
-import threading
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dsis.compiled import ROWS_PER_BLOCK, over_rows
 from dsis.scenes import sky
 from dsis.scenes.landscape import planting
 from dsis.scenes.landscape.crown import crowns
@@ -23,74 +20,27 @@ from dsis.scenes.landscape.relief import SUN_AZIMUTH_RAD, Relief
 from dsis.scenes.landscape.shading import shade
 from dsis.scenes.landscape.visible import SKY, grow, land, stand
 from dsis.scenes.landscape.water import mirror
+from dsis.scenes.strip import Strip
 
 FIELD_RAD: Final = math.radians(46.0)  # azimuth across a frame of 16:9
 TOP_SLOPE = 0.184  # of the upper edge
 SUN_ELEVATION_RAD = math.radians(34.0)
+EXPOSURE = 0.95  # the tops of clouds all but clip, glints do, as in a photograph
 MARGIN_RAD = 0.5  # what stands so far aside may still cast its shadow into the picture
 Numbers = NDArray[np.float64]
 
 
-def render(
-    seed: int,
-    rows: int,
-    columns: int,
-    *,
-    samples: int = 4,
-    ambient: int = 4,
-    threads: int = 1,
-    progress: Callable[[int, int], None] | None = None,
-) -> NDArray[np.float32]:
-    """Render the panorama of a seed onto a cylinder.
-
-    Parameters
-    ----------
-    seed
-        Another seed is another landscape.
-    rows, columns
-        Size in pixels; a frame of 16:9 and this height spans 46 degrees; column 0 is the left end,
-        and more columns show more of the same.
-    samples
-        Sub-pixel points.
-    ambient
-        Directions of the sky for each of them.
-    threads
-        Number of threads; the bytes do not depend on it.
-    progress
-        Called with the number of columns that are done and of all.
-
-    Returns
-    -------
-    NDArray[np.float32]
-        (row, column, 3), linear light, Rec.709 primaries; a white diffuse surface that faces the
-        sun has about 1.0; not negative, glints of the sun are above 1.
-    """
-    scene = _Scene.of(seed, rows, columns, samples, ambient)
-    image = np.empty((rows, columns, 3), np.float32)
-    focal_px = rows * 16 / 9 / FIELD_RAD
-    slopes = np.asarray(TOP_SLOPE - (np.arange(rows) + 0.5) / focal_px, np.float64)
-    azimuths = np.asarray((np.arange(columns) + 0.5) / focal_px, np.float64)
-    sky.paint(scene.dome, slopes, azimuths, image, threads)
-    lock, done = threading.Lock(), [0]
-
-    def work(first: int, last: int) -> None:
-        for start in range(first, last, ROWS_PER_BLOCK):
-            end = min(start + ROWS_PER_BLOCK, last)
-            scene.block(image[:, start:end], start)
-            if progress:
-                with lock:
-                    done[0] += end - start
-                    progress(done[0], columns)
-
-    over_rows(work, columns, threads)
-    return image
+def prepared(strip: Strip) -> "Landscape":
+    """Return what renders the parts of a strip; column 0 is at the azimuth 0."""
+    return Landscape.of(strip)
 
 
 @dataclass(frozen=True)
-class _Scene:
+class Landscape:
     """All that the pixels of one panorama need."""
 
     focal_px: float
+    rows: int
     samples: int
     dome: sky.SkyDome
     relief: Relief
@@ -100,21 +50,27 @@ class _Scene:
     ray_light: Numbers
 
     @classmethod
-    def of(cls, seed: int, rows: int, columns: int, samples: int, ambient: int) -> "_Scene":
-        focal_px = rows * 16 / 9 / FIELD_RAD
+    def of(cls, strip: Strip) -> Self:
+        """Make the land of a seed, as far as a strip shows it."""
+        seed, focal_px = strip.seed, strip.rows * 16 / 9 / FIELD_RAD
         dome = sky.SkyDome.of(seed, SUN_AZIMUTH_RAD, SUN_ELEVATION_RAD)
         relief = Relief.of(seed)
-        last = min(columns / focal_px, 2 * np.pi)
+        last = min(strip.columns / focal_px, 2 * np.pi)
         table = planting.things(relief, seed, -MARGIN_RAD, last + MARGIN_RAD)
-        rays, ray_light = _sky_rays(dome, samples, ambient)
-        meadow = blades(relief, seed, -0.05, columns / focal_px + 0.05)
+        rays, ray_light = _sky_rays(dome, strip.samples, strip.ambient)
+        meadow = blades(relief, seed, -0.05, strip.columns / focal_px + 0.05)
         lattice = Lattice.of(table)
         around = (lattice.start, lattice.item, lattice.top, table, crowns())
-        return cls(focal_px, samples, dome, relief, around, meadow, rays, ray_light)
+        return cls(
+            focal_px, strip.rows, strip.samples, dome, relief, around, meadow, rays, ray_light
+        )
 
-    def block(self, image: NDArray[np.float32], first: int) -> None:
-        """Render the columns `first` ... over the sky in `image` (row, column, 3)."""
-        rows, columns = image.shape[:2]
+    def part(self, first: int, last: int) -> NDArray[np.float32]:
+        """Render the columns first..last-1: float32 (row, column, 3), linear, Rec.709 primaries."""
+        rows, columns = self.rows, last - first
+        image = np.empty((rows, columns, 3), np.float32)
+        azimuths, slopes = self._directions(first, last, 0.5, 0.5)
+        sky.paint(self.dome, slopes, azimuths, image)
         shape = (columns, rows)
         seen = (np.empty(shape), np.empty(shape, np.int64), np.empty((*shape, 3)), np.empty(shape))
         colour, total, share = np.empty((*shape, 3)), np.zeros((*shape, 3)), np.zeros(shape)
@@ -123,8 +79,7 @@ class _Scene:
         pixel_rad = 1 / self.focal_px
         for n in range(self.samples):
             across, down = (0.5 + 0.7548776662 * n) % 1, (0.5 + 0.5698402910 * n) % 1
-            azimuths = np.asarray((first + np.arange(columns) + across) / self.focal_px, np.float64)
-            slopes = np.asarray(TOP_SLOPE - (np.arange(rows) + down) / self.focal_px, np.float64)
+            azimuths, slopes = self._directions(first, last, across, down)
             numbers = self._near(azimuths)
             low, high = np.searchsorted(
                 self.blades[:, AZIMUTH], [azimuths[0] - 0.05, azimuths[-1] + 0.05]
@@ -150,6 +105,16 @@ class _Scene:
         clear = 1 - share / self.samples
         image *= clear.T[..., None].astype(np.float32)
         image += total.transpose(1, 0, 2).astype(np.float32)
+        image *= np.float32(EXPOSURE)
+        return image
+
+    def _directions(
+        self, first: int, last: int, across: float, down: float
+    ) -> tuple[Numbers, Numbers]:
+        """Return azimuths of the columns and slopes of the rows, at a place within a pixel."""
+        azimuths = (np.arange(first, last) + across) / self.focal_px
+        slopes = TOP_SLOPE - (np.arange(self.rows) + down) / self.focal_px
+        return np.asarray(azimuths, np.float64), np.asarray(slopes, np.float64)
 
     def _near(self, azimuths: Numbers) -> NDArray[np.int64]:
         """Return the numbers of things that these azimuths may see."""

@@ -28,6 +28,7 @@ from dsis.scenes.noise import flakes, noise
 
 Numbers = NDArray[np.float64]
 FOLIAGE_PER_M = 0.9  # extinction inside the spheres
+BULGE = 0.45  # foliage may stand out of its sphere by so much of the sphere's radius
 
 
 def crowns() -> Numbers:
@@ -72,7 +73,7 @@ def _clump(x: float, y: float, z: float, tree: Numbers, footprint: float, salt: 
         radius *= max(1.05 - z / tree[HEIGHT], 0.1)
     size = 0.34 * tree[RADIUS]
     share = radius / tree[RADIUS]
-    total = 0.0
+    total = -0.05 * tree[RADIUS]
     for octave in range(3):
         keep = min(max(2.0 - 2.0 * footprint / size, 0.0), 1.0)
         if keep == 0.0:
@@ -82,7 +83,7 @@ def _clump(x: float, y: float, z: float, tree: Numbers, footprint: float, salt: 
         size = size * 0.40
     keep = min(max(2.0 - 2.0 * footprint / 0.13, 0.0), 1.0)
     if keep > 0.0:
-        total += 0.16 * keep * flakes(x / 0.13 + salt, y / 0.13, z / 0.13)
+        total += 0.22 * keep * flakes(x / 0.13 + salt, y / 0.13, z / 0.13)
     return float(total * share)
 
 
@@ -145,7 +146,7 @@ def meet(
     The range is 1e9 where there is none. `pixel` is the width of a pixel there in m.
     """
     radius = tree[RADIUS]
-    bulge = 1.0 + 0.22 * min(max(radius / pixel - 3.0, 0.0) / 3.0, 1.0)
+    bulge = 1.0 + BULGE * min(max(radius / pixel - 3.0, 0.0) / 3.0, 1.0)
     if tree[KIND] == CONIFER:
         bulge = 1.6  # the spheres lie inside the cone
     leave = _enter(found, ax, ay, slope, tree, shape, bulge)

@@ -19,7 +19,7 @@ NEAREST_M, FARTHEST_M = 2.5, 24000.0
 RANGE_M: Final = np.geomspace(NEAREST_M, FARTHEST_M, RANGES)
 LOG_STEP: Final = math.log(FARTHEST_M / NEAREST_M) / (RANGES - 1)
 LAKE_M = -66.0
-SUN_AZIMUTH_RAD = math.radians(66.0)  # a lake lies there: its glitter is seen
+SUN_AZIMUTH_RAD = math.radians(44.0)  # a lake lies there: its glitter is seen
 PROFILE = np.array(  # range, height, amplitude of the relief, bias of the woods
     [
         [2.5, -2.0, 0.03, -3], [10, -2.6, 0.1, -3], [30, -5.2, 0.4, -3], [60, -10.4, 1.0, -3],

@@ -38,9 +38,9 @@ GRASS_M = 95.0  # up to here blades stand on the meadow
 
 
 @kernel
-def _cloud_shade(x: float, y: float) -> float:
+def cloud_shade(x: float, y: float) -> float:
     """Return the share of sunlight that the clouds let pass."""
-    thin = step(fractal(x / 1300 + 4, y / 1300, 0, 3), 0.42, 0.17)
+    thin = step(fractal(x / 1300 + 4, y / 1300, 0, 3), 0.48, 0.08)
     return 1.0 - 0.82 * (1.0 - thin) * step(math.hypot(x, y), 300, 900)
 
 
@@ -59,8 +59,8 @@ def _soil(
         shelter = 1.0 - 0.8 * step(trees, 0.0, 0.05)
     else:
         shelter = 1.0
-        out[NORMAL] += 0.8 * fractal(x / 420, y / 420, deep / 420, 5)
-        out[NORMAL + 1] += 0.8 * fractal(x / 420 + 40, y / 420, deep / 420, 5)
+        out[NORMAL] += 1.1 * fractal(x / 420, y / 420, deep / 420, 5)
+        out[NORMAL + 1] += 1.1 * fractal(x / 420 + 40, y / 420, deep / 420, 5)
     out[OPEN_SUN], out[OPEN_SKY] = shelter, shelter
 
 
@@ -95,7 +95,7 @@ def _illuminate(
         share = max((facing + wrap) / (1.0 + wrap), 0.0)
         if ray < 0:
             share = (share + out[THROUGH] * max(-facing, 0.0)) * out[OPEN_SUN]
-            share *= _cloud_shade(point[0], point[1])
+            share *= cloud_shade(point[0], point[1])
         else:
             share *= out[OPEN_SKY]
         if share > 0.0:

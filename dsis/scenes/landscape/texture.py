@@ -1,5 +1,6 @@
 """Smooth noise on arrays, for the relief: octaves that fade out where the grid is coarser."""
 
+import math
 from dataclasses import dataclass
 from typing import Any, Self
 
@@ -7,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsis.cfa import Cfa
+from dsis.compiled import kernel
 from dsis.draw import Draw
 from dsis.grid import PixelGrid
 
@@ -24,25 +26,14 @@ class Texture:
         float32 (CELLS * CELLS,), uniform in -1..1.
     """
 
-    lattice: Field
+    lattice: NDArray[np.float32]
 
     @classmethod
     def of(cls, seed: int) -> Self:
         """Draw the lattice from a seed."""
         draw = Draw(seed, ("scenes", "relief"))
-        return cls(2 * draw.uniform("lattice", PixelGrid(CELLS, CELLS, Cfa.MONO, 0, 0)).ravel() - 1)
-
-    def value(self, u: Field, v: Field) -> Field:
-        """Return smooth noise in -1..1 with features one unit wide; u and v broadcast."""
-        i, j = np.floor(u), np.floor(v)
-        s, t = u - i, v - j
-        s, t = s * s * (3 - 2 * s), t * t * (3 - 2 * t)
-        i, j = i.astype(np.int32), j.astype(np.int32)
-        low, high = self._at(i, j), self._at(i, j + 1)
-        low = low + s * (self._at(i + 1, j) - low)
-        high = high + s * (self._at(i + 1, j + 1) - high)
-        blended: Field = low + t * (high - low)
-        return blended
+        lattice = draw.uniform("lattice", PixelGrid(CELLS, CELLS, Cfa.MONO, 0, 0)).ravel()
+        return cls((2 * lattice - 1).astype(np.float32))
 
     def fractal(self, u: Field, v: Field, octaves: int, footprint: Field | float = 0.0) -> Field:
         """Return a sum of octaves, each twice as fine, .55 as strong, and turned by 37 degrees.
@@ -56,20 +47,49 @@ class Texture:
         footprint
             Spacing of the points in the same unit; octaves finer than two of them fade out.
         """
-        total: Field = np.zeros(np.broadcast_shapes(u.shape, v.shape))
-        weight, width = 1.0, np.asarray(footprint)
-        for octave in range(octaves):
-            keep = np.clip(2 - 4 * 2**octave * width, 0, 1)
-            if not keep.any():
-                break
-            total += weight * keep * self.value(u, v)
-            u, v = 1.6 * u - 1.2 * v + 31.7, 1.2 * u + 1.6 * v + 17.3
-            weight *= 0.55
+        total = np.empty(np.broadcast_shapes(u.shape, v.shape))
+        x, y, gap = (
+            np.broadcast_to(np.asarray(a, np.float64), total.shape).ravel()
+            for a in (u, v, footprint)
+        )
+        _add_octaves(total.reshape(-1), self.lattice, x, y, gap, octaves)
         return total
 
-    def _at(self, i: NDArray[np.int32], j: NDArray[np.int32]) -> Field:
-        found: Field = self.lattice.take(((j & (CELLS - 1)) << 8) + (i & (CELLS - 1)))
-        return found
+
+@kernel
+def _value(lattice: NDArray[np.float32], u: float, v: float) -> float:
+    """Return smooth noise in -1..1 with features one unit wide."""
+    i, j = math.floor(u), math.floor(v)
+    s, t = u - i, v - j
+    s, t = s * s * (3 - 2 * s), t * t * (3 - 2 * t)
+    left, right = i & (CELLS - 1), (i + 1) & (CELLS - 1)
+    row, below = (j & (CELLS - 1)) * CELLS, ((j + 1) & (CELLS - 1)) * CELLS
+    low = lattice[row + left] + s * (lattice[row + right] - lattice[row + left])
+    high = lattice[below + left] + s * (lattice[below + right] - lattice[below + left])
+    return float(low + t * (high - low))
+
+
+@kernel
+def _add_octaves(
+    total: NDArray[np.float64],
+    lattice: NDArray[np.float32],
+    u: NDArray[np.float64],
+    v: NDArray[np.float64],
+    footprint: NDArray[np.float64],
+    octaves: int,
+) -> None:
+    """Write the sum for each of the points (point,)."""
+    for n in range(total.size):
+        x, y, weight, width = u[n], v[n], 1.0, footprint[n]
+        total[n] = 0.0
+        for _ in range(octaves):
+            keep = min(max(2.0 - 4.0 * width, 0.0), 1.0)
+            if keep == 0.0:
+                break
+            total[n] += weight * keep * _value(lattice, x, y)
+            x, y = 1.6 * x - 1.2 * y + 31.7, 1.2 * x + 1.6 * y + 17.3
+            weight *= 0.55
+            width *= 2.0
 
 
 def ramp(x: Field, low: float, high: float) -> Field:

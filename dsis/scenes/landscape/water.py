@@ -8,14 +8,14 @@ from numpy.typing import NDArray
 from dsis.compiled import kernel
 from dsis.scenes.landscape.ground import fractal, step
 from dsis.scenes.landscape.relief import LAKE_M
-from dsis.scenes.landscape.shading import HAZE_PER_M
+from dsis.scenes.landscape.shading import HAZE_PER_M, cloud_shade
 from dsis.scenes.landscape.visible import SKY, WATER, Seen
 from dsis.scenes.noise import flakes, noise
 
 Numbers = NDArray[np.float64]
 LONGEST_RIPPLE_M, RIPPLE_SLOPE = 4.2, 0.030
-GLITTER_SLOPE = 0.22  # root mean square over the wavelets that make the glitter
-GLINT = 4.0  # radiance of a wavelet that mirrors the sun, in that of a white surface
+GUST_M_PER_S, LULL = 2.6, 0.35  # wind over the lakes; its share where they are smooth
+GLINT = 6.0  # radiance of a cell of wavelets that mirror the sun, in that of a white surface
 
 
 @kernel
@@ -75,16 +75,27 @@ def _land(
 def _glitter(
     ray: tuple[float, float, float], x: float, y: float, sun: Numbers, wind: float, cell: float
 ) -> float:
-    """Return the radiance of wavelets that lean as half-way between eye and sun."""
-    hx, hy, hz = sun[0] - ray[0], sun[1] - ray[1], sun[2] - ray[2]
-    chance = 0.25 * math.exp(
-        -(hx * hx + hy * hy) / (2 * GLITTER_SLOPE**2 * (0.5 + 0.5 * wind) * hz * hz)
-    )
+    """Return the radiance of a cell of wavelets, some of which lean half-way between eye and sun.
+
+    Its mean is what slopes of the variance by Cox and Munk (J. Opt. Soc. Am. 44, 838, 1954) mirror,
+    less what wavelets hide from one another; no cell has more than `GLINT`.
+    """
+    dip = -ray[2] / math.sqrt(1.0 + ray[2] * ray[2])
+    level = math.sqrt(1.0 - dip * dip)
+    hx, hy, hz = sun[0] - level * ray[0], sun[1] - level * ray[1], sun[2] + dip
+    square = hx * hx + hy * hy + hz * hz
+    variance = 0.0015 + 0.00256 * GUST_M_PER_S * (LULL + (1.0 - LULL) * wind)  # along each axis
+    leaning = math.exp(-(square / (hz * hz) - 1.0) / (2.0 * variance)) / (2 * math.pi * variance)
+    fresnel = 0.02 + 0.98 * (1.0 - 0.5 * math.sqrt(square)) ** 5
+    steep = dip / level / math.sqrt(2.0 * variance)
+    hidden = 0.5 * (math.exp(-steep * steep) / (math.sqrt(math.pi) * steep) - math.erfc(steep))
+    mean = math.pi * fresnel * leaning * square * square / hz**4 / (4.0 * dip * (1.0 + hidden))
+    chance = mean / GLINT
     if chance < 1e-4:
         return 0.0
     size = 0.35 * 2.0 ** math.ceil(max(math.log2(cell / 1.2), 0.0))
     spark = 0.5 + 0.5 * flakes(x / size, y / size, 77.5)
-    return GLINT * step(spark, 1.0 - 0.9 * chance, 1.02 - 0.86 * chance)
+    return GLINT * step(spark, 1.0 - 1.1 * chance, 1.0 - 0.9 * chance)
 
 
 @kernel
@@ -121,7 +132,7 @@ def mirror(
             up = max(-slope + 2.0 * along, 0.004)
             if not _land(out, colour[column], depth[column], what[column], slopes, row, up):
                 _sky(out, table, up, azimuths[column] + 2.0 * aside * wind)
-            glint = _glitter((ax, ay, slope), x, y, sun, wind, deep)
+            glint = _glitter((ax, ay, slope), x, y, sun, wind, deep) * cloud_shade(x, y)
             fresnel = 0.02 + 0.98 * (1.0 - min(max(-slope + along, 0.02), 1.0)) ** 5
             shallow = math.exp(0.7 * min(part[column, row] - LAKE_M, 0.0))
             body = (0.010 + 0.05 * shallow, 0.026 + 0.05 * shallow, 0.026 + 0.02 * shallow)

@@ -1,0 +1,105 @@
+"""Promise: kernels do the same work on any number of threads, and are never stale."""
+
+import os
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dsis.compiled import ROWS_PER_BLOCK, kernel, over_rows
+from dsis.demosaic.bilinear_block import ALIGNMENT, PIXELS, fence, store, stream
+
+
+@pytest.mark.parametrize("threads", [1, 2, 5])
+@pytest.mark.parametrize(
+    "rows", [0, 1, ROWS_PER_BLOCK, ROWS_PER_BLOCK + 1, 10 * ROWS_PER_BLOCK - 1]
+)
+def test_every_row_is_worked_on_once(rows: int, threads: int) -> None:
+    times = np.zeros(rows, int)
+
+    def work(first: int, last: int) -> None:
+        times[first:last] += 1
+
+    over_rows(work, rows, threads)
+    assert (times == 1).all()
+
+
+def test_work_that_fails_is_told_and_the_rest_is_left() -> None:
+    begun: list[int] = []
+    met = threading.Barrier(2)
+
+    def work(first: int, last: int) -> None:
+        begun.append(first)
+        if len(begun) <= 2:
+            met.wait(timeout=60)  # both threads have a block: what is left is nobody's yet
+        raise ValueError(last)
+
+    with pytest.raises(ValueError, match=r"\d"):
+        over_rows(work, 50 * ROWS_PER_BLOCK, 2)
+    assert len(begun) == 2
+
+
+def aligned(samples: int) -> np.ndarray:
+    """Return zeros that begin where a line of the cache does."""
+    space = np.zeros(samples + ALIGNMENT, np.float32)
+    return space[-space.ctypes.data % ALIGNMENT // 4 :][:samples]
+
+
+@kernel
+def block(rows: np.ndarray, line: np.ndarray, blue: bool, odd: bool, past: bool) -> None:
+    if past:
+        stream(rows[0], rows[1], rows[2], np.uintp(PIXELS), line, blue, odd)
+    else:
+        store(rows[0], rows[1], rows[2], np.uintp(PIXELS), line, blue, odd)
+    fence()
+
+
+@pytest.mark.parametrize("blue", [False, True])
+@pytest.mark.parametrize("odd", [False, True])
+def test_stores_past_the_cache_write_the_same_bytes_and_no_others(blue: bool, odd: bool) -> None:
+    rows = np.random.default_rng(1).random((3, 3 * PIXELS), np.float32)
+    written = []
+    for past in (False, True):
+        line = aligned(9 * PIXELS)
+        block(rows, line, blue, odd, past)
+        written.append(line.tobytes())
+        assert not line[: 3 * PIXELS].any()
+        assert line[3 * PIXELS : 6 * PIXELS].all()
+        assert not line[6 * PIXELS :].any()
+    assert written[0] == written[1]
+
+
+KERNELS = "from dsis.compiled import kernel\n\n@kernel\ndef add(x):\n    return x + {}\n"
+
+
+@pytest.mark.parametrize("place", ["NUMBA_CACHE_DIR", "the user's cache"])
+def test_kernels_of_changed_sources_are_compiled_anew_wherever_they_lie(
+    place: str, tmp_path: Path
+) -> None:
+    """Beside the sources they are as well: `test_startup.py`."""
+    package, elsewhere = tmp_path / "package", tmp_path / "elsewhere"
+    package.mkdir()
+    (package / "outer.py").write_text(
+        "import sys\nimport dsis.compiled\n"
+        + ("dsis.compiled.os.access = lambda *_: False\n" if place == "the user's cache" else "")
+        + "from inner import add\n\n@dsis.compiled.kernel\ndef outer(x):\n    return add(x)\n\n"
+        "print(outer(1), sum(outer.stats.cache_hits.values()))\n"
+    )
+    environment = {k: v for k, v in os.environ.items() if k != "NUMBA_CACHE_DIR"}
+    environment |= {"HOME": str(elsewhere), "XDG_CACHE_HOME": str(elsewhere)}
+    environment |= {"NUMBA_CACHE_DIR": str(elsewhere)} if place == "NUMBA_CACHE_DIR" else {}
+    said = []
+    for step in (1, 2):
+        (package / "inner.py").write_text(KERNELS.format(step))
+        os.utime(package / "inner.py", (step, step))  # of one size; written at another time
+        run = [sys.executable, "-B", "outer.py"]
+        found = subprocess.run(
+            run, cwd=package, env=environment, capture_output=True, text=True, check=True
+        )
+        said.append(found.stdout.split())
+    assert said == [["2", "0"], ["3", "0"]]
+    assert list(elsewhere.rglob("*.nbc"))
+    assert not list(package.rglob("*.nbc"))

@@ -1,6 +1,7 @@
 """Promise: kernels do the same work on any number of threads, and are never stale."""
 
 import os
+import shutil
 import subprocess
 import sys
 import threading
@@ -9,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from dsis import compiled
 from dsis.compiled import ROWS_PER_BLOCK, kernel, over_rows
 from dsis.demosaic.bilinear_block import ALIGNMENT, PIXELS, fence, store, stream
 
@@ -103,3 +105,25 @@ def test_kernels_of_changed_sources_are_compiled_anew_wherever_they_lie(
     assert said == [["2", "0"], ["3", "0"]]
     assert list(elsewhere.rglob("*.nbc"))
     assert not list(package.rglob("*.nbc"))
+
+
+def test_only_kernels_that_nobody_uses_any_more_are_removed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Another process may be at it too: what it has removed meanwhile is no fault."""
+    (tmp_path / "package").mkdir()
+    caches = tmp_path / "package" / "__pycache__"
+    for age, name in enumerate(("kernels-new", "kernels-old", "kernels-older", "others-old")):
+        (caches / name).mkdir(parents=True)
+        os.utime(caches / name, (1e9 * (age == 0) + 2e9 - age,) * 2)
+    monkeypatch.setattr(compiled.time, "time", lambda: 3e9)
+    remove = shutil.rmtree
+
+    def both(folder: Path, **_: bool) -> None:
+        for old in caches.glob("kernels-old*"):  # the other process is quicker
+            remove(old)
+        assert not folder.exists()
+
+    monkeypatch.setattr(compiled.shutil, "rmtree", both)
+    compiled._cache.__wrapped__(tmp_path / "package", "")
+    assert {path.name for path in caches.iterdir()} == {"kernels-new", "others-old"}

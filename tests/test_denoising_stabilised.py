@@ -77,8 +77,9 @@ def test_without_shot_noise_it_is_a_division(sigma, x):
 def test_the_transform_rises_without_a_step(slope, intercept, switch):
     law = stabiliser(([-np.inf, switch], slope, intercept), "gaussian")
     x = np.sort(np.append(np.linspace(-100, 6000, 5001), [switch, np.nextafter(switch, 0), 0]))
-    step = np.diff(law.forward(x))
-    assert (step >= 0).all()
+    f = law.forward(x)
+    step = np.diff(f)
+    assert (step >= -4 * np.spacing(np.abs(f[1:]))).all()  # rounding, between neighbouring floats
     least = min(np.sqrt(max(t, 0) + 7 / 8 * m**2) for m, t in zip(slope, intercept, strict=True))
     assert (step <= np.diff(x) / least * (1 + 1e-6) + 1e-9).all()
 

@@ -64,10 +64,41 @@ def test_a_full_disk_leaves_no_file(
 
 
 def test_what_the_system_says_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def full(*_: object) -> Path:
-        raise OSError(errno.ENOSPC, "No space left on device")
+    write = Path.open
+
+    def full(path: Path, mode: str = "r", *rest: object) -> object:
+        if path.exists():  # there is space for a name, not for samples
+            raise OSError(errno.ENOSPC, "No space left on device")
+        return write(path, mode, *rest)
 
     monkeypatch.setattr(Path, "open", full)
     with pytest.raises(OSError, match="No space left on device"):
         imagefile.write_codes(tmp_path / "a.tif", np.ones((8, 8, 1), np.uint8))
     assert not list(tmp_path.iterdir())
+
+
+def test_words_about_a_picture_are_kept_whatever_its_samples(tmp_path: Path) -> None:
+    pixels = np.ones((8, 9, 3), np.uint16)
+    imagefile.write_codes(tmp_path / "a.tif", pixels, {"ImageDescription": "a flat field"})
+    image = ImageBuf(str(tmp_path / "a.tif"))
+    assert image.spec().get_string_attribute("ImageDescription") == "a flat field"
+    np.testing.assert_array_equal(image.get_pixels(image.spec().format), pixels)
+
+
+def test_the_header_says_what_readers_ask_for(tmp_path: Path) -> None:
+    """Tags of TIFF 6.0, part 1: the first row on top, no palette, square pixels, one strip."""
+    imagefile.write_codes(tmp_path / "a.tif", np.ones((8, 9, 3), np.uint8))
+    with Image.open(tmp_path / "a.tif") as image:
+        tags = dict(image.tag_v2)
+    assert {n: tags[n] for n in (256, 257, 258, 259, 262, 274, 277, 278, 284)} == {
+        256: 9, 257: 8, 258: (8, 8, 8), 259: 1, 262: 2, 274: 1, 277: 3, 278: 8, 284: 1
+    }  # fmt: skip
+    assert tags[279] == (8 * 9 * 3,)
+    assert tags[282] == tags[283] == 1
+
+
+def test_what_is_too_large_for_a_plain_tiff_is_left_to_the_library() -> None:
+    """An offset has 32 bits."""
+    for columns, plain in ((2**16 - 1, True), (2**16, False)):
+        pixels = np.broadcast_to(np.uint8(0), (2**16, columns, 1))
+        assert imagefile._plain_tiff(Path("a.tif"), pixels) is plain

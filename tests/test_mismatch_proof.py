@@ -1,21 +1,16 @@
-"""The proof on locked frames: likelihood, gains, gap closed and classifier say what they should."""
+"""The proof on locked frames: likelihood and gains say what they should."""
 
-from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
 import scipy.stats
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from analysis.mismatch.prove import (
     Loglik,
-    auc_of,
     gain_of,
-    gap_closed,
     heldout_gain,
     hold,
     loglik_of,
@@ -27,114 +22,22 @@ from analysis.mismatch.prove.held import Held
 from analysis.mismatch.prove.learning import law_of
 from analysis.mismatch.prove.shape import NORMAL, counted, shape_of
 from analysis.mismatch.prove.whittle import bin_counts, whittle_gain
-from dsis.camera import BaseNoise, Camera, Segment
+from dsis.camera import Camera
 from dsis.cfa import Cfa
 from dsis.effects import Effect, registry
 from dsis.grid import PixelGrid
-from dsis.recording import ExposurePlan, RecordedExposure, Recording, Sensor
-from dsis.simulate import Shot, dark, flat
-from dsis.simulate.simulator import simulated_frames
-
-ROWS, COLUMNS = 96, 128
-LEVELS = (100.0, 250.0, 500.0, 900.0, 1600.0, 2600.0)
-FRAMES = 8
-TRAINING, LOCKED = (0, 1, 2, 4, 5, 6), (3, 7)
-Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class InMemory(Recording):
-    """A recording whose frames are held in memory."""
-
-    stacks: dict[str, NDArray[np.uint16]] | None = None
-
-    def frame(self, exposure: RecordedExposure, index: int) -> NDArray[np.uint16]:
-        assert self.stacks is not None
-        return self.stacks[exposure.name][index]
-
-
-def camera(
-    *effects: Effect,
-    cfa: str = "MONO",
-    segments: tuple[tuple[float, float, float | None], ...] = ((0.5, 20.0, None),),
-    black: float = 64.0,
-) -> Camera:
-    parts = tuple(Segment(slope=m, intercept=t, upper_dn=end) for m, t, end in segments)
-    return Camera(
-        name="planted",
-        cfa=Cfa(cfa),
-        black_level=black,
-        white_level=4095.0,
-        bit_depth=12,
-        noise=BaseNoise(segment=parts),
-        effect=effects,
-    )
-
-
-def recorded(
-    true: Camera,
-    seed: int,
-    *,
-    rows: int = ROWS,
-    columns: int = COLUMNS,
-    frames: int = FRAMES,
-    levels: tuple[float, ...] = LEVELS,
-    lit: bool = True,
-    scene: NDArray[np.float32] | None = None,
-) -> InMemory:
-    """Return a recording of two dark times and flats."""
-    shots = [
-        dark("dark-0", frames=frames, exposure_time_s=0.005),
-        dark("dark-1", frames=frames, exposure_time_s=0.05),
-    ]
-    shots += [
-        flat(
-            f"flat-{i}",
-            level,
-            frames=frames,
-            exposure_time_s=0.01 * (i + 1),
-            light=level if lit else None,
-        )
-        for i, level in enumerate(levels)
-    ]
-    if scene is not None:
-        shots.append(Shot(ExposurePlan("scene", "scene", 0.01, frames), lambda _: scene.copy()))
-    grid = PixelGrid(rows, columns, true.cfa)
-    made = list(simulated_frames(true, shots, grid, seed=seed))
-    stacks = {
-        shot.plan.name: np.stack(made[k * frames : (k + 1) * frames])
-        for k, shot in enumerate(shots)
-    }
-    exposures = tuple(
-        RecordedExposure(
-            shot.plan.name,
-            shot.plan.kind,
-            shot.plan.exposure_time_s,
-            shot.plan.light,
-            tuple(Path(str(i)) for i in range(frames)),
-        )
-        for shot in shots
-    )
-    sensor = Sensor(
-        name="planted",
-        cfa=true.cfa,
-        black_level=true.black_level,
-        white_level=true.white_level,
-        bit_depth=true.bit_depth,
-    )
-    return InMemory(sensor, exposures, rows, columns, Path(), stacks)
-
-
-def held_of(recording: Recording, locked: tuple[int, ...] = LOCKED) -> Held:
-    names = [e.name for e in recording.exposures]
-    frames = len(recording.exposures[0].frames)
-    training = tuple(i for i in range(frames) if i not in locked)
-    return hold(recording, dict.fromkeys(names, training), dict.fromkeys(names, locked))
-
-
-def signals(levels: tuple[float, ...] = LEVELS) -> dict[str, Array]:
-    made = {f"flat-{i}": np.full((2, 2), level) for i, level in enumerate(levels)}
-    return made | {"dark-0": np.zeros((2, 2)), "dark-1": np.zeros((2, 2))}
+from mismatch_recordings import (
+    COLUMNS,
+    FRAMES,
+    LEVELS,
+    LOCKED,
+    ROWS,
+    TRAINING,
+    camera,
+    held_of,
+    recorded,
+    signals,
+)
 
 
 def test_likelihood_of_white_noise_is_its_closed_form() -> None:
@@ -463,80 +366,3 @@ def test_centre_of_clipped_and_coarse_noise(sd: float, level: float) -> None:
     found = cells.centre(mean - 10.0, sd) + 10.0
     # What is left where nothing is corrected: 4 sd from the end, or noise of 0.6 of a code.
     assert found == pytest.approx(level, abs=2e-3 * max(sd, 1.0))
-
-
-def test_intervals_cover() -> None:
-    """Normal gains of two frames each in eight exposures: 95 % intervals in 95 % of draws.
-
-    400 draws: 88 % is five standard errors below 95 %.
-    """
-    rng = np.random.default_rng(4)
-    names = [f"e{i}" for i in range(8)]
-    zero = Loglik({n: np.zeros(2) for n in names}, dict.fromkeys(names, 0.0))
-    covered = 0
-    for k in range(400):
-        gains = {n: 2 + 2 * rng.standard_normal(2) for n in names}
-        low, high = heldout_gain(zero, Loglik(gains, dict.fromkeys(names, 0.0)), seed=k).ci95
-        covered += low < 2 < high
-    assert covered / 400 > 0.88
-
-
-def test_one_locked_frame_tells_no_interval() -> None:
-    one = {"a": np.array([1.0])}
-    gain = heldout_gain(Loglik({"a": np.zeros(1)}, {"a": 0.0}), Loglik(one, {"a": 0.0}), seed=1)
-    assert gain.ci95 == (-np.inf, np.inf)
-
-
-def test_gap_closed() -> None:
-    """Normal measures, 300 of them, off by 3 standard deviations before: closed forms.
-
-    D0 - Df = 9; D1 - Df is 0, 9 or 9/4 on average, its standard error some sqrt(8 / 300) / 9 and
-    the shared spread estimate's: 0.05 in all.
-    """
-    rng = np.random.default_rng(7)
-    n, k = 300, 12
-    after = rng.standard_normal((k, n)) * 2
-    x = rng.standard_normal(n) * 2
-    before = rng.standard_normal((k, n)) * 2 + 6
-    assert gap_closed(x, before, after) == pytest.approx(1, abs=0.25)
-    assert gap_closed(x + 6, after, after + 3) == pytest.approx(0.75, abs=0.25)
-    assert gap_closed(x, before, before) == pytest.approx(0, abs=0.25)
-    assert gap_closed(x, rng.standard_normal((k, n)) * 2, after) is None
-    assert gap_closed(np.full(n, np.nan), before, after) is None
-
-
-def test_classifier_finds_nothing_in_the_right_model() -> None:
-    """Six recordings of 24 samples against 144: one area has a standard error of 0.065."""
-    areas = []
-    for seed in range(6):
-        auc = auc_of(null(seed)[0], camera(), signals(), seed=seed)
-        assert auc is not None
-        areas.append(auc.value)
-    assert abs(np.mean(areas) - 0.5) < 5 * 0.065 / np.sqrt(6)
-
-
-@pytest.mark.parametrize(
-    ("kind", "parameters"),
-    [
-        ("quantisation", {"step_dn": 2.0}),
-        ("image_lag", {"fraction": 0.04}),
-        ("spatial_filtering", {"fraction": 0.015}),
-        ("crosstalk", {"fraction": 0.02}),
-        ("heavy_tailed_read_noise", {"tail_df": 18.0}),
-        ("dsnu", {"sigma_dn": 0.6}),
-        ("row_noise", {"sigma_dn": 1.0}),
-    ],
-)
-def test_classifier_sees_what_is_visible(kind: str, parameters: dict[str, float]) -> None:
-    true = camera(registry()[kind](**parameters))
-    held = held_of(recorded(true, 31))
-    before, after = (auc_of(held, c, signals(), seed=1) for c in (camera(), true))
-    assert before is not None
-    assert after is not None
-    assert before.value >= 0.9
-    assert after.ci95[0] < 0.5
-
-
-def test_a_sensor_without_a_patch_has_no_classifier() -> None:
-    held = held_of(recorded(camera(), 1, rows=24, columns=64, levels=(400.0,)))
-    assert auc_of(held, camera(), signals((400.0,)), seed=1) is None

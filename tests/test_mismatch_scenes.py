@@ -11,9 +11,9 @@ from scipy.ndimage import gaussian_filter, shift
 from analysis.mismatch import Finding, find_mismatch
 from analysis.mismatch.finding import Mismatch
 from analysis.mismatch.observe import observe
-from analysis.mismatch.recalibrate import layout_of
 from analysis.mismatch.source import Source
 from analysis.mismatch.split import Split
+from analysis.mismatch.taking import layout_of
 from dsis.camera import BaseNoise, Camera, Segment
 from dsis.cfa import Cfa
 from dsis.recording import read_recording
@@ -174,7 +174,7 @@ def test_noise_of_bright_places_is_located_by_signal(tmp_path: Path) -> None:
         own = white(rng, name, light)
         return np.where((light > 1000) & (name == "street"), 1.25 * own, own)
 
-    finding = found(recorded(tmp_path, 7, noise=bright))
+    finding = found(recorded(tmp_path, 7, noise=bright), vocabulary=frozenset())
     where = of(finding, "pixel_variance").where
     assert (where.exposures, where.kind) == (("street",), "scene")
     assert where.signal_dn is not None

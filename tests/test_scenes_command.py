@@ -47,7 +47,7 @@ def test_jobs_runs_and_a_cluster_give_the_same_bytes(
     distributed = pytest.importorskip("distributed")
     files = []
     with distributed.LocalCluster(
-        n_workers=1, threads_per_worker=2, processes=False, protocol="tcp", dashboard_address=None
+        n_workers=1, threads_per_worker=2, processes=False, protocol="tcp", dashboard_address="127.0.0.1:0"
     ) as cluster:
         by = (["--jobs", "1"], ["--jobs", "2"], ["--scheduler", cluster.scheduler_address])
         for run, workers in enumerate(by):
@@ -76,6 +76,24 @@ def test_a_file_that_cannot_hold_light_is_refused_before_rendering(
     monkeypatch.setenv("DSIS_CACHE", str(tmp_path / "cache"))
     assert main(["scenes", "city", "--preset", "quick", "--out", str(tmp_path / name)]) == 2
     assert "must be a file that ends in one of: .exr, .tif, .tiff" in capsys.readouterr().err
+    assert not (tmp_path / "cache").exists()
+
+
+def test_a_place_where_nothing_can_be_written_is_refused_before_rendering(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write = Path.write_bytes
+
+    def read_only(path: Path, held: bytes) -> int:
+        if path.parent == tmp_path:
+            raise PermissionError(13, "Permission denied", str(path))
+        return write(path, held)
+
+    monkeypatch.setattr(Path, "write_bytes", read_only)
+    monkeypatch.setenv("DSIS_CACHE", str(tmp_path / "cache"))
+    out = tmp_path / "city.exr"
+    assert main(["scenes", "city", "--preset", "quick", "--out", str(out)]) == 2
+    assert capsys.readouterr().err == f"dsis: {out}: Permission denied\n"
     assert not (tmp_path / "cache").exists()
 
 

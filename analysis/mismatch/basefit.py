@@ -12,7 +12,8 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.mismatch.observe import Layout, Level, Place
+from analysis.mismatch.layout import Layout, Place
+from analysis.mismatch.observe import Level
 
 Array = NDArray[np.float64]
 CLIPPED_SHARE = 1e-3

@@ -7,9 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.candidates import CANDIDATES
+from analysis.mismatch.contradicted import Denial, contradicted
 from analysis.mismatch.explain import because, explained
 from analysis.mismatch.finding import (
     Alternative,
+    Change,
     Finding,
     FittedParameter,
     Gain,
@@ -20,13 +22,14 @@ from analysis.mismatch.finding import (
 )
 from analysis.mismatch.name import Named, Search
 from analysis.mismatch.observe import observe
+from analysis.mismatch.parameters import parameter_errors
 from analysis.mismatch.pictures import Album, evidence_of
-from analysis.mismatch.recalibrate import layout_of, parameter_errors
 from analysis.mismatch.remarks import remarks_on
 from analysis.mismatch.settle import would_settle
 from analysis.mismatch.source import Source
 from analysis.mismatch.split import Split
 from analysis.mismatch.state import Setting, State
+from analysis.mismatch.taking import layout_of
 from analysis.mismatch.thinned import thinned
 from analysis.mismatch.trial import Trial
 from dsis.camera import Camera
@@ -66,7 +69,7 @@ def find_mismatch(
     album = Album(layout)
     seen = observe(layout, lambda name: source.frames(name, numbers[name]), album, keep=True)
     samples = sum(len(e.numbers) for e in layout.exposures) * layout.rows * layout.columns
-    counts = (8, 4, 1, 2, 2) if samples > _LARGE else (16, 16, 2, 2, 4)
+    counts = (8, 4, 1, 1, 2) if samples > _LARGE else (16, 16, 2, 2, 4)
     setting = Setting(layout, seen, split.interpolated, seed, jobs, *counts)
     base = State.of(setting, camera, step)
     words = VOCABULARY if vocabulary is None else vocabulary & VOCABULARY
@@ -74,13 +77,28 @@ def find_mismatch(
     def frames_of(name: str) -> Iterator[NDArray[np.uint16]]:
         return source.frames(name, numbers[name])
 
+    trial = Trial.of(recording, split, source, setting)
+    # Whether anything differs is asked of all frames; what it is, of those that are not locked.
+    judged = setting
+    if samples <= _LARGE:
+        layout, seen = trial.numbers.whole
+        judged = replace(setting, layout=layout, seen=seen)
+    everything = base if judged is setting else State.of(judged, camera, step)
+    base = replace(base, mismatches=everything.mismatches)
     search = Search(setting, camera, base, words, step, frames_of=frames_of)
     final = _searched(search, source) if samples > _LARGE else search.run()
-    trial = Trial.of(recording, split, source, setting)
+    if samples > _LARGE:  # simulations of large recordings tell more, and cost more
+        search.setting = replace(setting, nulls=setting.drafts)
     final, gains = _proven(search, search.settle(final), trial)
     proof = trial.proof(base, final, step, source)
-    found = _finding(camera, base, final, search, gains, proof)
     evidence = evidence_of(base, final, album, split)
+    if judged is not setting:
+        search.setting, search.base = judged, everything
+        base = everything
+        final = State.of(judged, final.camera, step) if search.named else everything
+        counts = Change(len(base.mismatches), len(final.mismatches))
+        proof = replace(proof, discrepancies=counts)
+    found = _finding(camera, base, final, search, gains, proof)
     return replace(found, remarks=(*remarks, *found.remarks), evidence=evidence)
 
 
@@ -100,8 +118,17 @@ def _searched(search: Search, source: Source) -> State:
 
 
 def _proven(search: Search, final: State, trial: Trial) -> tuple[State, dict[str, Gain]]:
-    """Drop, one by one, effects whose gain on the locked frames is within its uncertainty."""
+    """Drop, one by one, effects that are denied, or whose gain is within its uncertainty."""
     while True:
+        denied = [
+            (denial.share, named, denial.why)
+            for named in search.named
+            if (denial := _denied(search, final, named)) is not None
+        ]
+        if denied:
+            _, worst, why = min(denied, key=lambda one: one[0])
+            final = search.drop(final, worst, why)
+            continue
         without = {named.kind: search.without(final, named) for named in search.named}
         gained = trial.gains(final, without)
         weak = [named for named in search.named if not gained[named.kind].certain]
@@ -111,6 +138,10 @@ def _proven(search: Search, final: State, trial: Trial) -> tuple[State, dict[str
         nats = gained[worst.kind].gain.nats_per_frame
         why = f"gains {nats:.3g} nats per locked frame, no more than chance"
         final = search.drop(final, worst, why)
+
+
+def _denied(search: Search, final: State, named: Named) -> Denial | None:
+    return contradicted(final, final.predictor(), named.kind, search.without(final, named))
 
 
 def _finding(

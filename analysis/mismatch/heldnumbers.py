@@ -14,12 +14,14 @@ import scipy.stats
 from numpy.typing import NDArray
 
 from analysis.mismatch.finding import Gain
+from analysis.mismatch.layout import Layout
 from analysis.mismatch.model import simulate
-from analysis.mismatch.observe import Layout, Observation, observe
-from analysis.mismatch.recalibrate import Calibrated, layout_of
+from analysis.mismatch.observe import Observation, observe
+from analysis.mismatch.recalibrate import Calibrated
 from analysis.mismatch.source import Source
 from analysis.mismatch.split import Split
 from analysis.mismatch.state import Setting, State
+from analysis.mismatch.taking import layout_of
 from analysis.mismatch.vector import vector
 from dsis.camera import Camera
 from dsis.recording import Recording
@@ -60,34 +62,41 @@ class HeldNumbers:
             for e in self.setting.layout.exposures
         }
         layout = layout_of(self.recording, numbers, self.source.frames)
-        return layout, observe(layout, lambda name: self.source.frames(name, numbers[name]))
+        return layout, observe(
+            layout, lambda name: self.source.frames(name, numbers[name]), keep=True
+        )
 
     def gain(self, final: State, without: Camera) -> tuple[Gain, float]:
-        """Return the gain of the final model over a camera without an effect, and its error.
+        """Return the gain of the final model over a camera without an effect, and its chance size.
 
         The gain is per locked frame, with its interval by the parametric bootstrap: recordings of
-        the final model, as simulated. The error is the standard error of the gain per frame.
+        the final model, as simulated. Chance gains more than the second in 2.5 % of recordings
+        without the effect at most, and it is not below zero.
         """
         frames = sum(len(self.split.locked.get(e.name, ())) for e in self.setting.layout.exposures)
         if not frames:
             return Gain(0.0, (-np.inf, np.inf)), np.inf
-        own, made = self._ratios(final, without, *self.whole)
-        less, made_less = self._ratios(final, without, self.setting.layout, self.setting.seen)
+        own, made, chance = self._ratios(final, without, *self.whole)
+        less, made_less, chance_less = self._ratios(
+            final, without, self.setting.layout, self.setting.seen
+        )
         total = own - less
         error = float(np.std(made - made_less, ddof=1)) / frames
+        without_it = chance - chance_less
+        clear = float(without_it.mean() + _NORMAL * without_it.std(ddof=1)) / frames
         value = total / frames
-        return Gain(value, (value - _NORMAL * error, value + _NORMAL * error)), error
+        return Gain(value, (value - _NORMAL * error, value + _NORMAL * error)), max(clear, 0.0)
 
     def _ratios(
         self, final: State, without: Camera, layout: Layout, seen: Observation
-    ) -> tuple[float, Array]:
-        """Return ln p(with) - ln p(without) as recorded, and of recordings of the final model."""
+    ) -> tuple[float, Array, Array]:
+        """Return ln p(with) - ln p(without): as recorded, of recordings with it, and without."""
         of = _numbers_of(final.calibrated, layout)
         one, other = (self._made(final, camera, layout) for camera in (final.camera, without))
         recorded = of(seen)
         weights = _weights(one, other, recorded)
         if not weights.any():
-            return 0.0, np.zeros(len(one))
+            return 0.0, np.zeros(len(one)), np.zeros(len(other))
         first, second, value = (np.nan_to_num(x) @ weights for x in (one, other, recorded))
         places = first.mean(), second.mean()
         spread = max(float(first.std(ddof=1)), float(second.std(ddof=1)))
@@ -100,7 +109,7 @@ class HeldNumbers:
                 law.logpdf((x - places[0]) / wide) - law.logpdf((x - places[1]) / wide)
             )
 
-        return float(ratio(float(value))), ratio(first)
+        return float(ratio(float(value))), ratio(first), ratio(second)
 
     def _made(self, final: State, camera: Camera, layout: Layout) -> Array:
         """Return the numbers of simulated recordings of a camera: (recording, number)."""

@@ -5,7 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.mismatch.bank.key import Key
+from analysis.mismatch.bank.home import TIME, homes, one_sided
+from analysis.mismatch.bank.key import MOSAIC, Key
 from analysis.mismatch.finding import Mismatch, Where
 from analysis.mismatch.null import Null, adjusted
 from analysis.mismatch.observe import Layout, Observation
@@ -15,7 +16,8 @@ from analysis.mismatch.vector import Vector
 
 Array = NDArray[np.float64]
 FAMILY = 0.006  # chance of any mismatch in a recording that differs in nothing
-SUMS = 0.7  # of it, for sums over exposures or channels
+HOMES = 0.6  # of it, for the sums that show an effect of the vocabulary best
+SUMS = 0.2  # of it, for other sums over exposures or channels
 _ROOTS = 2e-3  # of a ratio: 0.6 % of the finer mean square
 _FLOORS = {
     "pixel_variance": 1e-3,
@@ -53,9 +55,13 @@ def tested(layout: Layout, null: Null, seen: Vector) -> tuple[Array, Array]:
                       for key in null.keys])  # fmt: skip
     z[peaks] = np.maximum(z[peaks], 0.0)
     known = np.concatenate([null.known, np.ones(len(null.contrasts.keys), bool)])
-    chances = np.ones(len(z))
     weights = shares(layout, null)
-    chances[known] = adjusted(null.chances(z[known]), weights[known])
+    single = null.chances(z)
+    raised = np.array([one_sided(key) for key in null.keys])
+    raised &= np.array(homes(null.keys, layout.channels)) > 0
+    single[raised] = np.where(z[raised] > 0, single[raised] / 2, 1 - single[raised] / 2)
+    chances = np.ones(len(z))
+    chances[known] = adjusted(single[known], weights[known])
     return z, chances
 
 
@@ -65,24 +71,21 @@ def shares(layout: Layout, null: Null) -> Array:
     Sums over exposures and channels, where an effect shows best, have most of it.
     """
     known = np.concatenate([null.known, np.ones(len(null.contrasts.keys), bool)])
-    single = len(layout.channels) == 1
+    home = np.where(known, homes(null.keys, layout.channels), 0.0)
+    alone = len(layout.channels) == 1
     summed = np.array(
         [
-            not key.exposure
-            and (key.scope == "contrast" or key.channel == "" or single)
-            and key.statistic != "line_correlation"
+            not key.exposure and (key.scope == "contrast" or key.channel == "" or alone)
             for key in null.keys
         ]
     )
-    return np.where(
-        known,
-        np.where(
-            summed,
-            SUMS / max((known & summed).sum(), 1),
-            (1 - SUMS) / max((known & ~summed).sum(), 1),
-        ),
-        0.0,
+    rest = known & (home == 0)
+    groups = (
+        (HOMES, home),
+        (SUMS, 1.0 * (rest & summed)),
+        (1 - HOMES - SUMS, 1.0 * (rest & ~summed)),
     )
+    return np.asarray(sum(share * own / max(own.sum(), 1) for share, own in groups))
 
 
 def located(
@@ -142,12 +145,14 @@ def _where(
         columns=_middle(keys[top], "columns", layout.columns),
         spatial_frequency=_frequency(layout, seen, statistic, keys[top]),
         pixels=_pixels(layout, seen, keys[top]),
-        exposure_time_s=(min(times), max(times)) if keys[top].scope == "time" else None,
+        exposure_time_s=(min(times), max(times))
+        if "time" in (keys[top].scope, TIME[-4:] if keys[top].detail == TIME else "")
+        else None,
     )
 
 
 def _middle(key: Key, axis: str, size: int) -> tuple[int, int] | None:
-    if key.statistic == "half_seam" and key.detail == axis:
+    if key.statistic == "half_seam" and key.detail.startswith(axis):
         return size // 2 - 1, size // 2
     return None
 
@@ -155,12 +160,20 @@ def _middle(key: Key, axis: str, size: int) -> tuple[int, int] | None:
 def _frequency(
     layout: Layout, seen: Observation, statistic: str, key: Key
 ) -> tuple[float, float] | None:
+    if statistic == "alternation_variance":
+        name = key.detail.rpartition(" ")[2]
+        # Of a plane's pixels, or of the mosaic's.
+        mosaic = len(layout.channels) > 1
+        of_planes = mosaic and key.scope != MOSAIC and MOSAIC not in key.detail
+        top = 0.25 if of_planes else 0.5
+        return top * (name != "rows"), top * (name != "columns")
     kind = {
         "spectral_peak": "spectrum",
         "row_spectrum_peak": "rows of light" if key.detail == "light" else "rows",
     }.get(statistic)
-    channel = key.channel or layout.channels[0]
-    peak = seen.peaks.get((channel, kind or ""))
+    peak = seen.peaks.get((key.channel, kind or ""))
+    if peak is None:
+        peak = seen.peaks.get((layout.channels[0], kind or ""))
     if peak is None:
         return None
     step = 1 if layout.channels == ("MONO",) else 2

@@ -12,7 +12,8 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.mismatch.observe import Layout, Observation, observe
+from analysis.mismatch.layout import Layout
+from analysis.mismatch.observe import Observation, observe
 from analysis.mismatch.scenes import without_picture
 from dsis.camera import Camera
 from dsis.draw import Draw

@@ -20,7 +20,7 @@ from dsis.effects import Effect
 
 Array = NDArray[np.float64]
 Step = Callable[[], None]
-LEAST_GAIN = 5.0  # of log-likelihood, for an effect to be taken in
+LEAST_GAIN = 2.0  # of log-likelihood, for an effect to be taken in where something is located
 _TIE = 3.0  # of log-likelihood: odds below 20 do not tell two effects apart
 _ALIKE = 0.5  # cosine of what two effects change, from which they are rivals
 _MOST_EFFECTS = 8
@@ -29,8 +29,11 @@ _PHASES = {
     "periodic_noise": "the pattern's phase is the same in all frames but for its sign",
     "bistable_pattern": "the pattern's phase is another in every frame",
 }
+# On a mosaic, taps of even and odd lines are Gr and Gb; their red and blue show nothing more.
+_NARROWER = {"channel_imbalance": "tap_mismatch"}
 _SPIKY = 10.0  # standard errors from which tails bend the variances
 _TAILS = frozenset({"kurtosis", "kurtosis_within_pixels", "one_off_outliers"})
+_MOST_OF, _LEAST_CHANGE = 0.7, 1.0
 _MINOR = 0.3  # share of a departure
 _RESOLVED = 0.7  # share of what an effect touches that it must explain
 
@@ -163,6 +166,10 @@ class Search:
             and _alike(state, fitted[0], fitted[1])
         ):
             first, second = fitted[:2]
+            narrow = _narrower(first, second)
+            if narrow is not None:
+                fitted = [narrow, *fitted[2:]]
+                break
             self.ties.append((first, second))
             for one, other in ((first, second), (second, first)):
                 self.refused[one.kind] = f"explains the recording no better than {other.kind}"
@@ -224,6 +231,14 @@ class Search:
             state = self.drop(state, worst[1], worst[2])
 
 
+def _narrower(one: Ranked, other: Ranked) -> Ranked | None:
+    """Return which of two effects claims no more than is seen, of two that are one here."""
+    for narrow, wide in ((one, other), (other, one)):
+        if _NARROWER.get(narrow.kind) == wide.kind:
+            return narrow
+    return None
+
+
 def _alike(state: State, one: Ranked, other: Ranked) -> bool:
     """Return whether two effects change the same numbers in the same way."""
     null = state.null
@@ -273,7 +288,9 @@ def resolved(predictor: Predictor, state: State, without: Array) -> float:
     change = np.concatenate([single, sums @ single / null.contrast_sd])
     forms = np.concatenate([predictor.forms, np.full(len(sums), float(np.median(predictor.forms)))])
     after = null.departures(state.vector)
-    clear = np.abs(change) > _CLEAR
+    # What changes nothing clearly is judged by what it changes most.
+    limit = min(_CLEAR, _MOST_OF * float(np.abs(change).max(initial=0.0)))
+    clear = np.abs(change) > max(limit, _LEAST_CHANGE)
     # Where an effect adds little, and rightly, to a large departure, the rest is another's.
     departure = after + change
     clear &= ~((change * departure > 0) & (np.abs(change) < _MINOR * np.abs(departure)))
@@ -282,5 +299,5 @@ def resolved(predictor: Predictor, state: State, without: Array) -> float:
     before = np.abs(departure)[clear]
     allowed = _CLEAR + 2 * forms[clear] * np.abs(change[clear])
     left = np.maximum(np.abs(after[clear]) - allowed, 0.0).sum()
-    total = np.maximum(np.maximum(before, np.abs(change[clear])) - _CLEAR, 0.0).sum()
+    total = np.maximum(np.maximum(before, np.abs(change[clear])) - limit, 0.0).sum()
     return float(1 - left / total) if total > 0 else 0.0

@@ -8,13 +8,15 @@ import scipy.stats
 from numpy.typing import NDArray
 
 from analysis.mismatch.bank.key import Key
+from analysis.mismatch.contrasts import Contrasts, contrasts
 from analysis.mismatch.observe import Layout
-from analysis.mismatch.vector import Contrasts, Vector, contrasts
+from analysis.mismatch.vector import Vector
 
 Array = NDArray[np.float64]
 _OWN = 40.0  # degrees of freedom that the closed form, scaled by name, is worth for a number
 _POOLED = 160.0  # and for the tails: a scale is shared by all numbers of a name
 _LEAST_SCALE = 0.8
+_COMB = 0.4  # relative error of the codes' imbalance that a model predicts
 
 
 @dataclass(frozen=True)
@@ -79,6 +81,9 @@ def null_of(layout: Layout, simulated: Sequence[Vector], seen: Vector) -> Null:
     scale = _by_name(seen.keys, own, known)
     blended = (_OWN * scale + (count - 1) * own) / (_OWN + count - 1)
     sd = error * np.sqrt(np.maximum(blended, _LEAST_SCALE**2) * (1 + 1 / count))
+    # How deep a comb of codes is hangs on the numbers of the camera: on electrons of several DN.
+    comb = np.array([key.statistic == "code_imbalance" for key in seen.keys])
+    sd = np.where(comb, np.hypot(sd, _COMB * mean), sd)
     sums = contrasts(layout, Vector(seen.keys, seen.values, sd), known)
     parts = np.where(known, (np.nan_to_num(values) - mean) / sd, 0.0)
     along = parts @ sums.matrix.T

@@ -14,132 +14,15 @@ from analysis.mismatch.bank.local import local_scalars, variances, widened
 from analysis.mismatch.bank.maps import Parts, PatternSums, Regressors, parts
 from analysis.mismatch.bank.scalars import Number, scalars
 from analysis.mismatch.bank.together import together
-from analysis.mismatch.scenes import SCENE, Local, Scene
-from dsis.cfa import Cfa, pattern
+from analysis.mismatch.layout import Layout, Place, Taken
+from analysis.mismatch.scenes import Local
 from dsis.measures import Accumulator, Channel, Measured
 
 Array = NDArray[np.float64]
+__all__ = ["Frames", "Layout", "Level", "Observation", "Place", "Taken", "measure", "observe"]
+
 Frames = Callable[[str], Iterable[NDArray[np.generic]]]
 Watcher = Callable[[str, Measured], None]
-Place = tuple[str, str]
-"""Exposure and channel; of a scene also channel and bin of signal."""
-
-
-@dataclass(frozen=True)
-class Taken:
-    """One exposure as the bank takes it.
-
-    Attributes
-    ----------
-    name, kind
-        Of the exposure.
-    exposure_time_s
-        Exposure time, s.
-    light
-        Light per frame; None: unknown.
-    numbers
-        Numbers of the frames that are used, from 0.
-    """
-
-    name: str
-    kind: str
-    exposure_time_s: float
-    light: float | None
-    numbers: tuple[int, ...]
-
-
-@dataclass(frozen=True)
-class Layout:
-    """What is observed, and how sums over exposures are weighted.
-
-    Attributes
-    ----------
-    exposures
-        In the order of the recording.
-    rows, columns, cfa
-        Of the frames.
-    black_dn, white_dn
-        Nominal black level and largest code: levels are counted from this black.
-    signal_dn, variance_dn2
-        Expected by the re-calibrated model, by exposure and channel: weights only.
-    scenes
-        Static scenes among the exposures; their signals and variances are as recorded.
-    moving
-        Exposures of kind scene that are left out, for the picture moves between frames.
-    """
-
-    exposures: tuple[Taken, ...]
-    rows: int
-    columns: int
-    cfa: Cfa
-    black_dn: float
-    white_dn: float
-    signal_dn: Mapping[Place, float]
-    variance_dn2: Mapping[Place, float]
-    scenes: Mapping[str, Scene] = field(default_factory=dict)
-    moving: tuple[str, ...] = ()
-
-    @property
-    def channels(self) -> tuple[str, ...]:
-        """Names of the channels."""
-        return ("MONO",) if self.cfa is Cfa.MONO else ("R", "Gr", "Gb", "B")
-
-    @property
-    def sites(self) -> dict[str, tuple[int, int]]:
-        """First row and column of each channel."""
-        return sites(self.cfa)
-
-    @property
-    def uniform(self) -> tuple[Taken, ...]:
-        """Darks and flats."""
-        return tuple(e for e in self.exposures if e.kind != SCENE)
-
-    @property
-    def pictures(self) -> tuple[Taken, ...]:
-        """Static scenes."""
-        return tuple(e for e in self.exposures if e.name in self.scenes)
-
-    def part(self, place: Place) -> tuple[Local, slice]:
-        """Return the pixels of a place of a scene: a channel's, and those of a bin of signal."""
-        channel, _, label = place[1].partition(" ")
-        local = self.scenes[place[0]].channels[channel]
-        return local, local.bins[label].ranges if label else slice(None)
-
-    def range_dn(self, place: Place) -> tuple[float, float]:
-        """Return the lowest and the highest signal of a place of a scene from 0 on, DN above black.
-
-        A place of all channels together has those of all its channels.
-        """
-        channels = self.scenes[place[0]].channels
-        name, _, label = place[1].partition(" ")
-        parts = [channels[name]] if name in channels else channels.values()
-        own = [bin_ for part in parts for key, bin_ in part.bins.items() if label in ("", key)]
-        return max(min(b.low_dn for b in own), 0.0), max(b.high_dn for b in own)
-
-    def regressors(self, channel: str) -> Regressors:
-        """Return what the mean frames of a channel are regressed on."""
-        names = [e.name for e in self.uniform]
-        return Regressors.of(
-            names,
-            {name: self.signal_dn[name, channel] for name in names},
-            {e.name: e.exposure_time_s for e in self.uniform},
-            {e.name: len(e.numbers) / self.variance_dn2[e.name, channel] for e in self.uniform},
-        )
-
-
-def sites(cfa: Cfa) -> dict[str, tuple[int, int]]:
-    """Return the first row and column of each channel, in the order R, Gr, Gb, B."""
-    if cfa is Cfa.MONO:
-        return {"MONO": (0, 0)}
-    colours = pattern(cfa)
-    found = {}
-    for y in (0, 1):
-        for x in (0, 1):
-            name = "RGB"[colours[y, x]]
-            if name == "G":
-                name += "r" if 0 in colours[y] else "b"
-            found[name] = (y, x)
-    return {name: found[name] for name in ("R", "Gr", "Gb", "B")}
 
 
 @dataclass(frozen=True)
@@ -233,19 +116,6 @@ class _Channel:
             self.variances.add(channel.variance_map, (frames - 1) / variance_dn2)
         self.spectra.add(channel, frames, variance_dn2, signal_dn)
 
-    def pooled(self) -> dict[str, Number]:
-        """Return the numbers of spectra and persistent variances."""
-        return {**self.variances.numbers(), **self.spectra.numbers()}
-
-    def peaks(self) -> list[tuple[str, Peak]]:
-        """Return where the spectra are largest."""
-        found = (
-            ("spectrum", self.spectra.peak()),
-            ("rows", self.spectra.row_peak("")),
-            ("rows of light", self.spectra.row_peak("signal")),
-        )
-        return [(kind, peak) for kind, peak in found if peak is not None]
-
 
 def observe(
     layout: Layout, frames_of: Frames, watch: Watcher | None = None, *, keep: bool = False
@@ -286,12 +156,16 @@ def observe(
             sums[name].add(exposure.name, channel, frames, variance, signal)
     local = _scenes(layout, frames_of, watch, found, shared)
     maps, images = _maps(layout, sums)
+    spectra = {name: own.spectra for name, own in sums.items()}
+    if len(spectra) > 1:  # what all channels of a mosaic show
+        spectra[""] = SpectrumSums.merged(list(spectra.values()))
+    pooled = {name: own.variances.numbers() for name, own in sums.items()}
     return Observation(
         levels,
         found,
         maps,
-        {name: own.pooled() for name, own in sums.items()},
-        {(name, kind): peak for name, own in sums.items() for kind, peak in own.peaks()},
+        {name: {**pooled.get(name, {}), **own.numbers()} for name, own in spectra.items()},
+        {(name, kind): peak for name, own in spectra.items() for kind, peak in own.peaks()},
         images if keep else {},
         shared,
         local,

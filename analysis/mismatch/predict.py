@@ -6,16 +6,14 @@ of its own: no effect of the vocabulary is exactly what a sensor does.
 """
 
 from collections import Counter
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.bank.key import Key
-from analysis.mismatch.model import Model, simulate
 from analysis.mismatch.null import Null
-from analysis.mismatch.observe import Layout, Observation
+from analysis.mismatch.simulations import Simulations
 from analysis.mismatch.touches import touched
 from analysis.mismatch.vector import Vector
 from dsis.camera import Camera
@@ -65,24 +63,10 @@ class Reference:
 class Predictor:
     """Predictions of cameras beside a reference."""
 
-    def __init__(
-        self,
-        layout: Layout,
-        model: Model,
-        numbers_of: Callable[[Observation], Vector],
-        reference: Reference,
-        *,
-        replicates: int,
-        seed: int,
-        jobs: int,
-    ) -> None:
-        self.layout, self.model, self.numbers_of = layout, model, numbers_of
-        self.reference = reference
-        self.replicates, self.seed, self.jobs = replicates, seed, jobs
-        self.cache: dict[str, Array] = {}
-        self.simulations = 0
+    def __init__(self, simulations: Simulations, reference: Reference, *, replicates: int) -> None:
+        self.simulations, self.reference, self.replicates = simulations, reference, replicates
         self.forms = form_errors(reference.vector.keys)
-        self.base = self._numbers(reference.camera)
+        self.base = simulations.of(reference.camera, replicates)
 
     def mean(self, camera: Camera) -> Array:
         """Return the mean of every number under a camera; nan where it is unknown.
@@ -93,26 +77,13 @@ class Predictor:
         mine, theirs = Counter(camera.effect), Counter(self.reference.camera.effect)
         different = list(((mine - theirs) + (theirs - mine)).keys())
         may = touched(self.reference.vector.keys, different)
-        change = np.where(may, self._numbers(camera) - self.base, 0.0)
+        made = self.simulations.of(camera, self.replicates)
+        change = np.where(may, made - self.base, 0.0)
         mean = change.mean(0)
         noise = change.var(0, ddof=1) / len(change) if len(change) > 1 else 0.0 * mean
         with np.errstate(invalid="ignore", divide="ignore"):
             kept = np.where(mean == 0, 0.0, mean**2 / (mean**2 + noise))
         return np.asarray(self.reference.null.mean + mean * kept)
-
-    def _numbers(self, camera: Camera) -> Array:
-        key = camera.model_dump_json()
-        if key not in self.cache:
-            seen = simulate(
-                self.model.with_camera(camera),
-                self.layout,
-                range(self.replicates),
-                self.seed,
-                self.jobs,
-            )
-            self.simulations += self.replicates
-            self.cache[key] = np.stack([self.numbers_of(one).values for one in seen])
-        return self.cache[key]
 
     def weights(self, mean: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
         """Return residuals, their standard deviations under a prediction, and which are known."""

@@ -1,33 +1,25 @@
-"""The base model's numbers, fitted again; and whether the camera model's differ from them."""
+"""The base model's numbers, fitted again."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
-from math import hypot, isfinite, sqrt
+from math import isfinite, sqrt
 
 import numpy as np
-import scipy.stats
-from numpy.typing import NDArray
 
-from analysis.mismatch.basefit import CLIPPED_SHARE, BaseFit, Offsets, colour, fit_base
+from analysis.mismatch.basefit import BaseFit, Offsets, colour, fit_base
 from analysis.mismatch.bending import bending_offsets, bends
-from analysis.mismatch.finding import ParameterError
+from analysis.mismatch.layout import Layout, Place, sites
 from analysis.mismatch.model import Model, Sites
-from analysis.mismatch.observe import Layout, Level, Observation, Place, Taken, sites
+from analysis.mismatch.observe import Level, Observation
 from analysis.mismatch.rounding import rounded, unrounded
-from analysis.mismatch.scenes import SCENE
-from analysis.mismatch.staging import with_pictures, with_scenes
+from analysis.mismatch.staging import with_pictures
 from dsis.camera import BaseNoise, Camera, Segment
-from dsis.cfa import Cfa
 from dsis.effects.quantisation import Quantisation
-from dsis.errors import InputError
-from dsis.recording import Recording
 
 _ROUNDS = 3
-_LEAST_FRAMES = 2
 _SAME = 0.05  # of an error: the fit has settled
-P_PARAMETERS = 0.004  # chance that numbers without error are called wrong
 _SWITCH_DEVIANCE = 12.0  # by which another gap must fit better before the switch is moved
 
 
@@ -68,70 +60,6 @@ class Calibrated:
             left_out=self.left_out,
             slopes=[s.slope for s in camera.noise.segment],
         )
-
-
-def layout_of(
-    recording: Recording,
-    numbers: Mapping[str, Sequence[int]],
-    first: Callable[[str, Sequence[int]], Iterable[NDArray[np.generic]]],
-) -> Layout:
-    """Return the layout of the frames `numbers`; two frames of each exposure set the weights.
-
-    `first(exposure, numbers)` gives frames; all of a scene are read. Scenes that move are left out,
-    and exposures with fewer than two frames, with more than 0.1 % of a channel at the white level,
-    or whose frames are copies.
-
-    Raises
-    ------
-    InputError
-        Nothing is left.
-    """
-    sensor = recording.sensor
-    taken = []
-    means: dict[Place, float] = {}
-    variances: dict[Place, float] = {}
-    step = 1 if sensor.cfa is Cfa.MONO else 2
-    for recorded in recording.exposures:
-        own = tuple(numbers.get(recorded.name, ()))
-        if len(own) < _LEAST_FRAMES:
-            continue
-        e = Taken(recorded.name, recorded.kind, recorded.exposure_time_s, recorded.light, own)
-        a, b = (np.asarray(f, np.float32) for f in first(e.name, own[:2]))
-        clipped = [
-            float((a[y::step, x::step] >= sensor.white_level).mean())
-            for y, x in sites(sensor.cfa).values()
-        ]
-        if max(clipped) > CLIPPED_SHARE or (a == b).all():
-            continue
-        taken.append(e)
-        for channel, (y, x) in sites(sensor.cfa).items():
-            one, two = a[y::step, x::step], b[y::step, x::step]
-            means[e.name, channel] = float(one.mean() + two.mean()) / 2 - sensor.black_level
-            spread = np.percentile(two - one, [15.865, 84.135])
-            robust = float(spread[1] - spread[0]) ** 2 / 8
-            variances[e.name, channel] = max(robust, 0.05)
-    if not any(e.kind != SCENE for e in taken):
-        fact = "holds no dark or flat of two different frames that are not clipped"
-        raise InputError.of(recording.folder, "exposure", fact)
-    signal = {}
-    for e in taken:
-        for channel in sites(sensor.cfa):
-            darks = [means[d.name, channel] for d in taken if d.kind == "dark"]
-            ground = float(np.mean(darks)) if darks else 0.0
-            signal[e.name, channel] = (
-                0.0 if e.kind == "dark" else max(means[e.name, channel] - ground, 0.0)
-            )
-    layout = Layout(
-        tuple(taken),
-        recording.rows,
-        recording.columns,
-        sensor.cfa,
-        sensor.black_level,
-        sensor.white_level,
-        signal,
-        variances,
-    )
-    return with_scenes(layout, means, first)
 
 
 def calibrate(
@@ -295,73 +223,3 @@ def _moved(
     here = deviance(switches[0])
     best = min(gaps, key=deviance, default=switches[0])
     return (best,) if deviance(best) < here - _SWITCH_DEVIANCE else switches
-
-
-def parameter_errors(
-    camera: Camera, calibrated: Calibrated, layout: Layout, simulated: Sequence[BaseFit]
-) -> tuple[ParameterError, ...]:
-    """Return the numbers of the camera model that the recording contradicts.
-
-    Judged together (chi-squared over all numbers, at `P_PARAMETERS`) and one by one (Bonferroni).
-    The errors are those of the fit; larger ones where fits of simulated recordings scatter more,
-    as row noise, drift and fixed patterns make them.
-    """
-    fit = calibrated.fit
-    rows: list[tuple[str, float, float, float]] = []
-    many = len(fit.pieces) > 1
-    # A segment that the camera model does not have is physics, no wrong number.
-    for number, (piece, segment) in enumerate(zip(fit.pieces, camera.noise.segment, strict=False)):
-        at = f"noise.segment[{number}]" if many else "noise"
-        others = [one.pieces[number] for one in simulated]
-        if isfinite(piece.slope_error):
-            error = _wider(piece.slope_error, [p.slope for p in others])
-            rows.append(
-                (f"{at}.slope", segment.slope, piece.slope, hypot(error, segment.slope_se or 0.0))
-            )
-        if isfinite(piece.intercept_error):
-            error = _wider(piece.intercept_error, [p.intercept for p in others])
-            error = hypot(error, segment.intercept_se or 0.0)
-            rows.append((f"{at}.intercept", segment.intercept, piece.intercept, error))
-    errors = [e for e in fit.black_error_dn.values() if isfinite(e)]
-    if errors:
-        recorded = layout.black_dn + _mean_black(fit)
-        error = sqrt(sum(e**2 for e in errors)) / len(errors)
-        error = _wider(error, [_mean_black(one) for one in simulated])
-        rows.append(("black_level", camera.black_level, recorded, error))
-    return _contradicted(rows, camera, calibrated)
-
-
-def _mean_black(fit: BaseFit) -> float:
-    return float(np.mean(list(fit.black_dn.values())))
-
-
-def _wider(error: float, values: Sequence[float]) -> float:
-    """Return the error, or the scatter of simulated values where that is clearly larger."""
-    if len(values) < 2:
-        return error
-    scatter = float(np.std(values, ddof=1))
-    certain = 1 + 3 / sqrt(2 * (len(values) - 1))
-    return scatter if scatter > certain * error else error
-
-
-def _contradicted(
-    rows: list[tuple[str, float, float, float]], camera: Camera, calibrated: Calibrated
-) -> tuple[ParameterError, ...]:
-    found = []
-    if rows:
-        z = np.array([(recorded - own) / error for _, own, recorded, error in rows])
-        single = float(scipy.stats.norm.isf(P_PARAMETERS / 4 / len(rows)))
-        joint = float(scipy.stats.chi2.sf((z**2).sum(), len(rows)))
-        least = single
-        if joint < P_PARAMETERS / 2:
-            least = min(single, max(2.0, float(np.abs(z).max())))
-        found = [
-            ParameterError(name, own, recorded, error)
-            for (name, own, recorded, error), departure in zip(rows, z, strict=True)
-            if abs(departure) >= least
-        ]
-    stated = [s.upper_dn for s in camera.noise.segment if s.upper_dn is not None]
-    for own, recorded in zip(stated, calibrated.switches, strict=False):
-        if own != recorded:
-            found.append(ParameterError("noise.switch_dn", own, recorded, abs(recorded - own) / 4))
-    return tuple(found)

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from analysis.mismatch.basefit import BaseFit, Offsets
 from analysis.mismatch.bending import bending_offsets
+from analysis.mismatch.layout import Layout, Place
 from analysis.mismatch.model import Model
-from analysis.mismatch.observe import Layout, Place
 from analysis.mismatch.scenes import SCENE, Scene, scene_of, without_picture
 from dsis.cfa import Cfa
 

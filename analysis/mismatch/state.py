@@ -9,12 +9,14 @@ from numpy.typing import NDArray
 from analysis.mismatch.basefit import BaseFit
 from analysis.mismatch.clues import Clues
 from analysis.mismatch.finding import Mismatch
+from analysis.mismatch.layout import Layout
 from analysis.mismatch.locate import located, tested
 from analysis.mismatch.model import simulate
 from analysis.mismatch.null import Null, null_of
-from analysis.mismatch.observe import Layout, Observation
+from analysis.mismatch.observe import Observation
 from analysis.mismatch.predict import Predictor, Reference
 from analysis.mismatch.recalibrate import Calibrated, calibrate
+from analysis.mismatch.simulations import Simulations
 from analysis.mismatch.vector import Vector, vector
 from dsis.camera import Camera
 
@@ -70,6 +72,8 @@ class State:
         z and adjusted chances of numbers and contrasts.
     mismatches
         What is certain.
+    simulations
+        Of this model's cameras, kept.
     """
 
     setting: Setting
@@ -81,6 +85,7 @@ class State:
     departures: Array
     chances: Array
     mismatches: tuple[Mismatch, ...]
+    simulations: Simulations
 
     @classmethod
     def of(
@@ -107,6 +112,14 @@ class State:
         own = vector(layout, seen, calibrated.residual)
         null = null_of(layout, vectors, own)
         z, chances = tested(layout, null, own)
+        simulations = Simulations(
+            layout,
+            calibrated.model,
+            lambda one: numbers(layout, calibrated, one),
+            setting.seed,
+            setting.jobs,
+        )
+        simulations.keep(calibrated.model.camera, [one.values for one in vectors])
         return cls(
             setting,
             calibrated,
@@ -117,6 +130,7 @@ class State:
             z,
             chances,
             located(layout, seen, null, z, chances),
+            simulations,
         )
 
     @property
@@ -136,18 +150,11 @@ class State:
 
     def predictor(self, replicates: int | None = None) -> Predictor:
         """Return predictions of other cameras beside this one."""
-        s = self.setting
-        return Predictor(
-            s.layout,
-            self.calibrated.model,
-            lambda one: numbers(s.layout, self.calibrated, one),
-            Reference(self.camera, self.null, self.vector),
-            replicates=replicates or s.replicates,
-            seed=s.seed,
-            jobs=s.jobs,
-        )
+        reference = Reference(self.camera, self.null, self.vector)
+        count = replicates or self.setting.replicates
+        return Predictor(self.simulations, reference, replicates=count)
 
 
-def numbers(layout: Layout, calibrated: Calibrated, seen: Observation) -> Vector:
+def numbers(layout: Layout, calibrated: Calibrated, seen: Observation) -> Array:
     """Return the numbers of a simulated recording, its base numbers fitted as the recording's."""
-    return vector(layout, seen, calibrated.refit(layout, seen.levels))
+    return vector(layout, seen, calibrated.refit(layout, seen.levels)).values

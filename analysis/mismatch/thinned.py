@@ -7,11 +7,11 @@ many trials on the way are made on some exposures, evenly spaced, and some frame
 from collections.abc import Sequence
 from dataclasses import replace
 
-from analysis.mismatch.observe import Layout, Taken
+from analysis.mismatch.layout import Layout, Taken
 
 _FRAMES = 16  # of an exposure, in a row: enough for what frames have in common
 _STACK = 6  # frames from which an exposure shows more than a pair does
-_EXPOSURES = 20  # of fewer frames
+_EXPOSURES = 14  # of fewer frames
 
 
 def thinned(layout: Layout) -> Layout:

@@ -14,10 +14,11 @@ from analysis.mismatch.prove.gain import heldout_gain
 from analysis.mismatch.prove.gap import gap_closed
 from analysis.mismatch.prove.held import Held, hold
 from analysis.mismatch.prove.proof import loglik_of, prove_held
-from analysis.mismatch.recalibrate import Calibrated, layout_of
+from analysis.mismatch.recalibrate import Calibrated
 from analysis.mismatch.source import Source
 from analysis.mismatch.split import Split
 from analysis.mismatch.state import Setting, State
+from analysis.mismatch.taking import layout_of
 from analysis.mismatch.vector import vector
 from dsis.camera import Camera
 from dsis.errors import InputError

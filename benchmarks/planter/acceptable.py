@@ -47,7 +47,7 @@ STATISTICS: dict[str, tuple[str, ...]] = {
     "spatial_filtering": _CORRELATION,
     "pink_noise": ("line_correlation", "row_", *_CORRELATION, "frame_variance", "spectr"),
     "periodic_noise": ("spectral_peak", "spectrum", "peak"),
-    "bistable_pattern": ("spectral_peak", "spectrum", "peak", "phase"),
+    "bistable_pattern": ("spectral_peak", "spectrum", "peak", "phase", "alternation"),
     "readout_memory": (*_CORRELATION, "lag"),
     "tap_mismatch": ("half_seam", "parity", "seam", "tap"),
     "channel_imbalance": ("channel_ratio", "green", "imbalance"),

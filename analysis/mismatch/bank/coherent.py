@@ -1,20 +1,22 @@
 """What a channel shows over all exposures: persistent pixels, spectra and lags along lines."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import sqrt
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import gammaincc, gammaincinv
 
-from analysis.mismatch.bank.scalars import UNKNOWN, Number, gumbel_score, ratio_root
-from dsis.measures import Channel, Estimate
-from dsis.measures.spectra import line_peak, spectral_peak
+from analysis.mismatch.bank.scalars import UNKNOWN, Number, normal_score, ratio_root
+from dsis.measures import Channel
 
 Array = NDArray[np.float64]
 OUTSTANDING = (4, 7, 12)  # standard deviations of a pixel's summed variance
+_BLOCKS = ((1, 1), (1, 2), (2, 1), (2, 2))
+_LEAST_BINS = 8
+_ALONE = 2.0  # times as high a bin elsewhere is the peak, whatever a block sums up to
 LAGS = 16  # along a line, pixels of the plane
-_EULER = 0.5772156649
 
 
 class VarianceSums:
@@ -77,15 +79,17 @@ class Peak:
 class SpectrumSums:
     """Temporal power over all exposures, white noise scaled to 1.
 
-    Two weightings: amplitudes constant in DN, and in proportion to the signal.
+    Three weightings: amplitudes constant in DN, in proportion to the signal (of lines), and in
+    proportion to the noise (for correlations).
     """
 
     def __init__(self, shape: tuple[int, int]) -> None:
         self.shape = shape
         n, m = shape
-        self.power = np.zeros((n, m // 2 + 1))
+        self.power, self.relative = np.zeros((2, n, m // 2 + 1))
         self.rows = {key: np.zeros(n // 2 + 1) for key in ("", "signal")}
         self.columns = np.zeros(m // 2 + 1)
+        self.seen = 0
         self.weight = {key: [0.0, 0.0] for key in ("", "signal")}
 
     def add(self, channel: Channel, frames: int, variance_dn2: float, signal_dn: float) -> None:
@@ -96,11 +100,28 @@ class SpectrumSums:
         seen = frames - 1
         weights = {"": seen / variance_dn2, "signal": seen * max(signal_dn, 0) ** 2 / variance_dn2}
         self.power += weights[""] * channel.power_spectrum / pixel
+        self.relative += seen * channel.power_spectrum / pixel
+        self.seen += seen
         self.columns += weights[""] * channel.column_spectrum / pixel
         for key, weight in weights.items():
             self.rows[key] += weight * channel.row_spectrum / pixel
             self.weight[key][0] += weight
             self.weight[key][1] += weight**2 / seen
+
+    @classmethod
+    def merged(cls, parts: Sequence["SpectrumSums"]) -> "SpectrumSums":
+        """Return the sums of channels together: white noise of each is independent."""
+        found = cls(parts[0].shape)
+        for part in parts:
+            found.power += part.power
+            found.relative += part.relative
+            found.seen += part.seen
+            found.columns += part.columns
+            for key in found.rows:
+                found.rows[key] += part.rows[key]
+                found.weight[key][0] += part.weight[key][0]
+                found.weight[key][1] += part.weight[key][1]
+        return found
 
     def degrees(self, key: str) -> float:
         """Return how many independent frames the mean is worth."""
@@ -113,27 +134,47 @@ class SpectrumSums:
         n, m = self.shape
         if self.weight[""][0]:
             degrees = max(round(self.degrees("")), 1)
-            total = self.weight[""][0]
-            found["spectral_peak"] = _peak(spectral_peak(self.power / total, m, degrees))
-            found["column_spectrum_peak"] = _peak(line_peak(self.columns / total, m, degrees))
-            found |= self._lags(degrees)
+            # The axes hold what rows, columns and frames have in common.
+            edge = self.power[1 : (n + 1) // 2, m // 2 :] if m % 2 == 0 else None
+            inner = self.power[1:, 1 : (m + 1) // 2]
+            found["spectral_peak"] = _largest(inner, degrees, edge)
+            found["column_spectrum_peak"] = _largest(_line(self.columns), degrees)
+            found |= self._lags()
             found |= self._corners(degrees)
         for key, label in (("", "row_spectrum_peak"), ("signal", "row_spectrum_peak of light")):
             if self.weight[key][0]:
                 degrees = max(round(self.degrees(key)), 1)
-                found[label] = _peak(line_peak(self.rows[key] / self.weight[key][0], n, degrees))
+                found[label] = _largest(_line(self.rows[key]), degrees)
         return found
 
     def peak(self) -> Peak | None:
-        """Return where the spectrum off the axes is largest; None without noise."""
+        """Return where the spectrum off the axes is largest, between bins; None without noise."""
         if not self.weight[""][0]:
             return None
         n, m = self.shape
         power = self.power / self.weight[""][0]
         inner = power[1:, 1:]
-        y, x = np.unravel_index(int(inner.argmax()), inner.shape)
-        fy = np.fft.fftfreq(n)[y + 1]
-        return Peak(float((x + 1) / m), float(fy), float(inner.max()))
+        sums = _summed(inner, (2, 2))
+        y, x = np.unravel_index(int(sums.argmax()), sums.shape)
+        block = inner[y : y + 2, x : x + 2]
+        if inner.max() > _ALONE * block.max():
+            y, x = np.unravel_index(int(inner.argmax()), inner.shape)
+        else:
+            down, across = np.unravel_index(int(block.argmax()), block.shape)
+            y, x = y + down, x + across
+        fx = (x + 1 + _within_bin(inner[y], int(x))) / m
+        fy = (y + 1 + _within_bin(inner[:, x], int(y))) / n
+        fy -= float(fy > 1 / 2)
+        return Peak(float(fx), float(fy), float(inner[y, x]))
+
+    def peaks(self) -> list[tuple[str, Peak]]:
+        """Return where the spectra are largest."""
+        found = (
+            ("spectrum", self.peak()),
+            ("rows", self.row_peak("")),
+            ("rows of light", self.row_peak("signal")),
+        )
+        return [(kind, peak) for kind, peak in found if peak is not None]
 
     def row_peak(self, key: str) -> Peak | None:
         """Return where the spectrum of row means is largest."""
@@ -159,16 +200,50 @@ class SpectrumSums:
             found[f"alternation_variance of {name}"] = ratio_root(float(power) / total, degrees)
         return found
 
-    def _lags(self, degrees: int) -> dict[str, Number]:
+    def _lags(self) -> dict[str, Number]:
+        """Return correlations along lines: of a memory, alike at all signals."""
         n, m = self.shape
-        power = self.power / self.weight[""][0]
-        covariance = np.fft.irfft2(power, s=(n, m))
-        sd = 1 / sqrt(n * m * degrees)
+        covariance = np.fft.irfft2(self.relative, s=(n, m))
+        sd = 1 / sqrt(n * m * self.seen)
         found: dict[str, Number] = {}
         for axis, line in (("rows", covariance[0]), ("columns", covariance[:, 0])):
             for lag in range(1, min(LAGS, line.size // 2 - 1) + 1):
                 found[f"line_correlation along {axis} {lag}"] = (float(line[lag] / line[0]), sd)
         return found
+
+
+def _line(power: Array) -> Array:
+    """Return the bins of a line's spectrum that are complex, as (1, bin)."""
+    return power[np.newaxis, 1 : power.size - 1]
+
+
+def _largest(inner: Array, degrees: int, edge: Array | None = None) -> Number:
+    """Return the normal score of the largest bin, or block of two bins a side.
+
+    A sinusoid between bins shows in all of a block, in a single one by 0.4 per axis at worst. White
+    noise is the median bin, over that of Gamma(degrees) / degrees; `edge` are further bins.
+    """
+    if inner.size < _LEAST_BINS:
+        return UNKNOWN
+    white = float(np.median(inner)) * degrees / float(gammaincinv(degrees, 0.5))
+    if not white > 0:
+        return UNKNOWN
+    shape = inner.shape
+    parts = [(b, _summed(inner, b)) for b in _BLOCKS if b[0] <= shape[0] and b[1] <= shape[1]]
+    if edge is not None and edge.size:
+        parts.append(((1, 1), edge))
+    least = 1.0
+    for (high, wide), power in parts:
+        single = float(gammaincc(degrees * high * wide, degrees * float(power.max()) / white))
+        least = min(least, -float(np.expm1(power.size * np.log1p(-min(single, 0.5)))))
+    return normal_score(least), 1.0
+
+
+def _summed(power: Array, block: tuple[int, int]) -> Array:
+    """Return the sum of every block (rows, columns) of bins."""
+    rows, columns = (size - own + 1 for size, own in zip(power.shape, block, strict=True))
+    parts = [power[y : y + rows, x : x + columns] for y in range(block[0]) for x in range(block[1])]
+    return np.asarray(np.sum(parts, 0))
 
 
 def _within_bin(power: Array, place: int) -> float:
@@ -178,13 +253,6 @@ def _within_bin(power: Array, place: int) -> float:
     above = sqrt(max(float(power[place + 1]) - 1, 0.0)) if place + 1 < power.size else 0.0
     side, larger = (1.0, above) if above >= below else (-1.0, below)
     return side * larger / (excess + larger) if excess > 0 else 0.0
-
-
-def _peak(found: Estimate) -> Number:
-    if not found.known or not found.null_error > 0:
-        return UNKNOWN
-    scaled = np.pi / sqrt(6) * (found.value - found.null_value) / found.null_error + _EULER
-    return gumbel_score(float(scaled)), 1.0
 
 
 def split_name(name: str) -> tuple[str, str]:

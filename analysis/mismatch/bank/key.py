@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+MOSAIC = "in all channels"
+
 
 @dataclass(frozen=True)
 class Key:

@@ -22,6 +22,8 @@ Array = NDArray[np.float64]
 MAPS = ("offset", "gain", "time")
 ALONE = ("offset", "gain")
 LOW = "low order"
+WHOLE = "halves as a whole"
+STANDING_OUT = (3.5, 5)  # standard deviations of a map above its middle
 _LEAST_SPREAD = 0.02  # share of a regressor that the others leave, to be told from them
 
 
@@ -170,8 +172,10 @@ def parts(image: Array, noise: float) -> Parts:
         "fixed_row_variance": ratio_root(row / square, n - 1 - degree, dof),
         "fixed_column_variance": ratio_root(column / square, m - 1 - degree, dof),
         **surfaces(coefficients, (row, column, square), dof),
+        **slopes(coefficients, (row, column, square), image.shape),
         **_correlations(pixels, mean_square),
         "outlying_pixels": _outlying(scatter + mean_square**2, square, pixels.size),
+        **_standing_out(pixels, square),
         **_seams(by_row, by_column, (row, column)),
     }
     return Parts(pixels, rows, columns, square, coefficients, numbers)
@@ -203,6 +207,37 @@ def surfaces(
         kinds = int(taken.sum())
         found[name] = ratio_root(float(power[taken].sum()) / kinds / square, kinds, dof)
     return found
+
+
+def slopes(
+    coefficients: Array, squares: tuple[float, float, float], shape: tuple[int, ...]
+) -> dict[str, Number]:
+    """Return the tilt along each axis and the fall to the corners, each in its own noise.
+
+    Parameters
+    ----------
+    coefficients
+        (row degree, column degree), in units of the map's noise.
+    squares
+        Mean squares of rows, columns and pixels.
+    shape
+        Rows and columns: a fall with the distance from the centre bends along both.
+    """
+    row, column, square = squares
+    if len(coefficients) < 3:
+        return {}
+    down, across = max(row, square), max(column, square)
+    smooth = Smooth.of(shape[0], shape[1])
+    # Orthonormal polynomials have any sign: here they rise towards the last line.
+    signed = np.outer(np.sign(smooth.along_rows[-1]), np.sign(smooth.along_columns[-1]))
+    signed = coefficients * signed[: len(coefficients), : len(coefficients)]
+    n, m = float(shape[0]) ** 2, float(shape[1]) ** 2
+    fall = n * signed[2, 0] + m * signed[0, 2]
+    return {
+        "fixed_smooth_tilt of rows": (float(signed[1, 0]) / sqrt(down), 1.0),
+        "fixed_smooth_tilt of columns": (float(signed[0, 1]) / sqrt(across), 1.0),
+        "fixed_smooth_falloff": (float(fall) / sqrt(n**2 * down + m**2 * across), 1.0),
+    }
 
 
 def _correlations(pixels: Array, square: float) -> dict[str, Number]:
@@ -238,10 +273,20 @@ def _outlying(fourth: float, square: float, size: int) -> Number:
     return log(max(fourth / square**2, 0.1) / 3), sqrt(24 / size) / 3
 
 
+def _standing_out(pixels: Array, square: float) -> dict[str, Number]:
+    """Return how many pixels lie far above the others, as twice the root (Anscombe 1948)."""
+    sd = sqrt(square)
+    return {
+        f"outlying_pixels of {limit:g}": (2 * sqrt((pixels > limit * sd).sum() + 3 / 8), 1.0)
+        for limit in STANDING_OUT
+    }
+
+
 def _seams(by_row: Array, by_column: Array, squares: tuple[float, float]) -> dict[str, Number]:
     """Return the step between halves, and between even and odd lines, in its own noise.
 
-    Each is the coefficient of its shape beside smooth polynomials, over its error.
+    Each is the coefficient of its shape beside smooth polynomials, over its error; that of halves
+    as a whole is not, and sees a tilt too.
     """
     found: dict[str, Number] = {}
     for axis, means, square, across in (
@@ -251,6 +296,9 @@ def _seams(by_row: Array, by_column: Array, squares: tuple[float, float]) -> dic
         sd = sqrt(square / across)
         for name, shape in zip(("half_seam", "parity"), _seam_shapes(means.size), strict=True):
             found[f"{name} of {axis}"] = (float(shape @ means) / sd, 1.0)
+        half = np.where(np.arange(means.size) < means.size / 2, -1.0, 1.0)
+        half = (half - half.mean()) / (sqrt(means.size) * half.std())
+        found[f"half_seam of {axis}, {WHOLE}"] = (float(half @ means) / sd, 1.0)
     return found
 
 

@@ -10,7 +10,7 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.mismatch.bank.maps import Parts, surfaces
+from analysis.mismatch.bank.maps import WHOLE, Parts, slopes, surfaces
 from analysis.mismatch.bank.scalars import Number, ratio_root
 
 Array = NDArray[np.float64]
@@ -53,16 +53,19 @@ def together(
             bottom += moved.size - 1 - degree
         lines[axis] = top / bottom
         found[f"{label} of {TOGETHER}"] = ratio_root(top / bottom / square, bottom, dof)
-    for axis_name in ("rows", "columns"):
-        steps = [np.array([parts[n].numbers[f"half_seam of {axis_name}"][0]]) for n in names]
+    for seam in (f"{axis}{part}" for axis in ("rows", "columns") for part in ("", f", {WHOLE}")):
+        steps = [np.array([parts[n].numbers[f"half_seam of {seam}"][0]]) for n in names]
         step = float(_mean(steps, [sharpness[n] for n in names])[0])
-        found[f"half_seam of {axis_name}, {TOGETHER}"] = (step, 1.0)
+        found[f"half_seam of {seam}, {TOGETHER}"] = (step, 1.0)
     least = min(len(parts[name].coefficients) for name in names)
     surface = _mean(
         [parts[name].coefficients[:least, :least] for name in names],
         [sharpness[name] for name in names],
     )
-    for name, number in surfaces(surface, (lines[0], lines[1], square), dof).items():
+    squares_too = (lines[0], lines[1], square)
+    shape = sizes[names[0]]
+    common = {**surfaces(surface, squares_too, dof), **slopes(surface, squares_too, shape)}
+    for name, number in common.items():
         joined = name.replace(" of ", ", ", 1) if " of " in name else name
         statistic, _, order = joined.partition(", ")
         detail = f"{order}, {TOGETHER}" if order else TOGETHER

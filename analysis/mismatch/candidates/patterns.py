@@ -6,12 +6,14 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.mismatch.bank.maps import WHOLE
 from analysis.mismatch.bank.together import TOGETHER
 from analysis.mismatch.candidates.candidate import Candidate, Proposal, proposals
 from analysis.mismatch.clues import Clues, alike
 from analysis.mismatch.observe import Place
 
 Array = NDArray[np.float64]
+_SMOOTH = ("fixed_smooth_variance", "fixed_smooth_tilt", "fixed_smooth_falloff")
 
 
 def _constant(kind: str, statistic: str) -> Candidate:
@@ -54,8 +56,10 @@ def _taps(clues: Clues) -> Sequence[Proposal]:
         ("even_odd_rows", "parity", "rows"),
     ):
         clear = max(
-            abs(clues.number(statistic, "gain", axis)),
-            abs(clues.number(statistic, "gain", f"{axis}, {TOGETHER}")),
+            abs(clues.number(statistic, scope, f"{axis}{part}{joint}"))
+            for scope in ("gain", "gain alone")
+            for part in ("", f", {WHOLE}")
+            for joint in ("", f", {TOGETHER}")
         )
         if clear < 3 and not (statistic == "parity" and len(clues.layout.channels) > 1):
             continue
@@ -79,20 +83,16 @@ def _step(clues: Clues, regions: str) -> float:
             first_is_odd = "R" not in clues.layout.cfa.value[:2]
         return ratio if first_is_odd else -ratio
     for channel, (image, _) in clues.image("gain").items():
-        n, m = image.shape
         along = image.mean(0) if regions in ("left_right", "even_odd_columns") else image.mean(1)
         size = along.size
-        if regions.startswith("even_odd"):
-            step = along[1::2].mean() - along[0::2].mean()
-        else:
-            near = max(size // 16, 2)
-            step = (
-                along[size // 2 : size // 2 + near].mean()
-                - along[size // 2 - near : size // 2].mean()
-            )
+        second = np.arange(size) % 2 == 1 if regions.startswith("even_odd") else _upper(size)
+        step = along[second].mean() - along[~second].mean()
         steps.append(float(step) / clues.scale("gain", channel))
-        del n, m
     return float(np.mean(steps)) if steps else 0.0
+
+
+def _upper(size: int) -> NDArray[np.bool_]:
+    return np.arange(size) >= size / 2
 
 
 def _imbalance(clues: Clues) -> Sequence[Proposal]:
@@ -108,18 +108,27 @@ def _hot(clues: Clues) -> Sequence[Proposal]:
     values, noise, scale = _pooled(clues, "time")
     if values is None:
         return []
+    found: list[Proposal] = []
     clear = values > 5 * noise
-    if clear.sum() < 2:
+    if clear.sum() >= 2:
+        # Exponential: the same mean beyond any start.
+        excess = float((values[clear] - 5 * noise).mean())
+        fraction = float(clear.mean()) * float(np.exp(min(5 * noise / excess, 3.0)))
+        found += _of_hot(fraction, excess / scale)
+    tails = 3 * np.expm1(max(clues.number("outlying_pixels", "time"), 0.0))
+    for fraction in (0.001, 0.003, 0.01):
+        # E[x^4] = 24 mean^4 of an exponential: an excess kurtosis of 24 f (mean / noise)^4.
+        mean = noise * float(tails / (24 * fraction)) ** 0.25
+        found += _of_hot(fraction, mean / scale)
+    return found
+
+
+def _of_hot(fraction: float, mean_dn_per_s: float) -> Sequence[Proposal]:
+    names = ["pixel_fraction", "mean_dn_per_s"]
+    if mean_dn_per_s <= 0:
         return []
-    excess = float(
-        (values[clear] - 5 * noise).mean()
-    )  # exponential: the same mean beyond any start
-    fraction = float(clear.mean()) * float(np.exp(min(5 * noise / excess, 3.0)))
     return proposals(
-        "hot_pixels",
-        ["pixel_fraction", "mean_dn_per_s"],
-        pixel_fraction=min(fraction, 0.4),
-        mean_dn_per_s=excess / scale,
+        "hot_pixels", names, pixel_fraction=min(fraction, 0.4), mean_dn_per_s=mean_dn_per_s
     )
 
 
@@ -170,9 +179,9 @@ CANDIDATES = (
     _constant("row_fpn", "fixed_row_variance"),
     _constant("column_fpn", "fixed_column_variance"),
     Candidate("prnu", ("fixed_pixel_variance",), _prnu),
-    Candidate("shading", ("fixed_smooth_variance",), _shading),
-    Candidate("tap_mismatch", ("half_seam", "parity", "channel_ratio"), _taps),
+    Candidate("shading", _SMOOTH, _shading),
+    Candidate("tap_mismatch", ("half_seam", "parity", "channel_ratio", *_SMOOTH), _taps),
     Candidate("channel_imbalance", ("channel_ratio",), _imbalance),
     Candidate("hot_pixels", ("outlying_pixels", "one_off_outliers", "fixed_pixel_variance"), _hot),
-    Candidate("amp_glow", ("fixed_smooth_variance",), _glow),
+    Candidate("amp_glow", _SMOOTH, _glow),
 )

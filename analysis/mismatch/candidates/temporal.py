@@ -111,8 +111,9 @@ def frequencies(clues: Clues) -> list[tuple[float, float, float]]:
 
 
 def clearest(clues: Clues, kind: str) -> tuple[str, Peak] | None:
-    """Return the channel whose spectrum has the largest peak, and the peak."""
+    """Return the channel whose spectrum has the largest peak, and the peak; "": all channels."""
     own = [(c, peak) for (c, k), peak in clues.seen.peaks.items() if k == kind]
+    own = [one for one in own if not one[0]] or own
     return max(own, key=lambda one: one[1].power, default=None)
 
 

@@ -55,11 +55,14 @@ class Samples:
         (sample, feature).
     frames, places
         Which group of frames, which place: (sample,).
+    sensors
+        Which sensor, from 0: (sample,).
     """
 
     features: Array
     frames: Index
     places: Index
+    sensors: Index
 
 
 def auc_of(held: Held, camera: Camera, signals: Signals, *, seed: int) -> Auc | None:
@@ -154,6 +157,7 @@ def _samples(
         np.concatenate(rows),
         np.repeat(np.arange(groups), places),
         np.tile(np.arange(places), groups),
+        np.zeros(groups * places, np.intp),
     )
 
 
@@ -171,7 +175,7 @@ def _of_frames(held: Held, e: HeldExposure, own: _Seen, variance: Array) -> list
         patch_features(
             (codes - mean) / sd,
             None if before is None else (before - mean) / sd,
-            codes,
+            codes.astype(np.intp),
             pattern,
             spread,
         )
@@ -184,6 +188,7 @@ def _joined(parts: list[Samples]) -> Samples:
         np.concatenate([p.features for p in parts]),
         np.concatenate([p.frames for p in parts]),
         np.concatenate([p.places for p in parts]),
+        np.repeat(np.arange(len(parts)), [len(p.places) for p in parts]),
     )
 
 
@@ -206,7 +211,8 @@ def classifier_auc(recorded: Samples, simulated: Samples) -> Auc:
                 ~np.isin(s.frames, frames) & ~np.isin(s.places, places)
                 for s in (recorded, simulated)
             ]
-            weights = _regression(real[train[0]], made[train[1]])
+            sensors = simulated.sensors[train[1]]
+            weights = _regression(real[train[0]], made[train[1]], sensors)
             areas.append(_area(real[test[0]] @ weights, made[test[1]] @ weights))
             sizes.append(int(test[0].sum()))
     area = float(np.average(areas, weights=sizes))
@@ -218,12 +224,18 @@ def _groups(labels: Index, most: int) -> list[Index]:
     return [found[k :: min(most, found.size)] for k in range(min(most, found.size))]
 
 
-def _regression(real: Array, made: Array) -> Array:
+def _regression(real: Array, made: Array, sensors: Index) -> Array:
     """Return the weights of a ridge logistic regression by Newton's steps; classes count alike.
 
-    Features whose means differ by less than `_PLAIN` standard errors have no weight.
+    Features whose means differ by less than `_PLAIN` standard errors have no weight. What all
+    patches of a sensor share, its converter above all, is drawn once for each: the recorded one may
+    differ from those simulated as much as they differ from each other.
     """
-    error = made.std(0) * np.sqrt(1 / len(real) + 1 / len(made))
+    means = np.stack([made[sensors == k].mean(0) for k in np.unique(sensors)])
+    error = np.hypot(
+        made.std(0) * np.sqrt(1 / len(real) + 1 / len(made)),
+        means.std(0, ddof=1) * np.sqrt(1 + 1 / len(means)),
+    )
     size = np.abs(real.mean(0) - made.mean(0)) / np.maximum(error, 1e-9)
     kept = (size > _PLAIN) | (size == size.max())
     x = np.concatenate([real, made])[:, kept]

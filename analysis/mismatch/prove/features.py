@@ -3,9 +3,11 @@
 import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
+from scipy.ndimage import gaussian_filter1d
 
 Array = NDArray[np.float64]
 SIDE = 32
+_SMOOTH_CODES = 4.0  # what varies slower than this is no code's own width
 NAMES = (
     "mean squared",
     "variance",
@@ -23,8 +25,7 @@ NAMES = (
     "low frequencies",
     "corner frequencies",
     "spectral peak",
-    "odd codes",
-    "codes of 4",
+    "widths of codes",
     "frame before",
     "map variance",
     "map row variance",
@@ -43,8 +44,19 @@ def patches(frame: NDArray[np.generic]) -> Array:
     return tiles.reshape(-1, SIDE, SIDE)
 
 
+def code_widths(codes: NDArray[np.intp]) -> Array:
+    """Return by how much each code, from 0, is more frequent in a frame than those about it.
+
+    The converter is one for all patches of a sensor: only how unequal its codes are, found in a
+    patch as in the whole frame, is a law that another sensor shares; which of them are wide is not.
+    """
+    counts = np.bincount(codes.reshape(-1)).astype(np.float64)
+    about = gaussian_filter1d(counts, _SMOOTH_CODES, mode="constant")
+    return np.divide(counts, about, out=np.ones_like(counts), where=about > 0) - 1
+
+
 def patch_features(
-    residual: Array, before: Array | None, codes: NDArray[np.generic], pattern: Array, spread: Array
+    residual: Array, before: Array | None, codes: NDArray[np.intp], pattern: Array, spread: Array
 ) -> Array:
     """Return the features of each patch of a frame: (patch, feature), in the order of `NAMES`.
 
@@ -69,9 +81,6 @@ def patch_features(
     power = np.abs(fft.rfft2(z)) ** 2 / SIDE**2
     low = power[:, 1:4, 1:4].mean((1, 2))
     corner = (power[:, 16, 16] + power[:, 16, 0] + power[:, 0, 16]) / 3
-    c = patches(codes).astype(np.int64)
-    odd = ((c & 1).mean((1, 2)) - 0.5) ** 2
-    fours = sum((((c & 3) == k).mean((1, 2)) - 0.25) ** 2 for k in range(4))
     memory = np.zeros(len(d)) if before is None else (z * patches(before)).mean((1, 2))
     m = patches(pattern)
     m = m - m.mean((1, 2), keepdims=True)
@@ -96,8 +105,7 @@ def patch_features(
             low,
             corner,
             np.log(np.maximum(power[:, 1:].max((1, 2)), 1e-12)),
-            odd * SIDE**2,
-            np.asarray(fours) * SIDE**2,
+            patches(code_widths(codes)[codes]).mean((1, 2)),
             memory,
             (m**2).mean((1, 2)),
             m.mean(2).var(1) * SIDE,

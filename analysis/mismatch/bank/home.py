@@ -1,0 +1,135 @@
+"""By which numbers each effect is seen best: they have most of the error rate.
+
+Physics adds to mean squares, tails, peaks and correlations of neighbours: these are looked at from
+one side. What may have either sign (a step, a ratio of gains, a memory) is looked at from both.
+"""
+
+from collections.abc import Mapping, Sequence
+
+from analysis.mismatch.bank.coherent import OUTSTANDING
+from analysis.mismatch.bank.common import SIGNS
+from analysis.mismatch.bank.key import MOSAIC, Key
+from analysis.mismatch.bank.maps import LOW, STANDING_OUT, WHOLE
+from analysis.mismatch.bank.together import TOGETHER
+
+BOTH = "along rows and columns"
+TIME = "with the exposure time"
+ABOVE = "steeper above"
+READ_NOISE = "of read noise"
+PERSISTENT = "of read noise, in all exposures"
+LAG = 0.1  # share of one of many lags along a line, in that of another sum
+_TWO_SIDED = frozenset({"pixel_variance", "channel_ratio", "half_seam", "parity",
+                        "line_correlation", "fixed_smooth_tilt",
+                        "fixed_smooth_falloff"})  # fmt: skip
+# Sums over exposures: statistic, how what it shows grows with the signal.
+SHAPED: Mapping[str, tuple[str, ...]] = {
+    "row_variance": ("constant", "with the signal squared"),
+    "column_variance": ("constant",),
+    "frame_variance": ("constant", "with the signal squared"),
+    "alternation_variance": ("constant",),
+    "skewness": ("of few electrons",),
+    "kurtosis": (READ_NOISE,),
+    "kurtosis_within_pixels": (READ_NOISE,),
+    "variance_spread": (READ_NOISE, PERSISTENT),
+    "one_off_outliers": ("at all levels",),
+    "code_imbalance": ("at all levels",),
+    "correlation_0_1": ("with the signal", "with the signal squared", "at all levels"),
+    "correlation_1_0": ("with the signal",),
+    "correlation_0_2": ("at all levels",),
+    "frame_correlation": ("with the signal",),
+    "channel_ratio": ("at all levels",),
+    "level": (TIME,),
+}
+_IN_COMMON = frozenset({"row_variance", "column_variance", "frame_variance"})
+_STEPS, _AXES = ("half_seam", "parity"), ("rows", "columns")
+# Sums over exposures already: statistic, map, detail.
+_POOLED = frozenset(
+    {
+        *(("fixed_pixel_variance", name, "") for name in ("offset", "gain", "time")),
+        ("fixed_row_variance", "offset", ""),
+        ("fixed_column_variance", "offset", ""),
+        *(("fixed_smooth_variance", name, LOW) for name in ("gain", "time")),
+        *((name, "gain", axis) for name in _STEPS for axis in _AXES),
+        *(("half_seam", "gain", f"{axis}, {WHOLE}") for axis in _AXES),
+        *(("fixed_smooth_tilt", "time", axis) for axis in _AXES),
+        *(("fixed_smooth_falloff", name, "") for name in ("gain", "time")),
+        *(("outlying_pixels", "time", f"{limit:g}") for limit in STANDING_OUT),
+        ("variance_persistence", "all", ""),
+        *(("noisy_pixels", "all", str(limit)) for limit in OUTSTANDING),
+        ("spectral_peak", "all", ""),
+        ("row_spectrum_peak", "all", ""),
+        ("row_spectrum_peak", "all", "light"),
+        ("column_spectrum_peak", "all", ""),
+    }
+)
+_SPECTRA = frozenset({"spectral_peak", "row_spectrum_peak", "column_spectrum_peak"})
+_SHARED = frozenset({"fixed_row_variance", "fixed_column_variance", "fixed_smooth_variance",
+                     "fixed_smooth_tilt", "fixed_smooth_falloff", "half_seam"})  # fmt: skip
+
+
+def together_too(scope: str, detail: str) -> str:
+    """Return the detail of a sum over channels."""
+    return f"{scope} {detail}".strip()
+
+
+def homes(keys: Sequence[Key], channels: Sequence[str]) -> list[float]:
+    """Return the weight of each number as some effect's home; 0: of none."""
+    mosaic = len(channels) > 1
+    # Spectra of all channels together, where they were measured; the sum of the channels' else.
+    joint = any(key.statistic in _SPECTRA and not key.channel for key in keys if key.scope == "all")
+    summed = "all" if joint or not mosaic else "contrast"
+    wanted = _pooled({key.scope for key in keys}, mosaic=mosaic, joint=joint)
+    wanted |= _shaped(mosaic=mosaic)
+    found = []
+    for key in keys:
+        own = (key.statistic, key.scope, key.channel, key.detail)
+        weight = float(own in wanted)
+        if key.statistic == "line_correlation" and mosaic == (key.channel == ""):
+            weight = LAG * (key.scope == summed)
+        if key.statistic == "pixel_variance" and key.detail.startswith(ABOVE):
+            weight = 1.0
+        found.append(weight)
+    return found
+
+
+def one_sided(key: Key) -> bool:
+    """Return whether the effects that a number is home of can only raise it."""
+    return key.statistic not in _TWO_SIDED
+
+
+def _shaped(*, mosaic: bool) -> set[tuple[str, str, str, str]]:
+    """Return statistic, scope, channel and detail of the sums over exposures that are homes."""
+    found = {(name, shape) for name, shapes in SHAPED.items() for shape in shapes}
+    found -= {("correlation_0_2", shape) for shape in SHAPED["correlation_0_2"]}
+    for name in ("correlation_0_1", "correlation_0_2"):
+        found |= {(name, f"{shape} {BOTH}") for shape in SHAPED[name]}
+    found -= {("correlation_0_1", shape) for shape in SHAPED["correlation_0_1"][1:]}
+    if mosaic:  # what colours share says more than each of them
+        found -= {(name, shape) for name in _IN_COMMON for shape in SHAPED[name]}
+        found |= {(name, f"constant {MOSAIC}") for name in _IN_COMMON}
+        found |= {("alternation_variance", f"constant {MOSAIC}, {name}") for name in SIGNS}
+        of_light = "with the signal squared"
+        found |= {
+            ("row_variance", f"{of_light} {MOSAIC}"),
+            ("frame_variance", f"{of_light} {MOSAIC}, light"),
+        }
+    return {(name, "contrast", "", detail) for name, detail in found}
+
+
+def _pooled(scopes: set[str], *, mosaic: bool, joint: bool) -> set[tuple[str, str, str, str]]:
+    """Return statistic, scope, channel and detail of the sums that are homes."""
+    found = set()
+    for statistic, name, detail in _POOLED:
+        scope = f"{name} alone" if f"{name} alone" in scopes else name
+        if not mosaic:
+            found.add((statistic, scope, "MONO", detail))
+        elif joint and statistic in _SPECTRA:
+            found.add((statistic, scope, "", detail))
+        elif statistic in _SHARED:
+            joined = f"{detail}, {TOGETHER}" if detail else TOGETHER
+            found.add((statistic, scope, "", joined))
+        else:
+            found.add((statistic, "contrast", "", together_too(scope, detail)))
+    if not mosaic:
+        found |= {("alternation_variance", "all", "MONO", name) for name in SIGNS}
+    return found

@@ -1,0 +1,54 @@
+"""Effects that the very statistics which call for them deny."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.mismatch.candidates import CANDIDATES
+from analysis.mismatch.predict import Predictor
+from analysis.mismatch.state import State
+from dsis.camera import Camera
+
+_LEAST_SHARE = 0.5  # of what an effect predicts, that a recording must show
+_SURE = 3.0  # standard errors below it
+_CLEAR = 3.0  # standard deviations: a predicted change that can be seen at all
+
+
+@dataclass(frozen=True)
+class Denial:
+    """Which share of what an effect predicts a recording shows, and the same in words."""
+
+    share: float
+    why: str
+
+
+def contradicted(state: State, predictor: Predictor, kind: str, without: Camera) -> Denial | None:
+    """Return how an effect of the state's camera is denied by the recording; None: it is not.
+
+    Of each statistic that calls for the effect, over all exposures and channels, what the model
+    without it leaves open is projected on what the effect changes: sum(c d) / sum(c^2) is 1 for the
+    right effect, c and d in standard deviations that allow for its form. One statistic that shows
+    less than half of it denies the effect: a tilt, say, is nearly a difference of the halves, but
+    has no step where they meet.
+    """
+    if kind not in CANDIDATES:
+        return None
+    null, mean = state.null, predictor.mean(without)
+    known = null.known & np.isfinite(mean) & np.isfinite(state.vector.values)
+    change = np.where(known, null.mean - np.nan_to_num(mean), 0.0) / null.sd
+    form = np.sqrt(1 + (predictor.forms * change) ** 2)
+    clear = np.abs(change) > _CLEAR
+    left = null.departures(state.vector)[: change.size]
+    groups: dict[tuple[str, str, str], list[int]] = {}
+    for i, key in enumerate(state.vector.keys):
+        if clear[i] and key.statistic in CANDIDATES[kind].calls:
+            groups.setdefault((key.statistic, key.scope, key.detail), []).append(i)
+    found = []
+    for (statistic, _, _), which in groups.items():
+        own, rest = change[which] / form[which], left[which] / form[which]
+        square = float(own @ own)
+        share = 1 + float(own @ rest) / square
+        if share + _SURE / np.sqrt(square) < _LEAST_SHARE:
+            why = f"the recording shows {max(share, 0):.0%} of what it predicts of {statistic}"
+            found.append(Denial(share, why))
+    return min(found, key=lambda denial: denial.share, default=None)

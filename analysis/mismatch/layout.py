@@ -1,0 +1,130 @@
+"""What of a recording is observed: exposures, frames, expected signals and variances."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from analysis.mismatch.bank.maps import Regressors
+from analysis.mismatch.scenes import SCENE, Local, Scene
+from dsis.cfa import Cfa, pattern
+
+Place = tuple[str, str]
+"""Exposure and channel; of a scene also channel and bin of signal."""
+
+
+@dataclass(frozen=True)
+class Taken:
+    """One exposure as the bank takes it.
+
+    Attributes
+    ----------
+    name, kind
+        Of the exposure.
+    exposure_time_s
+        Exposure time, s.
+    light
+        Light per frame; None: unknown.
+    numbers
+        Numbers of the frames that are used, from 0.
+    """
+
+    name: str
+    kind: str
+    exposure_time_s: float
+    light: float | None
+    numbers: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Layout:
+    """What is observed, and how sums over exposures are weighted.
+
+    Attributes
+    ----------
+    exposures
+        In the order of the recording.
+    rows, columns, cfa
+        Of the frames.
+    black_dn, white_dn
+        Nominal black level and largest code: levels are counted from this black.
+    signal_dn, variance_dn2
+        Expected by the re-calibrated model, by exposure and channel: weights only.
+    scenes
+        Static scenes among the exposures; their signals and variances are as recorded.
+    moving
+        Exposures of kind scene that are left out, for the picture moves between frames.
+    """
+
+    exposures: tuple[Taken, ...]
+    rows: int
+    columns: int
+    cfa: Cfa
+    black_dn: float
+    white_dn: float
+    signal_dn: Mapping[Place, float]
+    variance_dn2: Mapping[Place, float]
+    scenes: Mapping[str, Scene] = field(default_factory=dict)
+    moving: tuple[str, ...] = ()
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Names of the channels."""
+        return ("MONO",) if self.cfa is Cfa.MONO else ("R", "Gr", "Gb", "B")
+
+    @property
+    def sites(self) -> dict[str, tuple[int, int]]:
+        """First row and column of each channel."""
+        return sites(self.cfa)
+
+    @property
+    def uniform(self) -> tuple[Taken, ...]:
+        """Darks and flats."""
+        return tuple(e for e in self.exposures if e.kind != SCENE)
+
+    @property
+    def pictures(self) -> tuple[Taken, ...]:
+        """Static scenes."""
+        return tuple(e for e in self.exposures if e.name in self.scenes)
+
+    def part(self, place: Place) -> tuple[Local, slice]:
+        """Return the pixels of a place of a scene: a channel's, and those of a bin of signal."""
+        channel, _, label = place[1].partition(" ")
+        local = self.scenes[place[0]].channels[channel]
+        return local, local.bins[label].ranges if label else slice(None)
+
+    def range_dn(self, place: Place) -> tuple[float, float]:
+        """Return the lowest and the highest signal of a place of a scene from 0 on, DN above black.
+
+        A place of all channels together has those of all its channels.
+        """
+        channels = self.scenes[place[0]].channels
+        name, _, label = place[1].partition(" ")
+        parts = [channels[name]] if name in channels else channels.values()
+        own = [bin_ for part in parts for key, bin_ in part.bins.items() if label in ("", key)]
+        return max(min(b.low_dn for b in own), 0.0), max(b.high_dn for b in own)
+
+    def regressors(self, channel: str) -> Regressors:
+        """Return what the mean frames of a channel are regressed on."""
+        names = [e.name for e in self.uniform]
+        return Regressors.of(
+            names,
+            {name: self.signal_dn[name, channel] for name in names},
+            {e.name: e.exposure_time_s for e in self.uniform},
+            {e.name: len(e.numbers) / self.variance_dn2[e.name, channel] for e in self.uniform},
+        )
+
+
+def sites(cfa: Cfa) -> dict[str, tuple[int, int]]:
+    """Return the first row and column of each channel, in the order R, Gr, Gb, B."""
+    if cfa is Cfa.MONO:
+        return {"MONO": (0, 0)}
+    colours = pattern(cfa)
+    found = {}
+    for y in (0, 1):
+        for x in (0, 1):
+            name = "RGB"[colours[y, x]]
+            if name == "G":
+                name += "r" if 0 in colours[y] else "b"
+            found[name] = (y, x)
+    return {name: found[name] for name in ("R", "Gr", "Gb", "B")}

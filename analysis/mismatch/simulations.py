@@ -1,0 +1,55 @@
+"""Numbers of simulated recordings, by camera: each recording is simulated once."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.mismatch.layout import Layout
+from analysis.mismatch.model import Model, simulate
+from analysis.mismatch.observe import Observation
+from dsis.camera import Camera
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Simulations:
+    """Simulated recordings of cameras beside one model, all on the same draws.
+
+    Attributes
+    ----------
+    layout, model
+        What is simulated; the model's signals are every camera's.
+    numbers_of
+        Gives the bank's numbers of an observation.
+    seed, jobs
+        Of the simulations.
+    kept
+        Numbers by camera, in the order of the replicates.
+    """
+
+    layout: Layout
+    model: Model
+    numbers_of: Callable[[Observation], Array]
+    seed: int
+    jobs: int
+    kept: dict[str, list[Array]] = field(default_factory=dict)
+
+    def keep(self, camera: Camera, numbers: Sequence[Array]) -> None:
+        """Take numbers of a camera's first replicates that were found elsewhere."""
+        self.kept[camera.model_dump_json()] = list(numbers)
+
+    def of(self, camera: Camera, replicates: int) -> Array:
+        """Return the numbers of a camera's first replicates: (replicate, number)."""
+        key = camera.model_dump_json()
+        known = self.kept.get(key, [])
+        missing = range(len(known), replicates)
+        if missing:
+            model = self.model.with_camera(camera)
+            made = simulate(model, self.layout, missing, self.seed, self.jobs)
+            # A list of its own: another thread may ask for the same camera meanwhile.
+            known = [*known, *(self.numbers_of(one) for one in made)]
+            self.kept[key] = known
+        return np.stack(known[:replicates])

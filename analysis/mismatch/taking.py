@@ -1,0 +1,80 @@
+"""Which exposures and frames of a recording are taken, and what to expect of each."""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.mismatch.basefit import CLIPPED_SHARE
+from analysis.mismatch.layout import Layout, Place, Taken, sites
+from analysis.mismatch.scenes import SCENE
+from analysis.mismatch.staging import with_scenes
+from dsis.cfa import Cfa
+from dsis.errors import InputError
+from dsis.recording import Recording
+
+_LEAST_FRAMES = 2
+
+
+def layout_of(
+    recording: Recording,
+    numbers: Mapping[str, Sequence[int]],
+    first: Callable[[str, Sequence[int]], Iterable[NDArray[np.generic]]],
+) -> Layout:
+    """Return the layout of the frames `numbers`; two frames of each exposure set the weights.
+
+    `first(exposure, numbers)` gives frames; all of a scene are read. Scenes that move are left out,
+    and exposures with fewer than two frames, with more than 0.1 % of a channel at the white level,
+    or whose frames are copies.
+
+    Raises
+    ------
+    InputError
+        Nothing is left.
+    """
+    sensor = recording.sensor
+    taken = []
+    means: dict[Place, float] = {}
+    variances: dict[Place, float] = {}
+    step = 1 if sensor.cfa is Cfa.MONO else 2
+    for recorded in recording.exposures:
+        own = tuple(numbers.get(recorded.name, ()))
+        if len(own) < _LEAST_FRAMES:
+            continue
+        e = Taken(recorded.name, recorded.kind, recorded.exposure_time_s, recorded.light, own)
+        a, b = (np.asarray(f, np.float32) for f in first(e.name, own[:2]))
+        clipped = [
+            float((a[y::step, x::step] >= sensor.white_level).mean())
+            for y, x in sites(sensor.cfa).values()
+        ]
+        if max(clipped) > CLIPPED_SHARE or (a == b).all():
+            continue
+        taken.append(e)
+        for channel, (y, x) in sites(sensor.cfa).items():
+            one, two = a[y::step, x::step], b[y::step, x::step]
+            means[e.name, channel] = float(one.mean() + two.mean()) / 2 - sensor.black_level
+            spread = np.percentile(two - one, [15.865, 84.135])
+            robust = float(spread[1] - spread[0]) ** 2 / 8
+            variances[e.name, channel] = max(robust, 0.05)
+    if not any(e.kind != SCENE for e in taken):
+        fact = "holds no dark or flat of two different frames that are not clipped"
+        raise InputError.of(recording.folder, "exposure", fact)
+    signal = {}
+    for e in taken:
+        for channel in sites(sensor.cfa):
+            darks = [means[d.name, channel] for d in taken if d.kind == "dark"]
+            ground = float(np.mean(darks)) if darks else 0.0
+            signal[e.name, channel] = (
+                0.0 if e.kind == "dark" else max(means[e.name, channel] - ground, 0.0)
+            )
+    layout = Layout(
+        tuple(taken),
+        recording.rows,
+        recording.columns,
+        sensor.cfa,
+        sensor.black_level,
+        sensor.white_level,
+        signal,
+        variances,
+    )
+    return with_scenes(layout, means, first)

@@ -1,0 +1,51 @@
+"""An effect is not named where the statistic that calls for it denies it."""
+
+import numpy as np
+import pytest
+
+from analysis.mismatch.contradicted import Denial, contradicted
+from analysis.mismatch.observe import observe
+from analysis.mismatch.source import Source
+from analysis.mismatch.split import Split
+from analysis.mismatch.state import Setting, State
+from analysis.mismatch.taking import layout_of
+from dsis.effects import registry
+from mismatch_recordings import Array, camera, recorded
+
+GAIN_PERCENT = 1.0
+LEVELS = (250.0, 900.0, 1600.0)
+ROWS, COLUMNS = 64, 96
+TAPS = registry()["tap_mismatch"](gain_percent=GAIN_PERCENT, regions="top_bottom")
+
+
+def fixed(gains: Array) -> Denial | None:
+    """Return what is said of tap mismatch in a sensor whose rows have gains: (row,)."""
+    recording = recorded(camera(), 5, rows=ROWS, columns=COLUMNS, levels=LEVELS)
+    assert recording.stacks is not None
+    for i, level in enumerate(LEVELS):
+        added = np.rint(level * (gains - 1))[:, np.newaxis]
+        recording.stacks[f"flat-{i}"] = (recording.stacks[f"flat-{i}"] + added).astype(np.uint16)
+    split, source = Split.of(recording), Source(recording)
+    layout = layout_of(recording, split.development, source.frames)
+    numbers = {e.name: e.numbers for e in layout.exposures}
+    seen = observe(layout, lambda name: source.frames(name, numbers[name]))
+    setting = Setting(layout, seen, None, 1, 1, 8, 8, 2, 2, 2)
+    state = State.of(setting, camera(TAPS), lambda: None)
+    without = state.camera.model_copy(update={"effect": ()})
+    return contradicted(state, state.predictor(), "tap_mismatch", without)
+
+
+@pytest.mark.parametrize("share", [1.0, 0.8])
+def test_halves_of_two_amplifiers_are_believed(share: float) -> None:
+    step = np.where(np.arange(ROWS) < ROWS / 2, -0.5, 0.5)
+    assert fixed(1 + share * GAIN_PERCENT / 100 * step) is None
+
+
+@pytest.mark.parametrize("direction", [1, -1])
+def test_a_tilt_is_no_step_between_halves(direction: int) -> None:
+    """The means of the halves differ as those of two amplifiers would; nothing jumps."""
+    tilt = direction * np.linspace(-1, 1, ROWS)
+    said = fixed(1 + GAIN_PERCENT / 100 * tilt)
+    assert said is not None
+    assert said.share < 0.5
+    assert direction < 0 or "half_seam" in said.why  # the wrong way round all else denies it too

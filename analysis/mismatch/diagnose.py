@@ -96,8 +96,8 @@ def find_mismatch(
         search.setting, search.base = judged, everything
         base = everything
         final = State.of(judged, final.camera, step) if search.named else everything
-        counts = Change(len(base.mismatches), len(final.mismatches))
-        proof = replace(proof, discrepancies=counts)
+        departures = Change(len(base.mismatches), len(final.mismatches))
+        proof = replace(proof, discrepancies=departures)
     found = _finding(camera, base, final, search, gains, proof)
     return replace(found, remarks=(*remarks, *found.remarks), evidence=evidence)
 

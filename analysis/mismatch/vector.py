@@ -87,11 +87,26 @@ def _of_scene(
         for label in local.bins:
             key = Key("pixel_variance", SCENE, name, channel, label)
             level, expected = seen.local[key.place], expected_dn2(layout, key.place, fit)
-            known = level.variance_dn2 > 0 and expected > 0
+            told = _told(layout.range_dn(key.place), fit)
+            known = told and level.variance_dn2 > 0 and expected > 0
             yield (
                 key,
                 (log(level.variance_dn2 / expected), sqrt(2 / level.dof)) if known else (nan, inf),
             )
+
+
+def _told(range_dn: tuple[float, float], fit: BaseFit) -> bool:
+    """Return whether uniform exposures tell which segment a range of signal is read out in.
+
+    They only say between which two of their levels a segment begins.
+    """
+    levels = np.array(sorted(fit.signal_dn.values()))
+    for piece in fit.pieces[1:]:
+        below, above = levels[levels <= piece.from_dn], levels[levels > piece.from_dn]
+        start = below[-1] if below.size else 0.0
+        if range_dn[1] > start and (above.size == 0 or range_dn[0] < above[0]):
+            return False
+    return True
 
 
 def expected_dn2(layout: Layout, place: Place, fit: BaseFit) -> float:

@@ -1,17 +1,19 @@
 """Promise: kernels do the same work on any number of threads, and are never stale."""
 
+import importlib
 import os
 import shutil
-import subprocess
 import sys
 import threading
+import time
 from pathlib import Path
 
+import numba
 import numpy as np
 import pytest
 
 from dsis import compiled
-from dsis.compiled import ROWS_PER_BLOCK, kernel, over_rows
+from dsis.compiled import ROWS_PER_BLOCK, _cache, kernel, over_rows
 from dsis.demosaic.bilinear_block import ALIGNMENT, PIXELS, fence, store, stream
 
 
@@ -44,6 +46,25 @@ def test_work_that_fails_is_told_and_the_rest_is_left() -> None:
     assert len(begun) == 2
 
 
+@pytest.mark.parametrize("failing", ["this thread", "another"])
+def test_who_works_on_is_stopped_by_who_fails(failing: str) -> None:
+    begun: list[int] = []
+    met = threading.Barrier(2)
+
+    def work(first: int, last: int) -> None:
+        begun.append(first)
+        if len(begun) > 2:
+            return
+        met.wait(timeout=60)
+        if (threading.current_thread() is threading.main_thread()) == (failing == "this thread"):
+            raise ValueError(last)
+        time.sleep(0.2)  # long enough for the other to fail
+
+    with pytest.raises(ValueError, match=r"\d"):
+        over_rows(work, 50 * ROWS_PER_BLOCK, 2)
+    assert len(begun) < 50
+
+
 def aligned(samples: int) -> np.ndarray:
     """Return zeros that begin where a line of the cache does."""
     space = np.zeros(samples + ALIGNMENT, np.float32)
@@ -74,35 +95,43 @@ def test_stores_past_the_cache_write_the_same_bytes_and_no_others(blue: bool, od
     assert written[0] == written[1]
 
 
-KERNELS = "from dsis.compiled import kernel\n\n@kernel\ndef add(x):\n    return x + {}\n"
+INNER = "from dsis.compiled import kernel\n\n@kernel\ndef add(x):\n    return x + {}\n"
+OUTER = """from dsis.compiled import kernel
+from inner import add
+
+@kernel
+def outer(x):
+    return add(x)
+"""
 
 
 @pytest.mark.parametrize("place", ["NUMBA_CACHE_DIR", "the user's cache"])
 def test_kernels_of_changed_sources_are_compiled_anew_wherever_they_lie(
-    place: str, tmp_path: Path
+    place: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Beside the sources they are as well: `test_startup.py`."""
+    """Beside the sources, and from one process to the next, they are as well: `test_startup.py`."""
     package, elsewhere = tmp_path / "package", tmp_path / "elsewhere"
     package.mkdir()
-    (package / "outer.py").write_text(
-        "import sys\nimport dsis.compiled\n"
-        + ("dsis.compiled.os.access = lambda *_: False\n" if place == "the user's cache" else "")
-        + "from inner import add\n\n@dsis.compiled.kernel\ndef outer(x):\n    return add(x)\n\n"
-        "print(outer(1), sum(outer.stats.cache_hits.values()))\n"
-    )
-    environment = {k: v for k, v in os.environ.items() if k != "NUMBA_CACHE_DIR"}
-    environment |= {"HOME": str(elsewhere), "XDG_CACHE_HOME": str(elsewhere)}
-    environment |= {"NUMBA_CACHE_DIR": str(elsewhere)} if place == "NUMBA_CACHE_DIR" else {}
+    (package / "outer.py").write_text(OUTER)
+    monkeypatch.syspath_prepend(package)
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
+    given = place == "NUMBA_CACHE_DIR"
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(elsewhere) if given else "")
+    for home in ("HOME", "XDG_CACHE_HOME", "LOCALAPPDATA"):
+        monkeypatch.setenv(home, str(elsewhere))
+    if not given:
+        monkeypatch.setattr(os, "access", lambda *_: False)
     said = []
-    for step in (1, 2):
-        (package / "inner.py").write_text(KERNELS.format(step))
+    for step in (1, 2, 2):
+        (package / "inner.py").write_text(INNER.format(step))
         os.utime(package / "inner.py", (step, step))  # of one size; written at another time
-        run = [sys.executable, "-B", "outer.py"]
-        found = subprocess.run(
-            run, cwd=package, env=environment, capture_output=True, text=True, check=True
-        )
-        said.append(found.stdout.split())
-    assert said == [["2", "0"], ["3", "0"]]
+        importlib.invalidate_caches()
+        _cache.cache_clear()  # as in a new process
+        outer = importlib.import_module("outer").outer
+        said.append((outer(1), sum(outer.stats.cache_hits.values())))
+        for name in ("inner", "outer"):
+            del sys.modules[name]
+    assert said == [(2, 0), (3, 0), (3, 1)]
     assert list(elsewhere.rglob("*.nbc"))
     assert not list(package.rglob("*.nbc"))
 

@@ -85,15 +85,21 @@ def test_words_about_a_picture_are_kept_whatever_its_samples(tmp_path: Path) -> 
     np.testing.assert_array_equal(image.get_pixels(image.spec().format), pixels)
 
 
-def test_the_header_says_what_readers_ask_for(tmp_path: Path) -> None:
-    """Tags of TIFF 6.0, part 1: the first row on top, no palette, square pixels, one strip."""
-    imagefile.write_codes(tmp_path / "a.tif", np.ones((8, 9, 3), np.uint8))
+@pytest.mark.parametrize(("channels", "kind"), [(3, np.uint8), (1, np.uint16)])
+def test_the_header_says_what_readers_ask_for(
+    channels: int, kind: type[np.unsignedinteger], tmp_path: Path
+) -> None:
+    """Tags of TIFF 6.0, part 1: the first row on top, square pixels, one strip."""
+    pixels = np.ones((8, 9, channels), kind)
+    imagefile.write_codes(tmp_path / "a.tif", pixels)
     with Image.open(tmp_path / "a.tif") as image:
         tags = dict(image.tag_v2)
+    bits = (8 * pixels.itemsize,) * channels
     assert {n: tags[n] for n in (256, 257, 258, 259, 262, 274, 277, 278, 284)} == {
-        256: 9, 257: 8, 258: (8, 8, 8), 259: 1, 262: 2, 274: 1, 277: 3, 278: 8, 284: 1
+        256: 9, 257: 8, 258: bits, 259: 1, 262: 1 + (channels == 3), 274: 1, 277: channels, 278: 8,
+        284: 1,
     }  # fmt: skip
-    assert tags[279] == (8 * 9 * 3,)
+    assert tags[279] == (8 * 9 * channels * pixels.itemsize,)
     assert tags[282] == tags[283] == 1
 
 

@@ -72,11 +72,16 @@ def recorded(
     return folder
 
 
-def found(folder: Path, cfa: str = "MONO", *, vocabulary: frozenset[str] | None = None) -> Finding:
-    segment = Segment(slope=SLOPE, intercept=READ**2)
+def found(
+    folder: Path,
+    cfa: str = "MONO",
+    *,
+    vocabulary: frozenset[str] | None = None,
+    segments: tuple[Segment, ...] = (Segment(slope=SLOPE, intercept=READ**2),),
+) -> Finding:
     camera = Camera(
         name="numpy", cfa=Cfa(cfa), black_level=BLACK, white_level=WHITE, bit_depth=12,
-        noise=BaseNoise(segment=(segment,)),
+        noise=BaseNoise(segment=segments),
     )  # fmt: skip
     return find_mismatch(camera, read_recording(folder), seed=2, vocabulary=vocabulary)
 
@@ -94,6 +99,25 @@ def test_scenes_of_the_camera_are_a_match(seed: int, cfa: str, tmp_path: Path) -
     # Every scene was tested, in bins of signal.
     curves = finding.evidence.curves["pixel_variance"]
     assert all(curve.x.size > len(LEVELS) for curve in curves)
+
+
+@pytest.mark.parametrize("switch", [350.0, 850.0])
+def test_where_between_two_flats_a_segment_begins_is_not_asked_of_a_scene(
+    switch: float, tmp_path: Path
+) -> None:
+    """The camera model says 500 DN, flats of 300 and 900 DN cannot say better."""
+    upper = {"slope": 3 * SLOPE, "intercept": 400.0}
+
+    def two(rng: np.random.Generator, name: str, light: Array) -> Array:
+        above = np.sqrt(upper["slope"] * light + upper["intercept"]) * rng.normal(size=light.shape)
+        return np.where(light < switch, white(rng, name, light), above)
+
+    lower = Segment(slope=SLOPE, intercept=READ**2, upper_dn=500.0)
+    finding = found(recorded(tmp_path, 8, noise=two), segments=(lower, Segment(**upper)))
+    assert finding.verdict == "match"
+    # Darker and brighter ranges of the scenes are judged.
+    (curve,) = finding.evidence.curves["pixel_variance"]
+    assert curve.x.size > len(LEVELS)
 
 
 def test_row_noise_is_located_in_scenes_too(tmp_path: Path) -> None:

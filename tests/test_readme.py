@@ -74,11 +74,8 @@ def test_its_first_picture_is_the_one_that_the_demo_draws() -> None:
     test = replace(test, spec=test.spec.model_copy(update={"awgn": given}))
     city = next(job for job in jobs_of(test) if job.name == "city")
     middle = test.spec.sequence.frames // 2
-    frames = {name: shown for name, shown, _ in FrameMaker.of(test, city).frame(middle)}
-    names = {"reference": "city__reference", "none": "city__sd__none__2"}
-    names |= {"dlmmse": "city__sd__dlmmse__2"}
-    drawn = fig5({method: frames[name] for method, name in names.items()})
+    drawn = fig5(FrameMaker.of(test, city).figure_frames(middle)["sd", 2])
     shown = ImageBuf(str(ROOT / re.search(r"!\[.*?\]\((.*?)\)", README)[1])).get_pixels(UINT8)
     assert shown.shape == drawn.shape
-    # Other processors and versions: at most one code in 1e-4 of samples, four times in a difference.
+    # Elsewhere one code in 1e-4 of samples may be another; a sample may touch all of its crop.
     assert np.mean(shown != drawn) < 1e-2

@@ -12,6 +12,7 @@ from scipy.ndimage import sobel
 
 from dsis.errors import InputError
 from dsis.scenes import SCENES, Strip, panorama, preset_strip, render
+from dsis.scenes.renderer import _prepared
 from dsis.workers import Workers, workers
 
 REC709_LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)  # ITU-R BT.709-6, item 3.2
@@ -54,6 +55,7 @@ def test_a_seed_fixes_every_byte_whoever_renders_and_a_wider_strip_shows_more_of
     wide = render(strip, 2, lambda *words: told.append(words))
     apart = render(strip, pool=processes)
     narrow = render(replace(strip, columns=64), 1)
+    assert _prepared.cache_info().currsize == 0  # what it was made from holds no memory
     assert narrow.dtype == np.float32
     assert narrow.shape == (48, 64, 3)
     assert wide.tobytes() == apart.tobytes()

@@ -47,7 +47,11 @@ def test_jobs_runs_and_a_cluster_give_the_same_bytes(
     distributed = pytest.importorskip("distributed")
     files = []
     with distributed.LocalCluster(
-        n_workers=1, threads_per_worker=2, processes=False, protocol="tcp", dashboard_address="127.0.0.1:0"
+        n_workers=1,
+        threads_per_worker=2,
+        processes=False,
+        protocol="tcp",
+        dashboard_address="127.0.0.1:0",
     ) as cluster:
         by = (["--jobs", "1"], ["--jobs", "2"], ["--scheduler", cluster.scheduler_address])
         for run, workers in enumerate(by):

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,8 @@ import pytest
 from dsis.cli import main
 from dsis.errors import InputError
 from dsis.imagefile import write
+from dsis.scenes import Strip, renderer
+from dsis.scenes.cache import cache_folder
 from dsis.spec import read_spec
 from dsis.stimuli import build_stimuli
 from dsis.workers import WorkersLostError, _refuse_unlike, versions, workers
@@ -91,6 +94,32 @@ def test_two_worker_processes_give_the_same_bytes(
     said = main(["stimuli", str(spec), "--scheduler", address, "--out", str(tmp_path / "out")])
     assert said == 0
     assert every_byte(tmp_path / "out") == built
+
+
+def test_the_cluster_renders_the_scenes(
+    cluster: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    spec = write_spec(
+        tmp_path / "spec.toml",
+        content=[{"name": "land", "scene": "landscape", "scene_seed": 77}],
+        sequence={"width": 32, "height": 24, "seconds": 0.04},
+        awgn={"sigma": 2.0},
+        session={"reference_s": 0.04, "test_s": 0.04},
+    )
+
+    @lru_cache
+    def prepared(strip: Strip) -> None:
+        pytest.fail(f"{strip} is rendered here")
+
+    with monkeypatch.context() as here:
+        here.setattr(renderer, "_prepared", prepared)
+        build_stimuli(read_spec(spec), tmp_path / "far", scheduler=cluster.scheduler.address)
+    rendered = list(cache_folder().glob("landscape-77-*"))
+    assert rendered
+    for path in rendered:
+        path.unlink()
+    build_stimuli(read_spec(spec), tmp_path / "near")
+    assert every_byte(tmp_path / "far") == every_byte(tmp_path / "near")
 
 
 def test_workers_with_other_versions_are_refused() -> None:

@@ -14,8 +14,10 @@ import sys
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
+from threading import Lock
 from typing import Any, TypeVar, cast
 
 import numba
@@ -27,6 +29,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 ROWS_PER_BLOCK = 64
 _UNUSED_S = 86400.0  # from when on no process can still write there
+_one_places = Lock()  # the compiler has one setting for all threads, and they may import at once
 
 
 class _Word(event.Listener):
@@ -53,18 +56,22 @@ def kernel(function: F) -> F:
     Kernels may call kernels of other files of their folder: all are compiled anew when one changes.
     """
     settings: Any = numba.config
-    default = settings.CACHE_DIR
-    settings.CACHE_DIR = str(_cache(Path(function.__code__.co_filename).parent, default))
-    try:
-        compiled = numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=False)(function)
-    finally:
-        settings.CACHE_DIR = default
-    return cast("F", compiled)
+    with _one_places:
+        default = settings.CACHE_DIR
+        place = _cache(Path(function.__code__.co_filename).parent, default)
+        settings.CACHE_DIR = str(place or default)
+        try:
+            compile_ = numba.njit(
+                cache=place is not None, nogil=True, error_model="numpy", fastmath=False
+            )
+            return cast("F", compile_(function))
+        finally:
+            settings.CACHE_DIR = default
 
 
 @lru_cache(maxsize=64)
-def _cache(package: Path, given: str) -> Path:
-    """Return where the compiled kernels of a folder lie; old ones are removed.
+def _cache(package: Path, given: str) -> Path | None:
+    """Return where the compiled kernels of a folder lie, None: nowhere; old ones are removed.
 
     The compiler's own cache looks at the file of a kernel only, and would keep what calls another.
     They lie beside the sources, else in the user's cache; in `given` (NUMBA_CACHE_DIR) if not "".
@@ -81,8 +88,13 @@ def _cache(package: Path, given: str) -> Path:
     wanted = caches / f"kernels-{stamp.hexdigest()}"
     if not wanted.exists():
         for earlier in caches.glob("kernels-*"):
-            if time.time() - earlier.stat().st_mtime > _UNUSED_S:
-                shutil.rmtree(earlier, ignore_errors=True)
+            with suppress(FileNotFoundError):  # another process removes them, too
+                if time.time() - earlier.stat().st_mtime > _UNUSED_S:
+                    shutil.rmtree(earlier, ignore_errors=True)
+        try:
+            wanted.mkdir(parents=True, exist_ok=True)
+        except OSError:  # nothing can be written: each process compiles for itself
+            return None
     return wanted
 
 

@@ -233,6 +233,20 @@ def write_light(path: Path, light: NDArray[np.float32], says: str) -> None:
     write_codes(path, light, {"ImageDescription": says, "oiio:ColorSpace": "lin_rec709_scene"})
 
 
+def begin(path: Path) -> Path:
+    """Return an empty file in the folder of `path`, made where it is absent: what is not yet whole.
+
+    Raises `OSError`, which names `path`, where no file can be written.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    unfinished = path.with_name(f".{path.stem}.unfinished{path.suffix}")
+    try:
+        unfinished.write_bytes(b"")
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(path)) from None
+    return unfinished
+
+
 def write_codes(
     path: Path, pixels: NDArray[np.generic], attributes: Mapping[str, str] = MappingProxyType({})
 ) -> None:
@@ -253,8 +267,7 @@ def write_codes(
     spec.attribute("compression", "zip" if path.suffix.lower() == ".exr" else "none")
     if path.suffix == ".png":
         spec.attribute("png:compressionLevel", 1)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    unfinished = path.with_name(f".{path.stem}.unfinished{path.suffix}")
+    unfinished = begin(path)
     complaint = _written(unfinished, pixels, spec)
     if complaint:
         unfinished.unlink(missing_ok=True)

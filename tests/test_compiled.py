@@ -142,9 +142,10 @@ def test_only_kernels_that_nobody_uses_any_more_are_removed(
     """Another process may be at it too: what it has removed meanwhile is no fault."""
     (tmp_path / "package").mkdir()
     caches = tmp_path / "package" / "__pycache__"
-    for age, name in enumerate(("kernels-new", "kernels-old", "kernels-older", "others-old")):
+    known = {"kernels-new": 0.5, "kernels-old": 2, "kernels-older": 3, "others-old": 2}
+    for name, days in known.items():
         (caches / name).mkdir(parents=True)
-        os.utime(caches / name, (1e9 * (age == 0) + 2e9 - age,) * 2)
+        os.utime(caches / name, (3e9 - 86400 * days,) * 2)
     monkeypatch.setattr(compiled.time, "time", lambda: 3e9)
     remove = shutil.rmtree
 
@@ -155,4 +156,14 @@ def test_only_kernels_that_nobody_uses_any_more_are_removed(
 
     monkeypatch.setattr(compiled.shutil, "rmtree", both)
     compiled._cache.__wrapped__(tmp_path / "package", "")
-    assert {path.name for path in caches.iterdir()} == {"kernels-new", "others-old"}
+    left = {path.name for path in caches.iterdir()}
+    assert left & set(known) == {"kernels-new", "others-old"}
+
+
+def test_where_nothing_can_be_written_kernels_run_all_the_same(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "file").write_text("no folder")
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path / "file"))
+    assert kernel(lambda x: x + 1)(1) == 2
+    assert str(tmp_path / "file") == numba.config.CACHE_DIR

@@ -19,6 +19,8 @@ FAMILY = 0.006  # chance of any mismatch in a recording that differs in nothing
 HOMES = 0.6  # of it, for the sums that show an effect of the vocabulary best
 SUMS = 0.2  # of it, for other sums over exposures or channels
 _ROOTS = 2e-3  # of a ratio: 0.6 % of the finer mean square
+_PATTERNS = frozenset(f"fixed_{part}_variance" for part in ("pixel", "row", "column", "smooth"))
+_NO_PATTERN = 1.02  # cube root of a ratio of mean squares: 6 % above noise alone
 _FLOORS = {
     "pixel_variance": 1e-3,
     "skewness": 1e-3,
@@ -54,6 +56,9 @@ def tested(layout: Layout, null: Null, seen: Vector) -> tuple[Array, Array]:
     peaks = np.array([key.statistic.endswith("spectrum_peak") or key.statistic == "spectral_peak"
                       for key in null.keys])  # fmt: skip
     z[peaks] = np.maximum(z[peaks], 0.0)
+    # No pattern is less than none: lower tails of these ratios of few degrees are heavy.
+    nothing = _without_pattern(null, seen)
+    z[nothing] = np.maximum(z[nothing], 0.0)
     known = np.concatenate([null.known, np.ones(len(null.contrasts.keys), bool)])
     weights = shares(layout, null)
     single = null.chances(z)
@@ -63,6 +68,16 @@ def tested(layout: Layout, null: Null, seen: Vector) -> tuple[Array, Array]:
     chances = np.ones(len(z))
     chances[known] = adjusted(single[known], weights[known])
     return z, chances
+
+
+def _without_pattern(null: Null, seen: Vector) -> NDArray[np.bool_]:
+    """Return which numbers and contrasts are of fixed patterns that the model does not have."""
+    pattern = np.array([key.statistic in _PATTERNS for key in seen.keys])
+    single = pattern & (null.mean < _NO_PATTERN + null.sd)
+    weights = np.abs(null.contrasts.matrix)
+    mean = weights @ null.mean / np.maximum(weights.sum(1), 1e-12)
+    of_patterns = ~(weights[:, ~pattern] > 0).any(1)
+    return np.concatenate([single, of_patterns & (mean < _NO_PATTERN)])
 
 
 def shares(layout: Layout, null: Null) -> Array:

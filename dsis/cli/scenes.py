@@ -30,7 +30,7 @@ def add_scenes(add: Add) -> None:
 
 def scenes(options: argparse.Namespace) -> None:
     """Render City or Landscape into a file."""
-    from dsis.imagefile import LIGHT_FORMATS, write_light
+    from dsis.imagefile import LIGHT_FORMATS, begin, write_light
     from dsis.scenes import panorama, preset_strip
     from dsis.workers import workers
 
@@ -40,7 +40,7 @@ def scenes(options: argparse.Namespace) -> None:
     if out.is_dir() or out.suffix.lower() not in LIGHT_FORMATS:
         fact = f"must be a file that ends in one of: {', '.join(LIGHT_FORMATS)}"
         raise InputError.of("--out", "", f"is {str(out)!r}, {fact}")
-    out.parent.mkdir(parents=True, exist_ok=True)
+    begin(out).unlink()  # rendering takes minutes: what cannot be written is refused before
     with (
         workers(options.jobs, scheduler=options.scheduler) as pool,
         progress_bar(strip.scene) as progress,

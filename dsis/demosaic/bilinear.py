@@ -36,7 +36,7 @@ def bilinear(
     out
         float32 (row, column, 3) to write into; re-using one saves as much time as the arithmetic.
     threads
-        Number of threads; the result does not depend on it.
+        Number of threads, for large images; the result does not depend on it.
 
     Returns
     -------
@@ -50,7 +50,9 @@ def bilinear(
     """
     given = frame(mosaic, cfa, MARGIN, out)
     large = given.out.nbytes > _CACHED_BYTES
-    over_rows(lambda first, last: _rows(given, large, first, last), mosaic.shape[0], threads)
+    # One thread is done with what fits the caches before another is awake.
+    workers = threads if large else 1
+    over_rows(lambda first, last: _rows(given, large, first, last), mosaic.shape[0], workers)
     return given.out
 
 

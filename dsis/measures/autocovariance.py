@@ -12,7 +12,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from dsis.compiled import inlined, kernel
+from dsis.compiled import kernel
 from dsis.measures.estimate import Estimate, estimate, unknown
 from dsis.measures.lag_products import half_plane
 
@@ -86,7 +86,10 @@ class Autocorrelation:
 
     def inflation(self) -> float:
         """Return the sum of rho^2 over lags less what their errors add; at least 1."""
-        total = float(_inflation(self.values, self.pairs, self.degrees))
+        beyond = self.values**2 - 1 / np.maximum(self.pairs * self.degrees, 1)
+        counted = self.pairs > 0
+        counted[counted.shape[0] // 2, counted.shape[1] // 2] = False
+        total = 1 + float(beyond[counted].sum())
         return total if total > 1 else 1.0  # 1 also where there is no noise at all
 
     def less(self, temporal: "Autocorrelation", frames: int) -> "Autocorrelation":
@@ -102,7 +105,9 @@ class Autocorrelation:
         """Return the correlation at some lags (dy, dx) by name; error by Bartlett's formula."""
         centre = self.values.shape[0] // 2
         wanted = np.array(list(lags.values()), np.int64).reshape(-1, 2)
-        scatters = _bartlett(self.observed, self.pairs, self.degrees, wanted)
+        scatters, known = np.empty(len(wanted)), np.empty(self.values.shape)
+        wide = np.zeros((len(known) + 4 * centre, len(known) + 4 * centre))
+        _bartlett(self.observed, self.pairs, self.degrees, wanted, known, wide, scatters)
         # What temporal noise leaves is estimated from T - 1 frames and taken off: its noise again.
         again = 1 / (self.frames - 1)
         null = 1 + (again if self.left else 0.0)
@@ -146,118 +151,90 @@ def autocorrelation(
     """
     products, pairs = table.of_channel(phases)
     step = 1 if len(phases) > 1 else 2
-    values, scale = _correlation(
-        products, pairs, variances, phases[0], degrees, (*shape, step, lost)
-    )
+    work = np.zeros((4, *products.shape))
+    _correlate(products, pairs, variances, phases[0], degrees, (*shape, step, lost), work)
+    values, scale, _, _ = work
     return Autocorrelation(values, pairs, scale, degrees, values)
 
 
 @kernel
-def _correlation(
+def _correlate(  # noqa: C901, PLR0912 - one loop nest, compiled as one
     products: Array,
     pairs: Array,
     variances: Array,
     phase: tuple[int, int],
     degrees: int,
     size: tuple[int, int, int, int],
-) -> tuple[Array, Array]:
-    """Return the correlation, nan without pairs, and the product of standard deviations.
+    work: Array,
+) -> None:
+    """Write the correlation, nan without pairs, and the product of standard deviations.
 
-    White noise first, then the lags that stand out, in four rounds: converges as 1/columns.
+    They are work[0] and work[1] of zeros (4, lag, lag). White noise first, then the lags that stand
+    out, in four rounds: converges as 1/columns. Means that were taken off cost each lag the sum of
+    its row's lags over m, for a pixel's row mean holds 1/m of every pixel of the partner's channel
+    in that row; likewise columns, and both means hold the frame's.
     """
     lags = products.shape[0]
     centre = lags // 2
+    n, m, step, lost = size
     y, x = phase
-    scale, raw, values = np.empty((lags, lags)), np.empty((lags, lags)), np.empty((lags, lags))
-    rho = np.zeros((lags, lags))
-    rho[centre, centre] = 1.0
+    values, scale, rho, rows = work[0], work[1], work[2], work[3]
     for i in range(lags):
         for j in range(lags):
-            partner = variances[(y + i - centre) % 2, (x + j - centre) % 2]
+            partner = variances[(y + i - centre) & 1, (x + j - centre) & 1]
             scale[i, j] = np.sqrt(variances[y, x] * partner)
-            raw[i, j] = products[i, j] / degrees / scale[i, j]
+    rho[centre, centre] = 1.0
     for _ in range(4):
-        _taken_off(rho, size, values)
         for i in range(lags):
             for j in range(lags):
-                values[i, j] += raw[i, j]
+                rows[i, j] = 0.0
+                for k in range(j % step, lags, step):
+                    rows[i, j] += rho[i, k] / m
+        for i in range(lags):
+            for j in range(lags):
+                column, both = 0.0, 0.0
+                for k in range(i % step, lags, step):
+                    column += rho[k, j]
+                    both += rows[k, j]
+                off = rows[i, j] + column / n - both * (1 - lost) / n
+                values[i, j] = off + products[i, j] / degrees / scale[i, j]
+        for i in range(lags):
+            for j in range(lags):
                 # Lags within their own error would only add noise.
-                clear = np.abs(values[i, j]) > 3 / np.sqrt(_at_least_1(pairs[i, j] * degrees))
-                rho[i, j] = values[i, j] if clear and pairs[i, j] > 0 else 0.0
-        values[centre, centre] = raw[centre, centre]
+                clear = abs(values[i, j]) > 3 / np.sqrt(pairs[i, j] * degrees)
+                rho[i, j] = values[i, j] if clear else 0.0
+        values[centre, centre] = products[centre, centre] / degrees / scale[centre, centre]
         rho[centre, centre] = 1.0
     for i in range(lags):
         for j in range(lags):
             if not pairs[i, j] > 0:
                 values[i, j] = np.nan
-    return values, scale
 
 
-@inlined
-def _taken_off(rho: Array, size: tuple[int, int, int, int], off: Array) -> None:
-    """Write what removed means take off each lag, from the correlations known.
+@kernel
+def _bartlett(
+    observed: Array,
+    pairs: Array,
+    degrees: int,
+    lags: NDArray[np.int64],
+    known: Array,
+    wide: Array,
+    found: Array,
+) -> None:
+    """Write n var(rho) of a linear process at lags (lag, 2), from those known (Bartlett 1946).
 
-    A pixel's row mean holds 1/m of every pixel of the partner's channel in that row, so each lag
-    loses the sum of its row's lags over m; likewise columns, and both means hold the frame's.
+    `wide`, zeros, has a margin of two centres: the formula looks one lag ahead, and one behind.
     """
-    n, m, step, lost = size
-    lags = rho.shape[0]
-    rows, columns = np.zeros(lags), np.zeros(lags)
-    for y in range(step):
-        for x in range(step):
-            whole = 0.0
-            for i in range(y, lags, step):
-                total = 0.0
-                for j in range(x, lags, step):
-                    total += rho[i, j]
-                rows[i] = total / m
-                whole += rows[i]
-            for j in range(x, lags, step):
-                total = 0.0
-                for i in range(y, lags, step):
-                    total += rho[i, j]
-                columns[j] = total / n
-            both = whole * (1 - lost) / n
-            for i in range(y, lags, step):
-                for j in range(x, lags, step):
-                    off[i, j] = rows[i] + columns[j] - both
-
-
-@inlined
-def _at_least_1(count: float) -> float:
-    """Return the count, or 1; the built-in `max` takes longer to compile."""
-    return count if count > 1 else 1.0
-
-
-@kernel
-def _inflation(values: Array, pairs: Array, degrees: int) -> float:
-    centre = values.shape[0] // 2
-    total = 1.0
-    for i in range(values.shape[0]):
-        for j in range(values.shape[1]):
-            if (i != centre or j != centre) and pairs[i, j] > 0:
-                total += values[i, j] ** 2 - 1 / _at_least_1(pairs[i, j] * degrees)
-    return total
-
-
-@kernel
-def _bartlett(observed: Array, pairs: Array, degrees: int, lags: NDArray[np.int64]) -> Array:
-    """Return n var(rho) of a linear process at lags (lag, 2), from those known (Bartlett 1946)."""
     size = observed.shape[0]
     centre = size // 2
-    # A margin of zeros: the formula looks one lag ahead, and one behind.
-    start, wide = 2 * centre, np.zeros((size + 4 * centre, size + 4 * centre))
-    known = np.zeros((size, size))
     for i in range(size):
         for j in range(size):
-            # Lags within their own error would only add noise: 80 lags of it.
-            least = 3 / np.sqrt(_at_least_1(pairs[i, j] * degrees))
             known[i, j] = observed[i, j] if pairs[i, j] > 0 else 0.0
             if i == centre and j == centre:
                 known[i, j] = 1.0
-            if np.abs(known[i, j]) > least:
-                wide[start + i, start + j] = known[i, j]
-    found = np.empty(lags.shape[0])
+            # Lags within their own error would only add noise: 80 lags of it.
+            if abs(known[i, j]) > 3 / np.sqrt(pairs[i, j] * degrees):
+                wide[2 * centre + i, 2 * centre + j] = known[i, j]
     for k in range(lags.shape[0]):
         dy, dx = lags[k, 0], lags[k, 1]
         h = known[centre + dy, centre + dx]
@@ -267,7 +244,6 @@ def _bartlett(observed: Array, pairs: Array, degrees: int, lags: NDArray[np.int6
                 w, ahead, behind = wide[i, j], wide[i + dy, j + dx], wide[i - dy, j - dx]
                 total += w * w + ahead * behind - 4 * h * w * behind + 2 * h * h * (w * w)
         found[k] = total
-    return found
 
 
 @lru_cache(maxsize=16)

@@ -46,9 +46,11 @@ def first_pass(
     limits[:, 1], limits[:, 2] = _FAR, -_FAR
 
     def block(start: int, stop: int) -> None:
+        lines = np.zeros((3, columns))
         _first_pass(
-            frame, first, previous, difference, start, stop, by_row, by_column, squares, limits
-        )
+            frame, first, previous, difference, start, stop, by_row, by_column, squares, limits,
+            lines,
+        )  # fmt: skip
 
     over_rows(block, rows, threads)
     # Blocks are added in their order, whoever made them.
@@ -69,12 +71,14 @@ def _first_pass(
     by_column: Sums,
     squares: Sums,
     limits: NDArray[np.int64],
+    lines: Sums,
 ) -> None:
+    """Use `lines` (3, column), zeros at first: of a row and of the changes in rows of a parity."""
     columns = frame.shape[1]
-    folded, changes = np.empty(columns), np.zeros((2, columns))
+    folded = lines[2]
     for y in range(first, last):
         line, out, start, before = frame[y], difference[y], base[y], previous[y]
-        into, squared = by_column[y // _BLOCK, y & 1], changes[y & 1]
+        into, squared = by_column[y // _BLOCK, y & 1], lines[y & 1]
         for x in range(columns):
             out[x] = line[x] - start[x]
         for x in range(columns):
@@ -87,8 +91,9 @@ def _first_pass(
         _take_limits(line, limits[y // _BLOCK])
         if (y + 1) % _BLOCK == 0 or y + 1 == last:
             for p in range(2):
-                _fold(changes[p], squares[y // _BLOCK, p])
-            changes[:] = 0
+                _fold(lines[p], squares[y // _BLOCK, p])
+                for x in range(columns):
+                    lines[p, x] = 0.0
 
 
 @inlined

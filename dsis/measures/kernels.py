@@ -7,7 +7,7 @@ number of threads. A 2 x 2 phase is (row parity, column parity) within the array
 import numpy as np
 from numpy.typing import NDArray
 
-from dsis.compiled import inlined, kernel, over_rows
+from dsis.compiled import kernel, over_rows
 
 Frame = NDArray[np.float32]
 Sums = NDArray[np.float64]
@@ -41,65 +41,29 @@ def add_moments(
     over_rows(block, difference.shape[0], threads)
 
 
-@kernel
 def offsets(by_row: Sums, by_column: Sums, single: bool) -> tuple[Sums, Sums, Sums]:
     """Return what to subtract from each pixel, and the mean of each phase (2, 2).
 
     Row means (row, column parity), and column means less the mean (row parity, column); `single`:
-    all phases are one channel. Plain loops: array expressions take many times as long to compile.
+    all phases are one channel.
     """
     rows, columns = by_row.shape[0], by_column.shape[1]
-    of_rows, of_columns, means = np.empty((rows, 2)), np.empty((2, columns)), np.zeros((2, 2))
     if single:
-        _offsets_of_one(by_row, by_column, of_rows, of_columns, means)
-        return of_rows, of_columns, means
-    down, across = ((rows + 1) // 2, rows // 2), ((columns + 1) // 2, columns // 2)
-    for y in range(rows):
-        for p in range(2):
-            of_rows[y, p] = by_row[y, p] / across[p]
-            means[y & 1, p] += by_row[y, p]
-    for p in range(2):
-        for q in range(2):
-            means[p, q] /= down[p] * across[q]
-        for x in range(columns):
-            of_columns[p, x] = by_column[p, x] / down[p] - means[p, x & 1]
-    return of_rows, of_columns, means
+        by_line = by_row.sum(1)
+        mean = by_line.sum() / (rows * columns)
+        of_columns = (by_column[0] + by_column[1]) / rows - mean
+        of_rows = np.repeat(by_line / columns, 2).reshape(rows, 2)
+        return of_rows, np.tile(of_columns, (2, 1)), np.full((2, 2), mean)
+    down, across = (np.array([(size + 1) // 2, size // 2]) for size in (rows, columns))
+    means = np.array([by_row[0::2].sum(0), by_row[1::2].sum(0)]) / np.outer(down, across)
+    of_columns = by_column / down[:, np.newaxis] - means[:, np.arange(columns) & 1]
+    return by_row / across, of_columns, means
 
 
-@inlined
-def _offsets_of_one(
-    by_row: Sums, by_column: Sums, of_rows: Sums, of_columns: Sums, means: Sums
-) -> None:
-    """Write `offsets` where all phases are one channel."""
-    rows, columns = by_row.shape[0], by_column.shape[1]
-    total = 0.0
-    for y in range(rows):
-        total += by_row[y, 0]
-        total += by_row[y, 1]
-    for p in range(2):
-        for q in range(2):
-            means[p, q] = total / (rows * columns)
-        for y in range(rows):
-            of_rows[y, p] = (by_row[y, 0] + by_row[y, 1]) / columns
-        for x in range(columns):
-            of_columns[p, x] = (by_column[0, x] + by_column[1, x]) / rows - means[0, 0]
-
-
-@kernel
 def split(image: Frame, places: NDArray[np.int64], means: Sums, out: Frame) -> None:
     """Write planes less their means: (plane, row, column); `places`: first row, column and step."""
-    _, n, m = out.shape
-    for k in range(places.shape[0]):
-        y0, x0, step = places[k, 0], places[k, 1], places[k, 2]
-        mean = np.float32(means[y0, x0])
-        for y in range(n):
-            line, into = image[y0 + y * step], out[k, y]
-            if step == 1:
-                for x in range(m):
-                    into[x] = line[x] - mean
-            else:
-                for x in range(m):
-                    into[x] = line[x0 + 2 * x] - mean
+    for (y, x, step), plane in zip(places.tolist(), out, strict=True):
+        np.subtract(image[y::step, x::step], np.float32(means[y, x]), out=plane)
 
 
 @kernel
@@ -174,7 +138,6 @@ def project(images: NDArray[np.floating], basis: Sums) -> Sums:
     return out
 
 
-@kernel
 def mean_frame(
     base: Frame,
     sums: Sums,
@@ -203,46 +166,20 @@ def mean_frame(
     mean, change
         Are written: (row, column).
     """
-    y0, x0, step = place
-    n, m = mean.shape
-    rows, columns = np.zeros(n), np.zeros(m)
-    _over_frames(row_means, frames, rows)
-    _over_frames(column_means, frames, columns)
-    level = 0.0
-    for y in range(n):
-        level += rows[y]
-    level /= n
-    for y in range(n):
-        rows[y] -= level
-    for x in range(m):
-        columns[x] -= level
-    by_row, by_column = np.zeros(n), np.zeros(m)
-    for y in range(n):
-        line, total = base[y0 + y * step, x0::step], sums[y0 + y * step, x0::step]
-        into, over = mean[y], change[y]
-        for x in range(m):
-            over[x] = total[x] / frames + rows[y] + columns[x]
-            into[x] = line[x] + (over[x] + level) + shift
-            by_column[x] += line[x]
-            by_row[y] += line[x]
-    for y in range(n):
-        by_row[y] = by_row[y] / m + shift
-    for x in range(m):
-        by_column[x] = by_column[x] / n + shift
-    return by_row, by_column
+    y, x, step = place
+    (n, m), first = mean.shape, base[y::step, x::step]
+    rows, columns = row_means.sum(0) / frames, column_means.sum(0) / frames
+    level = rows.sum() / n
+    np.divide(sums[y::step, x::step], frames, out=change)
+    change += (rows - level)[:, np.newaxis]
+    change += columns - level
+    np.add(change, level, out=mean)
+    mean += first
+    mean += shift
+    by_row, by_column = (first.sum(axis, dtype=np.float64) for axis in (1, 0))
+    return by_row / m + shift, by_column / n + shift
 
 
-@inlined
-def _over_frames(series: Sums, frames: int, out: Sums) -> None:
-    """Write the mean over the first frames of a series (frame, line) to `out`, zeros before."""
-    for t in range(frames):
-        for i in range(out.size):
-            out[i] += series[t, i]
-    for i in range(out.size):
-        out[i] /= frames
-
-
-@kernel
 def temporal_power(
     power: Sums, transform: NDArray[np.complex128], columns: int, frames: int
 ) -> Sums:
@@ -250,12 +187,10 @@ def temporal_power(
 
     Power (row, column) of images of `columns` columns; nothing is below zero.
     """
-    rows, bins = power.shape
-    out = np.empty((rows, bins))
-    share = rows * columns * (frames - 1)
-    for y in range(rows):
-        for x in range(bins):
-            still = transform[y, x].real ** 2 + transform[y, x].imag ** 2
-            left = power[y, x] - frames * still
-            out[y, x] = (left if left > 0 else 0.0) / share
-    return out
+    left = transform.real**2
+    left += transform.imag**2
+    left *= -frames
+    left += power
+    np.maximum(left, 0, out=left)
+    left /= len(power) * columns * (frames - 1)
+    return left

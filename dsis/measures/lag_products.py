@@ -26,11 +26,13 @@ def lag_products(image: NDArray[np.float32], reach: int, threads: int) -> Sums:
 
     The lags are those of `half_plane`; pairs that leave the image (C-contiguous) are left out.
     """
-    rows = image.shape[0]
+    rows, columns = image.shape
     sums = np.zeros((-(-rows // _BLOCK), len(half_plane(reach)), 2, 2))
 
     def block(first: int, last: int) -> None:
-        _lag_products(image, reach, first, last, sums)
+        wide = columns + 2 * reach + 3
+        margin = np.zeros((_BLOCK + reach + 8) * wide, np.float32)
+        _lag_products(image, reach, first, last, margin, np.empty((3, columns), np.float32), sums)
 
     over_rows(block, rows, threads)
     total: Sums = sums.sum(0)
@@ -39,29 +41,34 @@ def lag_products(image: NDArray[np.float32], reach: int, threads: int) -> Sums:
 
 @kernel
 def _lag_products(
-    image: NDArray[np.float32], reach: int, first: int, last: int, sums: Sums
+    image: NDArray[np.float32],
+    reach: int,
+    first: int,
+    last: int,
+    margin: NDArray[np.float32],
+    by_column: NDArray[np.float32],
+    sums: Sums,
 ) -> None:
     """Sum products by column, in float32: it holds 32 products of one sign to 1e-6.
 
     Three lags and four rows at a time keep what is loaded in registers; a margin of zeros spares
-    the ends of rows and columns a case of their own.
+    the ends of rows and columns a case of their own. Rows are copied in a loop: an assignment of
+    slices takes a second more to compile.
     """
     rows, columns = image.shape
     wide = columns + 2 * reach + 3
-    margin = np.zeros((_BLOCK + reach + 8) * wide, np.float32)
-    by_column = np.empty((3, columns), np.float32)
     a, b, c = by_column[0], by_column[1], by_column[2]
     size, two = np.uintp(columns), np.uintp(2 * wide)
     for start in range(first, last, _BLOCK):
-        top = min(start + _BLOCK + reach, rows)
-        margin[(top - start) * wide :] = 0
-        for y in range(start, top):
-            at = (y - start) * wide + reach
-            margin[at : at + columns] = image[y]
-        height = min(_BLOCK, rows - start)
+        height, loaded = min(_BLOCK, rows - start), min(_BLOCK + reach, rows - start)
+        margin[loaded * wide :] = 0
+        for y in range(loaded):
+            for x in range(columns):
+                margin[y * wide + reach + x] = image[start + y, x]
         lag = 0
         for dy in range(reach + 1):
             for dx in range(0 if dy == 0 else -reach, reach + 1, 3):
+                lags = min(3, reach - dx + 1)
                 for parity in range(2):
                     by_column[:] = 0
                     for y in range((start + parity) & 1, height, 8):
@@ -86,9 +93,9 @@ def _lag_products(
                                 ((c[i] + v0 * margin[t0 + k]) + v1 * margin[t1 + k])
                                 + v2 * margin[t2 + k]
                             ) + v3 * margin[t3 + k]
-                    for g in range(min(3, reach - dx + 1)):
+                    for g in range(lags):
                         _by_parity(by_column[g], sums[start // _BLOCK, lag + g, parity])
-                lag += min(3, reach - dx + 1)
+                lag += lags
 
 
 @inlined

@@ -1,6 +1,6 @@
 """Each pixel's moments over time from its sums over frames, and how the pixels scatter.
 
-Two passes over the pixels: maps and means, then products of deviations from the means. Nothing of
+Two passes over the pixels, the same work about zero and then about the means it found. Nothing of
 the size of a frame is kept but the two maps that are asked for.
 """
 
@@ -8,11 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dsis.compiled import ROWS_PER_BLOCK, inlined, kernel, over_rows
+from dsis.compiled import ROWS_PER_BLOCK, kernel, over_rows
 from dsis.measures.kernels import FiveSums, Frame, Sums
 
 _BLOCK = ROWS_PER_BLOCK
-_MEANS, _PRODUCTS = 5, 10
+_FIRST, _SECOND = 4, 10  # sums of powers, and of products of two
 Place = tuple[int, int, int]
 """First row, first column and step of a channel."""
 
@@ -77,127 +77,100 @@ def pixel_moments(
         Threads that may be used.
     """
     n, m = shape
-    blocks, size, t = -(-n // _BLOCK), n * m, frames
+    size, t = n * m, frames
     variance, neighbour = np.empty(shape), np.empty(shape)
-    first, second = np.empty((blocks, _MEANS)), np.empty((blocks, _PRODUCTS))
+    by_block = np.empty((-(-n // _BLOCK), _FIRST + _SECOND))
 
-    def maps(start: int, stop: int) -> None:
-        _maps(sums, last, t, place, kept, variance, neighbour, start, stop, first)
+    def summed(centre: tuple[float, ...]) -> Sums:
+        numbers = np.array([t, kept, *centre])
 
-    over_rows(maps, n, threads)
-    means = first.sum(0) / size
+        def block(start: int, stop: int) -> None:
+            lines = np.empty((4 + _FIRST + _SECOND, m))
+            _add_powers(
+                *sums, last, *place, numbers, variance, neighbour, start, stop, lines, by_block
+            )
+
+        over_rows(block, n, threads)
+        whole: Sums = by_block.sum(0) / size
+        return whole
+
+    square, cube, fourth, pairs, of_squares = summed((0.0,) * 7)[: _FIRST + 1].tolist()
     a = t**2 * (t + 1) / ((t - 1) * (t - 2) * (t - 3)) if t > 3 else 0.0
     b = 3 * (t - 1) / (t + 1)
-    k4 = a * (means[2] - b * means[4])
-
-    def products(start: int, stop: int) -> None:
-        _products(sums, last, t, place, means, (a, b, k4), m, start, stop, second)
-
-    over_rows(products, n, threads)
-    p: list[float] = (second.sum(0) / size).tolist()
-    square, cube, fourth, pairs, of_squares = means.tolist()
+    k4 = a * (fourth - b * of_squares)
+    p = summed((square, cube, fourth, pairs, a, b, k4))[_FIRST:].tolist()
     some = of_squares > 0
     return variance, neighbour, Scatter(some, square, cube, fourth, pairs, k4, *p)
 
 
 @kernel
-def _maps(
-    sums: FiveSums,
-    last: Frame,
-    frames: int,
-    place: Place,
-    kept: float,
+def _add_powers(
+    s1: Sums,
+    s2: Sums,
+    s3: Sums,
+    s4: Sums,
+    s11: Sums,
+    end: Frame,
+    y0: int,
+    x0: int,
+    step: int,
+    numbers: Sums,
     variance: Sums,
     neighbour: Sums,
     first: int,
-    last_row: int,
+    last: int,
+    lines: Sums,
     out: Sums,
 ) -> None:
+    """Write the maps, and sums over blocks of rows (block, _FIRST + _SECOND), to `out`.
+
+    `numbers`: frames, kept, means of square, cube, fourth and product, a, b, mean of k4. `lines`
+    (4 + _FIRST + _SECOND, column) are what a row and its sums by column are kept in.
+    """
+    frames, kept, a, b, k4 = numbers[0], numbers[1], numbers[6], numbers[7], numbers[8]
+    mean2, mean3, mean4, mean11 = numbers[2], numbers[3], numbers[4], numbers[5]
+    square, cube, fourth, pairs, total = lines[0], lines[1], lines[2], lines[3], lines[4:]
     m = variance.shape[1]
-    rows, total = np.empty((4, m)), np.empty((_MEANS, m))
-    square, cube, fourth, pairs = rows[0], rows[1], rows[2], rows[3]
-    for start in range(first, last_row, _BLOCK):
-        total[:] = 0
-        for y in range(start, min(start + _BLOCK, last_row)):
-            _row(sums, last, frames, place, y, rows)
-            into, beside = variance[y], neighbour[y]
-            for x in range(m):
-                into[x] = square[x] / kept
-                beside[x] = pairs[x]
-            for x in range(m):
-                total[0, x] += square[x]
-                total[1, x] += cube[x]
-                total[2, x] += fourth[x]
-                total[3, x] += pairs[x]
-                total[4, x] += square[x] * square[x]
-        _over_columns(total, out[start // _BLOCK])
-
-
-@kernel
-def _products(
-    sums: FiveSums,
-    last: Frame,
-    frames: int,
-    place: Place,
-    means: Sums,
-    k: tuple[float, float, float],
-    m: int,
-    first: int,
-    last_row: int,
-    out: Sums,
-) -> None:
-    rows, total = np.empty((4, m)), np.empty((_PRODUCTS, m))
-    square, cube, fourth, pairs = rows[0], rows[1], rows[2], rows[3]
-    a, b, k4 = k
-    mean2, mean3, mean4, mean11 = means[0], means[1], means[2], means[3]
-    for start in range(first, last_row, _BLOCK):
-        total[:] = 0
-        for y in range(start, min(start + _BLOCK, last_row)):
-            _row(sums, last, frames, place, y, rows)
-            for x in range(m):
-                d = square[x] - mean2
-                dd = d * d
-                total[0, x] += dd
-                total[1, x] += dd * d
-                total[2, x] += dd * dd
-                e = cube[x] - mean3
-                total[3, x] += e * e
-                total[4, x] += e * d
-            for x in range(m):
-                d = square[x] - mean2
-                e = fourth[x] - mean4
-                total[5, x] += e * e
-                total[6, x] += e * d
-                e = pairs[x] - mean11
-                total[7, x] += e * e
-                total[8, x] += e * d
-                e = a * (fourth[x] - b * (square[x] * square[x])) - k4
-                total[9, x] += e * e
-        _over_columns(total, out[start // _BLOCK])
-
-
-@inlined
-def _row(sums: FiveSums, last: Frame, frames: int, place: Place, y: int, out: Sums) -> None:
-    """Write mean square, cube, fourth power and product with the next frame of a row of pixels."""
-    y0, x0, step = place
-    line = y0 + y * step
-    s1, s2, s3 = sums[0][line, x0::step], sums[1][line, x0::step], sums[2][line, x0::step]
-    s4, s11, end = sums[3][line, x0::step], sums[4][line, x0::step], last[line, x0::step]
-    pairs = frames - 1
-    for x in range(out.shape[1]):
-        m1, m2, m3 = s1[x] / frames, s2[x] / frames, s3[x] / frames
-        square = m1 * m1
-        out[0, x] = m2 - square
-        out[1, x] = m3 - 3 * m1 * m2 + 2 * (square * m1)
-        out[2, x] = s4[x] / frames - 4 * m1 * m3 + 6 * square * m2 - 3 * (square * square)
-        ends = 2 * frames * m1 - end[x]
-        out[3, x] = (frames * (s11[x] / frames) - m1 * ends + pairs * square) / pairs
-
-
-@inlined
-def _over_columns(total: Sums, out: Sums) -> None:
-    for k in range(total.shape[0]):
-        whole = 0.0
-        for x in range(total.shape[1]):
-            whole += total[k, x]
-        out[k] = whole
+    for y in range(first, last):
+        line = y0 + y * step
+        if y % _BLOCK == 0:
+            total[:] = 0
+        for x in range(m):
+            i = x0 + x * step
+            m1, m2, m3 = s1[line, i] / frames, s2[line, i] / frames, s3[line, i] / frames
+            of_mean = m1 * m1
+            square[x] = m2 - of_mean
+            cube[x] = m3 - 3 * m1 * m2 + 2 * (of_mean * m1)
+            m4 = s4[line, i] / frames
+            fourth[x] = m4 - 4 * m1 * m3 + 6 * of_mean * m2 - 3 * (of_mean * of_mean)
+            ends = 2 * frames * m1 - end[line, i]
+            product = frames * (s11[line, i] / frames) - m1 * ends + (frames - 1) * of_mean
+            pairs[x] = product / (frames - 1)
+        for x in range(m):
+            variance[y, x] = square[x] / kept
+            neighbour[y, x] = pairs[x]
+            d, e = square[x] - mean2, cube[x] - mean3
+            dd = d * d
+            total[0, x] += d
+            total[1, x] += e
+            total[4, x] += dd
+            total[5, x] += dd * d
+            total[6, x] += dd * dd
+            total[7, x] += e * e
+            total[8, x] += e * d
+        for x in range(m):
+            d, e, f = square[x] - mean2, fourth[x] - mean4, pairs[x] - mean11
+            k = a * (fourth[x] - b * (square[x] * square[x])) - k4
+            total[2, x] += e
+            total[3, x] += f
+            total[9, x] += e * e
+            total[10, x] += e * d
+            total[11, x] += f * f
+            total[12, x] += f * d
+            total[13, x] += k * k
+        if (y + 1) % _BLOCK == 0 or y + 1 == last:
+            for part in range(total.shape[0]):
+                whole = 0.0
+                for x in range(m):
+                    whole += total[part, x]
+                out[y // _BLOCK, part] = whole

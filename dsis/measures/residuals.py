@@ -1,11 +1,14 @@
 """What an image, or its lines, hold beyond coarser parts of the pattern."""
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
-from dsis.compiled import inlined, kernel, over_rows
+from dsis.compiled import kernel, over_rows
 
 Array = NDArray[np.float64]
+_PIXELS_IN_CACHE = 1 << 15
 
 
 def pixel_residuals(
@@ -18,7 +21,8 @@ def pixel_residuals(
     column), the sum of their squares, and the variance of their squares.
     """
     n, m = image.shape
-    by_row, by_column, mean = _line_means(image)
+    by_row, by_column = image.sum(1) / m, image.sum(0) / n
+    mean = by_row.sum() / n
     pixels, by_line = np.empty((n, m)), np.empty((2, n))
 
     def residual(first: int, last: int) -> None:
@@ -28,29 +32,12 @@ def pixel_residuals(
     squares = float(by_line[0].sum())
 
     def scatter(first: int, last: int) -> None:
-        _scatter(pixels, squares / pixels.size, by_line[1], first, last)
+        for part in _in_cache(first, last, m):
+            beyond = pixels[part] * pixels[part] - squares / pixels.size
+            by_line[1, part] = np.einsum("yx,yx->y", beyond, beyond)
 
     over_rows(scatter, n, threads)
     return by_row, by_column, pixels, squares, float(by_line[1].sum()) / pixels.size
-
-
-@kernel
-def _line_means(image: Array) -> tuple[Array, Array, float]:
-    """Return the means of rows, of columns, and of all pixels."""
-    n, m = image.shape
-    by_row, by_column = np.empty(n), np.zeros(m)
-    mean = 0.0
-    for y in range(n):
-        line, total = image[y], 0.0
-        for x in range(m):
-            total += line[x]
-        for x in range(m):
-            by_column[x] += line[x]
-        by_row[y] = total / m
-        mean += by_row[y]
-    for x in range(m):
-        by_column[x] /= n
-    return by_row, by_column, mean / n
 
 
 @kernel
@@ -81,49 +68,23 @@ def _residual(
         squares[y] = total
 
 
-@kernel
-def _scatter(pixels: Array, mean: float, out: Array, first: int, last: int) -> None:
-    """Write sums by row of (pixel^2 - mean)^2."""
-    for y in range(first, last):
-        line = pixels[y]
-        total = 0.0
-        for x in range(line.size):
-            total += (line[x] * line[x] - mean) ** 2
-        out[y] = total
+def _in_cache(first: int, last: int, columns: int) -> Iterator[slice]:
+    """Yield runs of rows first..last-1 whose intermediate results stay in the cache."""
+    rows = max(1, _PIXELS_IN_CACHE // columns)
+    for top in range(first, last, rows):
+        yield slice(top, min(top + rows, last))
 
 
-@kernel
 def line_residuals(means: Array, series: Array, basis: Array) -> tuple[float, float]:
     """Return sums of squares beyond a basis (line, degree), of means and of the wander of a series.
 
     Means (line); series (frame, line), about its mean over frames.
     """
-    frames, lines = series.shape
-    centre, line = np.zeros(lines), np.empty(lines)
-    for t in range(frames):
-        for i in range(lines):
-            centre[i] += series[t, i]
-    for i in range(lines):
-        line[i] = means[i]
-    spatial = _outside(line, basis)
-    temporal = 0.0
-    for t in range(frames):
-        for i in range(lines):
-            line[i] = series[t, i] - centre[i] / frames
-        temporal += _outside(line, basis)
-    return spatial, temporal
+    return _outside(means[np.newaxis], basis), _outside(series - series.sum(0) / len(series), basis)
 
 
-@inlined
-def _outside(line: Array, basis: Array) -> float:
-    """Return the sum of squares of a line less its projection, which is taken off in place."""
-    inside = np.zeros(basis.shape[1])
-    for i in range(line.size):
-        for degree in range(basis.shape[1]):
-            inside[degree] += basis[i, degree] * line[i]
-    total = 0.0
-    for i in range(line.size):
-        for degree in range(basis.shape[1]):
-            line[i] -= basis[i, degree] * inside[degree]
-        total += line[i] * line[i]
-    return total
+def _outside(lines: Array, basis: Array) -> float:
+    """Return the sum of squares of lines (any, line) less their projections."""
+    inside = np.einsum("tl,ld->td", lines, basis)
+    left = lines - np.einsum("td,ld->tl", inside, basis)
+    return float(np.einsum("tl,tl->", left, left))

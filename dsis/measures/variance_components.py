@@ -12,7 +12,6 @@ import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
-from dsis.compiled import kernel
 from dsis.measures.estimate import Estimate, estimate
 
 Array = NDArray[np.float64]
@@ -133,40 +132,10 @@ def line_power(means: Array, frame_means: Array) -> Array:
     Means (plane, frame, line), (plane, frame); power (plane, bin): half spectrum of a real
     transform along the lines; the sum of the whole one is that of squares.
     """
-    transform = scipy.fft.rfft(_wander(means, frame_means))
-    power: Array = _over_frames(transform, means.shape[2])
-    return power
-
-
-@kernel
-def _wander(means: Array, frame_means: Array) -> Array:
-    """Return line means less the frame's, less their mean over frames: (plane, frame, line)."""
-    planes, frames, lines = means.shape
-    out = np.empty((planes, frames, lines))
-    for k in range(planes):
-        centre = np.zeros(lines)
-        for t in range(frames):
-            for i in range(lines):
-                out[k, t, i] = means[k, t, i] - frame_means[k, t]
-                centre[i] += out[k, t, i]
-        for t in range(frames):
-            for i in range(lines):
-                out[k, t, i] -= centre[i] / frames
-    return out
-
-
-@kernel
-def _over_frames(transform: NDArray[np.complex128], lines: int) -> Array:
-    """Return the sum over frames of |transform|^2 per line: (plane, bin)."""
-    planes, frames, bins = transform.shape
-    power = np.zeros((planes, bins))
-    for k in range(planes):
-        for t in range(frames):
-            for i in range(bins):
-                re, im = transform[k, t, i].real, transform[k, t, i].imag
-                power[k, i] += re * re + im * im
-        for i in range(bins):
-            power[k, i] /= lines
+    wander = means - frame_means[:, :, np.newaxis]
+    wander -= wander.sum(1, keepdims=True) / means.shape[1]
+    transform = scipy.fft.rfft(wander)
+    power: Array = (transform.real**2 + transform.imag**2).sum(1) / means.shape[2]
     return power
 
 

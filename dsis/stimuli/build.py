@@ -47,8 +47,8 @@ def build_stimuli(
     jobs
         Number of threads; no influence on the result.
     scheduler
-        Address of a Dask scheduler whose workers make the frames instead; the same bytes. They
-        find footage under the same paths.
+        Address of a Dask scheduler whose workers render scenes and make the frames instead; the
+        same bytes. They find footage under the same paths.
     progress
         Called with (frames done, frames in all, what is being done).
 
@@ -71,7 +71,7 @@ def build_stimuli(
         workers(jobs, scheduler=scheduler) as pool,
         result_folder(out, MANIFEST, keep=recorded_votes, resume=digest) as folder,
     ):
-        render_panoramas(test, threads=jobs, progress=tell)
+        render_panoramas(test, progress=tell, pool=pool)
         journal = Journal(folder)
         clips: list[Clip] = []
         sigmas: dict[str, dict[str, float]] = {}

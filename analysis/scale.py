@@ -61,6 +61,8 @@ def describe_test(votes_csv: Path, scale: tuple[float, float] | None = None) -> 
         low, high = _ends(list(scale), "--scale", "")
     elif stated is not None:
         low, high = _ends(stated, str(file), "scale")
+    elif not votes_csv.exists():
+        raise InputError.of(votes_csv, "", "cannot be read: No such file or directory")
     else:
         raise InputError.of(
             votes_csv,

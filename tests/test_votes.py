@@ -190,6 +190,8 @@ def test_the_scale_comes_from_the_option_or_the_package(tmp_path):
     file = write(tmp_path, SMALL)
     with pytest.raises(InputError, match="--scale LOW HIGH"):
         analysis.read_votes(file)
+    with pytest.raises(InputError, match=r"no.csv: cannot be read: No such file"):
+        analysis.read_votes(tmp_path / "no.csv")  # that is missing, not the scale
     package = tmp_path / "datapackage.json"
     package.write_text('{"scale": [1, 8], "labels": ["bad", "good"], "title": "T"}')
     with pytest.raises(InputError, match="from 1 to 8"):

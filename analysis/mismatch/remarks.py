@@ -18,13 +18,12 @@ def remarks_on(
     found = []
     if unfit:
         found.append(
-            f"{len(unfit)} exposure(s) are left out, clipped at the white level, of a single frame "
-            f"or of copies: {_listed(unfit)}."
+            "Exposures left out, clipped at the white level, of a single frame or of copies: "
+            f"{_listed(unfit)}."
         )
     if layout.moving:
         found.append(
-            f"{len(layout.moving)} scene(s) are left out, their picture moves between frames: "
-            f"{_listed(layout.moving)}."
+            f"Scenes left out, their picture moves between frames: {_listed(layout.moving)}."
         )
     if not recording.of_kind("dark"):
         found.append(

@@ -29,8 +29,6 @@ _PHASES = {
     "periodic_noise": "the pattern's phase is the same in all frames but for its sign",
     "bistable_pattern": "the pattern's phase is another in every frame",
 }
-# On a mosaic, taps of even and odd lines are Gr and Gb; their red and blue show nothing more.
-_NARROWER = {"channel_imbalance": "tap_mismatch"}
 _SPIKY = 10.0  # standard errors from which tails bend the variances
 _TAILS = frozenset({"kurtosis", "kurtosis_within_pixels", "one_off_outliers"})
 _MOST_OF, _LEAST_CHANGE = 0.7, 1.0
@@ -166,10 +164,6 @@ class Search:
             and _alike(state, fitted[0], fitted[1])
         ):
             first, second = fitted[:2]
-            narrow = _narrower(first, second)
-            if narrow is not None:
-                fitted = [narrow, *fitted[2:]]
-                break
             self.ties.append((first, second))
             for one, other in ((first, second), (second, first)):
                 self.refused[one.kind] = f"explains the recording no better than {other.kind}"
@@ -229,14 +223,6 @@ class Search:
             if worst is None:
                 return state
             state = self.drop(state, worst[1], worst[2])
-
-
-def _narrower(one: Ranked, other: Ranked) -> Ranked | None:
-    """Return which of two effects claims no more than is seen, of two that are one here."""
-    for narrow, wide in ((one, other), (other, one)):
-        if _NARROWER.get(narrow.kind) == wide.kind:
-            return narrow
-    return None
 
 
 def _alike(state: State, one: Ranked, other: Ranked) -> bool:

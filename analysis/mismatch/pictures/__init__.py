@@ -76,7 +76,8 @@ def evidence_of(
 def threshold_z(state: State) -> float:
     """Return from where on the number of a single exposure is certain to depart."""
     null = state.null
-    least = float(min(share for share in shares(state.setting.layout, null) if share > 0))
+    by_key = zip(null.keys, shares(state.setting.layout, null), strict=True)
+    least = float(min(share for key, share in by_key if key.exposure and share > 0))
     chance = FAMILY * least
     return float(scipy.stats.t.isf(chance / 2, null.degrees))
 

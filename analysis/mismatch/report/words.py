@@ -39,6 +39,8 @@ STATISTICS = {
     "fixed_row_variance": "fixed pattern of rows",
     "fixed_column_variance": "fixed pattern of columns",
     "fixed_smooth_variance": "smooth fixed pattern",
+    "fixed_smooth_tilt": "tilt of the fixed pattern",
+    "fixed_smooth_falloff": "fall of the fixed pattern towards the corners",
     "fixed_correlation_0_1": "fixed pattern alike in neighbours of a row",
     "fixed_correlation_1_0": "fixed pattern alike in neighbours of a column",
     "pattern_growth": "growth of the fixed pattern",

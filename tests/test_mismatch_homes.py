@@ -58,6 +58,17 @@ def test_a_sinusoid_between_bins_is_seen_where_it_is(across: float, down: float,
     assert peak.fy * ROWS == pytest.approx(down, abs=0.5)
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_a_checkerboard_alternates_exactly(seed: int) -> None:
+    """Noise of the bins beside it must not say that its phase drifts along a line."""
+    rng = np.random.default_rng(seed)
+    board = 0.1 * (-1.0) ** np.add.outer(np.arange(ROWS), np.arange(COLUMNS))
+    signs = rng.choice([-1.0, 1.0], (FRAMES, 1, 1))
+    peak = _spectra([_white(rng) + signs * board], [1.0]).peak()
+    assert peak is not None
+    assert (peak.fx, abs(peak.fy)) == (0.5, 0.5)
+
+
 def test_the_largest_peak_of_white_noise_is_as_rare_as_it_says() -> None:
     rng = np.random.default_rng(5)
     found = [_spectra([_white(rng)], [1.0]).numbers() for _ in range(60)]

@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.candidates import CANDIDATES
-from analysis.mismatch.contradicted import Denial, contradicted
 from analysis.mismatch.explain import because, explained
 from analysis.mismatch.finding import (
     Alternative,
@@ -120,14 +119,9 @@ def _searched(search: Search, source: Source) -> State:
 def _proven(search: Search, final: State, trial: Trial) -> tuple[State, dict[str, Gain]]:
     """Drop, one by one, effects that are denied, or whose gain is within its uncertainty."""
     while True:
-        denied = [
-            (denial.share, named, denial.why)
-            for named in search.named
-            if (denial := _denied(search, final, named)) is not None
-        ]
-        if denied:
-            _, worst, why = min(denied, key=lambda one: one[0])
-            final = search.drop(final, worst, why)
+        denied = search.denied(final, final.predictor())
+        if denied is not None:
+            final = search.drop(final, *denied)
             continue
         without = {named.kind: search.without(final, named) for named in search.named}
         gained = trial.gains(final, without)
@@ -138,10 +132,6 @@ def _proven(search: Search, final: State, trial: Trial) -> tuple[State, dict[str
         nats = gained[worst.kind].gain.nats_per_frame
         why = f"gains {nats:.3g} nats per locked frame, no more than chance"
         final = search.drop(final, worst, why)
-
-
-def _denied(search: Search, final: State, named: Named) -> Denial | None:
-    return contradicted(final, final.predictor(), named.kind, search.without(final, named))
 
 
 def _finding(

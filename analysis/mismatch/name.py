@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.candidates import Proposal
+from analysis.mismatch.contradicted import contradicted
 from analysis.mismatch.observe import Frames
 from analysis.mismatch.phase import keeps_phase
 from analysis.mismatch.polish import polish, with_effects
@@ -200,6 +201,16 @@ class Search:
         camera = with_effects(bare, polished.effects)
         return state if camera is None else State.of(self.setting, camera, self.step)
 
+    def denied(self, state: State, predictor: Predictor) -> tuple[Named, str] | None:
+        """Return the effect that the recording denies most, and why; None: it denies none."""
+        found = [
+            (denial.share, named, denial.why)
+            for named in self.named
+            if (denial := contradicted(state, predictor, named.kind, self.without(state, named)))
+        ]
+        most = min(found, key=lambda one: one[0], default=None)
+        return None if most is None else most[1:]
+
     def _pruned(self, state: State) -> State:
         """Drop effects that the others make needless, and those that leave what they touch."""
         while True:
@@ -207,6 +218,10 @@ class Search:
             if not mine:
                 return state
             predictor = state.predictor()
+            denied = self.denied(state, predictor)
+            if denied is not None:  # first: it may explain what is another's
+                state = self.drop(state, *denied)
+                continue
             whole = predictor.loglik(state.null.mean)
             worst: tuple[float, Named, str] | None = None
             for named in mine:

@@ -15,6 +15,7 @@ Array = NDArray[np.float64]
 OUTSTANDING = (4, 7, 12)  # standard deviations of a pixel's summed variance
 _BLOCKS = ((1, 1), (1, 2), (2, 1), (2, 2))
 _LEAST_BINS = 8
+_ALTERNATES = 0.1  # bins from half a cycle per pixel: phases of a line drift by less than a tenth
 _ALONE = 2.0  # times as high a bin elsewhere is the peak, whatever a block sums up to
 LAGS = 16  # along a line, pixels of the plane
 
@@ -162,8 +163,8 @@ class SpectrumSums:
         else:
             down, across = np.unravel_index(int(block.argmax()), block.shape)
             y, x = y + down, x + across
-        fx = (x + 1 + _within_bin(inner[y], int(x))) / m
-        fy = (y + 1 + _within_bin(inner[:, x], int(y))) / n
+        fx = _frequency(x + 1 + _within_bin(inner[y], int(x)), m)
+        fy = _frequency(y + 1 + _within_bin(inner[:, x], int(y)), n)
         fy -= float(fy > 1 / 2)
         return Peak(float(fx), float(fy), float(inner[y, x]))
 
@@ -253,6 +254,11 @@ def _within_bin(power: Array, place: int) -> float:
     above = sqrt(max(float(power[place + 1]) - 1, 0.0)) if place + 1 < power.size else 0.0
     side, larger = (1.0, above) if above >= below else (-1.0, below)
     return side * larger / (excess + larger) if excess > 0 else 0.0
+
+
+def _frequency(at: float, size: int) -> float:
+    """Return cycles per pixel; what nearly alternates from pixel to pixel does so exactly."""
+    return 0.5 if abs(at - size / 2) < _ALTERNATES else at / size
 
 
 def split_name(name: str) -> tuple[str, str]:

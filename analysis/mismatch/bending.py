@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.basefit import Offsets
+from analysis.mismatch.layout import Layout, Place
 from analysis.mismatch.model import Model, in_threads
-from analysis.mismatch.observe import Layout, Place
 from dsis.camera import Camera
 from dsis.compiled import kernel
 from dsis.effects.quantisation import Quantisation

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from analysis.mismatch.bank.key import Key
 from analysis.mismatch.basefit import BaseFit
+from analysis.mismatch.layout import Layout, Place
 from analysis.mismatch.null import Null
-from analysis.mismatch.observe import Layout, Observation, Place
+from analysis.mismatch.observe import Observation
 from analysis.mismatch.vector import Vector
 from dsis.camera import Camera
 from dsis.measures.fixed_pattern import Smooth

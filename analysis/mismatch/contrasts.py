@@ -19,7 +19,7 @@ from analysis.mismatch.bank.home import (
 )
 from analysis.mismatch.bank.key import MOSAIC, Key
 from analysis.mismatch.bank.scalars import OF_MEAN_FRAMES
-from analysis.mismatch.observe import Layout
+from analysis.mismatch.layout import Layout
 from analysis.mismatch.scenes import SCENE
 from analysis.mismatch.vector import Vector
 

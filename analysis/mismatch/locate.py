@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 from analysis.mismatch.bank.home import TIME, homes, one_sided
 from analysis.mismatch.bank.key import MOSAIC, Key
 from analysis.mismatch.finding import Mismatch, Where
+from analysis.mismatch.layout import Layout
 from analysis.mismatch.null import Null, adjusted
-from analysis.mismatch.observe import Layout, Observation
+from analysis.mismatch.observe import Observation
 from analysis.mismatch.says import sentence
 from analysis.mismatch.scenes import SCENE
 from analysis.mismatch.vector import Vector

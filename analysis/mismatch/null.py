@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from analysis.mismatch.bank.key import Key
 from analysis.mismatch.contrasts import Contrasts, contrasts
-from analysis.mismatch.observe import Layout
+from analysis.mismatch.layout import Layout
 from analysis.mismatch.vector import Vector
 
 Array = NDArray[np.float64]

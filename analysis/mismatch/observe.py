@@ -14,12 +14,11 @@ from analysis.mismatch.bank.local import local_scalars, variances, widened
 from analysis.mismatch.bank.maps import Parts, PatternSums, Regressors, parts
 from analysis.mismatch.bank.scalars import Number, scalars
 from analysis.mismatch.bank.together import together
-from analysis.mismatch.layout import Layout, Place, Taken
+from analysis.mismatch.layout import Layout, Place
 from analysis.mismatch.scenes import Local
 from dsis.measures import Accumulator, Channel, Measured
 
 Array = NDArray[np.float64]
-__all__ = ["Frames", "Layout", "Level", "Observation", "Place", "Taken", "measure", "observe"]
 
 Frames = Callable[[str], Iterable[NDArray[np.generic]]]
 Watcher = Callable[[str, Measured], None]

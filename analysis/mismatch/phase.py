@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.mismatch.observe import Layout
+from analysis.mismatch.layout import Layout
 
 _ONE_LINE, _CIRCLE = 0.75, 0.45
 _LEAST = 8  # frames, to tell

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
-from analysis.mismatch.observe import Layout
+from analysis.mismatch.layout import Layout
 from dsis.recording import Recording
 
 _SHOWN = 8

@@ -12,7 +12,8 @@ from analysis.mismatch.bank.key import MOSAIC, Key
 from analysis.mismatch.bank.local import LOCAL_NAMES
 from analysis.mismatch.bank.scalars import NAMES, Number
 from analysis.mismatch.basefit import CLIPPED_SHARE, BaseFit, colour
-from analysis.mismatch.observe import Layout, Observation, Place
+from analysis.mismatch.layout import Layout, Place
+from analysis.mismatch.observe import Observation
 from analysis.mismatch.scenes import SCENE
 
 Array = NDArray[np.float64]

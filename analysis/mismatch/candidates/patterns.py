@@ -10,7 +10,7 @@ from analysis.mismatch.bank.maps import WHOLE
 from analysis.mismatch.bank.together import TOGETHER
 from analysis.mismatch.candidates.candidate import Candidate, Proposal, proposals
 from analysis.mismatch.clues import Clues, alike
-from analysis.mismatch.observe import Place
+from analysis.mismatch.layout import Place
 
 Array = NDArray[np.float64]
 _SMOOTH = ("fixed_smooth_variance", "fixed_smooth_tilt", "fixed_smooth_falloff")

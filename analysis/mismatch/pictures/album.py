@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.bank.coherent import SpectrumSums
-from analysis.mismatch.observe import Layout, Place
+from analysis.mismatch.layout import Layout, Place
 from dsis.measures import Channel, Measured
 
 Array = NDArray[np.float64]

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from analysis.mismatch.bank.key import Key
 from analysis.mismatch.evidence import Against, Curve
-from analysis.mismatch.observe import Place, Taken
+from analysis.mismatch.layout import Place, Taken
 from analysis.mismatch.pictures.natural import UNITS, Scale, back, shared
 from analysis.mismatch.state import State
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from analysis.mismatch.bank.coherent import SpectrumSums
 from analysis.mismatch.evidence import Histogram, LineSpectrum, Series, Spectrum
-from analysis.mismatch.observe import Layout, Place
+from analysis.mismatch.layout import Layout, Place
 from analysis.mismatch.pictures.album import Album, wander_dn
 from analysis.mismatch.split import Split
 

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from analysis.mismatch.bank.key import Key
 from analysis.mismatch.bank.maps import ALONE, MAPS
 from analysis.mismatch.evidence import Map, Shown
-from analysis.mismatch.observe import Layout, Observation
+from analysis.mismatch.layout import Layout
+from analysis.mismatch.observe import Observation
 from analysis.mismatch.state import State
 
 Array = NDArray[np.float64]

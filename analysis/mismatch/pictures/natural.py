@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import exp, expm1, isfinite
 
-from analysis.mismatch.observe import Place
+from analysis.mismatch.layout import Place
 from analysis.mismatch.state import State
 from analysis.mismatch.vector import expected_dn2
 from dsis.measures.fixed_pattern import Smooth

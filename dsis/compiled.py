@@ -13,11 +13,11 @@ import shutil
 import sys
 import time
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
-from threading import Lock
+from threading import Lock, local
 from typing import Any, TypeVar, cast
 
 import numba
@@ -144,7 +144,8 @@ def over_rows(work: Callable[[int, int], None], rows: int, threads: int = 1) -> 
     rows
         Number of rows.
     threads
-        Number of threads; 1 calls `work(0, rows)` directly.
+        Number of threads; 1 calls `work(0, rows)` directly. The threads are kept: to start one
+        takes as long as a megapixel.
     """
     if threads <= 1 or rows <= ROWS_PER_BLOCK:
         work(0, rows)
@@ -159,8 +160,27 @@ def over_rows(work: Callable[[int, int], None], rows: int, threads: int = 1) -> 
             for _ in blocks:  # who fails or is interrupted does not wait for every block
                 pass
 
-    with ThreadPoolExecutor(threads - 1) as pool:
-        others = [pool.submit(take) for _ in range(threads - 1)]
+    pool = _kept.pool(threads - 1)
+    others = [pool.submit(take) for _ in range(threads - 1)]
+    try:
         take()
-        for other in others:
-            other.result()
+    finally:
+        wait(others)
+    for other in others:
+        other.result()
+
+
+class _Pools(local):
+    """Threads that each thread keeps for its own calls: none waits for another's, nested or not."""
+
+    def __init__(self) -> None:
+        self._pools: dict[tuple[int, int], ThreadPoolExecutor] = {}
+
+    def pool(self, threads: int) -> ThreadPoolExecutor:
+        key = os.getpid(), threads  # after a fork the parent's threads are not there
+        if key not in self._pools:
+            self._pools[key] = ThreadPoolExecutor(threads)
+        return self._pools[key]
+
+
+_kept = _Pools()

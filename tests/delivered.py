@@ -34,14 +34,6 @@ CAMERA = Camera(
     noise=BaseNoise(segment=(Segment(slope=SLOPE, intercept=INTERCEPT),)),
 )
 
-CINEMA = Optics(
-    f_number=5.6,
-    wavelength_nm=550.0,
-    pitch_um=8.25,
-    low_pass_spot_separation_px=0.75,
-    fill_factor=1.0,
-)
-
 # Gain 1 within 1e-6 at all frequencies: nothing but the sampling.
 NO_OPTICS = Optics(
     f_number=0.01,

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from delivered import CAMERA, CINEMA, COLUMNS, ROWS, Z_MAX, built, codes_of, flat
+from cinema import CINEMA
+from delivered import CAMERA, COLUMNS, ROWS, Z_MAX, built, codes_of, flat
 from dsis.camera import BaseNoise, Camera, Segment, read_camera
 from dsis.cfa import Cfa, pattern
 from dsis.color import Color, DisplayTransform

@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from delivered import CINEMA, COLUMNS, ROWS, built, codes_of
+from cinema import CINEMA
+from delivered import COLUMNS, ROWS, built, codes_of
 from dsis.manifest import read_manifest
 from dsis.optics import transfer
 

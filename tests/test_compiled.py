@@ -65,6 +65,44 @@ def test_who_works_on_is_stopped_by_who_fails(failing: str) -> None:
     assert len(begun) < 50
 
 
+def test_rows_within_rows_and_from_many_threads_wait_for_nobody() -> None:
+    rows, times = 3 * ROWS_PER_BLOCK, np.zeros(9 * ROWS_PER_BLOCK, int)
+
+    def outer(first: int, last: int) -> None:
+        del last
+
+        def inner(start: int, end: int) -> None:
+            times[3 * first + start : 3 * first + end] += 1
+
+        over_rows(inner, rows, 3)
+
+    def call() -> None:
+        over_rows(outer, rows, 2)
+
+    threads = [threading.Thread(target=call, daemon=True) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(60)
+    assert not any(thread.is_alive() for thread in threads)
+    assert (times == 4).all()
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="this system does not fork")
+@pytest.mark.filterwarnings("ignore:.*multi-threaded.*fork:DeprecationWarning")
+def test_threads_are_found_after_a_fork() -> None:
+    def work(first: int, last: int) -> None:
+        del first, last
+
+    over_rows(work, 2 * ROWS_PER_BLOCK, 2)
+    child = os.fork()
+    if child == 0:
+        threading.Timer(30, os._exit, (1,)).start()
+        over_rows(work, 2 * ROWS_PER_BLOCK, 2)
+        os._exit(0)
+    assert os.waitpid(child, 0)[1] == 0
+
+
 def aligned(samples: int) -> np.ndarray:
     """Return zeros that begin where a line of the cache does."""
     space = np.zeros(samples + ALIGNMENT, np.float32)

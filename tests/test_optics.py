@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
+from cinema import CINEMA
 from dsis.errors import InputError
 from dsis.model import structure
 from dsis.optics import (
@@ -19,13 +20,6 @@ from dsis.optics import (
     transfer,
 )
 
-CINEMA = Optics(
-    f_number=5.6,
-    wavelength_nm=550.0,
-    pitch_um=8.25,
-    low_pass_spot_separation_px=0.75,
-    fill_factor=1.0,
-)
 NYQUIST_PER_MM = 1000.0 / (2.0 * 8.25)
 # Of unit amplitudes after a float32 Fourier transform of some 10^4 samples: 10 roundings of 6e-8
 # in the mean, a few times that in the worst pixel.

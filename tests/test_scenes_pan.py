@@ -9,19 +9,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from dsis.optics import Optics, Pan, through_optics
+from cinema import CINEMA
+from dsis.optics import Pan, through_optics
 from dsis.scenes import SCENES, panorama, preset_strip
 from dsis.spec import Sequence
 from dsis.stimuli.source import Slices, Window
 
 Light = NDArray[np.float32]
-CINEMA = Optics(
-    f_number=5.6,
-    wavelength_nm=550.0,
-    pitch_um=8.25,
-    low_pass_spot_separation_px=0.75,
-    fill_factor=1.0,
-)
 ROWS, COLUMNS, TRAVEL = 72, 96, 24
 SCENE = pytest.mark.parametrize("name", SCENES)
 ROUTES_AGREE = 1e-5  # of a white surface: what a float32 Fourier transform of this size rounds

@@ -138,7 +138,7 @@ def test_what_who_asks_calls_off_is_cancelled() -> None:
 
 
 INTERRUPTED = """
-import sys, time
+import signal, sys, time
 from pathlib import Path
 from dsis.workers import completed, workers
 
@@ -147,6 +147,8 @@ def slow(path):
     time.sleep(60)
 
 if __name__ == "__main__":
+    # What a shell starts in the background ignores interrupts, and its children inherit that.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     with workers(2, kind="processes") as pool:
         list(completed(pool, slow, sys.argv[1:]))
 """

@@ -70,12 +70,7 @@ def haar(group: NDArray[np.float32], count: int) -> None:
     """Transform between members: sums and differences of pairs, over sqrt(2), of the sums again."""
     half = count * 4
     while half >= 8:
-        for k in range(8):
-            low, high = group[k, :half], group[k, half : 2 * half]
-            for n in range(half):
-                p, q = low[_U(n)], high[_U(n)]
-                low[_U(n)] = (p + q) * _SQRT_HALF
-                high[_U(n)] = (p - q) * _SQRT_HALF
+        _pairs(group, half)
         half //= 2
 
 
@@ -84,13 +79,19 @@ def haar_back(group: NDArray[np.float32], count: int) -> None:
     """Undo `haar`."""
     half = 8
     while half <= count * 4:
-        for k in range(8):
-            low, high = group[k, :half], group[k, half : 2 * half]
-            for n in range(half):
-                p, q = low[_U(n)], high[_U(n)]
-                low[_U(n)] = (p + q) * _SQRT_HALF
-                high[_U(n)] = (p - q) * _SQRT_HALF
+        _pairs(group, half)
         half *= 2
+
+
+@inlined
+def _pairs(group: NDArray[np.float32], half: int) -> None:
+    """Replace the first half of what is left by its sums with the second, that by differences."""
+    for k in range(8):
+        low, high = group[k, :half], group[k, half : 2 * half]
+        for n in range(half):
+            p, q = low[_U(n)], high[_U(n)]
+            low[_U(n)] = (p + q) * _SQRT_HALF
+            high[_U(n)] = (p - q) * _SQRT_HALF
 
 
 @inlined

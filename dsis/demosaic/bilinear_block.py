@@ -5,6 +5,7 @@ takes half as long again. The instructions are LLVM's own and suit any processor
 vectors of this length gets several shorter ones.
 """
 
+from collections.abc import Callable
 from typing import Any
 
 from llvmlite import ir
@@ -18,52 +19,36 @@ _FLOAT, _INT = ir.FloatType(), ir.IntType(32)
 _VECTOR = ir.VectorType(_FLOAT, PIXELS)
 
 
-@emitted
-def store(
-    b: ir.IRBuilder,
-    above: ir.Value,
-    here: ir.Value,
-    below: ir.Value,
-    x: ir.Value,
-    line: ir.Value,
-    blue: ir.Value,
-    odd: ir.Value,
-) -> None:
-    """Write pixels x..x+15 of a row, 1 <= x <= columns - 17, to its line of the result.
+def _block(*, past_the_cache: bool) -> Callable[..., None]:
+    """Return what writes pixels x..x+15 of a row, 1 <= x <= columns - 17, to its line of a result.
 
-    Parameters
-    ----------
-    above, here, below
-        Rows of the mosaic.
-    x
-        Unsigned.
-    line
-        Row of the result, flat.
-    blue
-        Whether the row's own colour is blue.
-    odd
-        Whether x is a green site.
+    Its arguments: `above`, `here` and `below`, rows of the mosaic; `x`, unsigned; `line`, a row of
+    the result, flat; `blue`, whether the row's own colour is blue; `odd`, whether x is a green
+    site.
     """
-    _write(b, _pixels(b, above, here, below, x, blue, odd), line, x)
+
+    def emit(
+        b: ir.IRBuilder,
+        above: ir.Value,
+        here: ir.Value,
+        below: ir.Value,
+        x: ir.Value,
+        line: ir.Value,
+        blue: ir.Value,
+        odd: ir.Value,
+    ) -> None:
+        if past_the_cache:
+            _fetch(b, _at(b, below, x, _AHEAD))
+        colours = _pixels(b, above, here, below, x, blue, odd)
+        _write(b, colours, line, x, past_the_cache=past_the_cache)
+
+    return emitted(emit)
 
 
-@emitted
-def stream(
-    b: ir.IRBuilder,
-    above: ir.Value,
-    here: ir.Value,
-    below: ir.Value,
-    x: ir.Value,
-    line: ir.Value,
-    blue: ir.Value,
-    odd: ir.Value,
-) -> None:
-    """Do as `store`, past the cache: pixel x of the line must be aligned to `ALIGNMENT`.
-
-    An ordinary store reads the line of the cache that it changes: 28 bytes a pixel, not 16.
-    """
-    _fetch(b, _at(b, below, x, _AHEAD))
-    _write(b, _pixels(b, above, here, below, x, blue, odd), line, x, past_the_cache=True)
+store = _block(past_the_cache=False)
+# An ordinary store reads the line of the cache that it changes: 28 bytes a pixel, not 16. Pixel x
+# of the line must be aligned to `ALIGNMENT`.
+stream = _block(past_the_cache=True)
 
 
 @emitted
@@ -105,7 +90,7 @@ def _write(
     line: ir.Value,
     x: ir.Value,
     *,
-    past_the_cache: bool = False,
+    past_the_cache: bool,
 ) -> None:
     """Write red, green and blue in turn, 48 samples from 3 x on."""
     red, green, blue = colours

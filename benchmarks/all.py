@@ -11,7 +11,7 @@ import demosaicking
 import noise
 import pipeline
 import scaling
-from timing import machine, show, write_csv
+from timing import Row, machine, show, write_csv
 
 ALL = {"demosaicking": demosaicking, "noise": noise, "pipeline": pipeline, "scaling": scaling}
 
@@ -27,8 +27,11 @@ def main() -> None:
     if unknown:
         parser.error(f"{', '.join(sorted(unknown))}: must be of {', '.join(ALL)}")
     print("; ".join(f"{key} {value}" for key, value in machine().items()))
-    rows = [row for name in options.names or ALL for row in show(ALL[name].rows())]
-    write_csv(rows, options.csv)
+    rows: list[Row] = []
+    for name in options.names or ALL:
+        for row in ALL[name].rows():
+            rows += show([row])
+            write_csv(rows, options.csv)  # at once: a run that is ended keeps what it measured
     print(f"table in {options.csv}")
 
 

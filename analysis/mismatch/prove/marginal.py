@@ -8,7 +8,15 @@ from analysis.mismatch.prove.held import Held
 from analysis.mismatch.prove.law import Array, Law
 from analysis.mismatch.prove.populations import CONSPICUOUS, GROUPS, OUTLIER
 from analysis.mismatch.prove.residuals import Residuals
-from analysis.mismatch.prove.shape import EDGES, NORMAL, Shape, counted, shape_of
+from analysis.mismatch.prove.shape import (
+    EDGES,
+    NORMAL,
+    Shape,
+    counted,
+    interval_of,
+    moved,
+    shape_of,
+)
 from analysis.mismatch.prove.sites import site_places
 from analysis.mismatch.prove.sure import sure
 from dsis.effects import Image
@@ -103,18 +111,27 @@ def with_groups(own: Residuals, base: Residuals, held: Held) -> Law:
 
 def with_shapes(own: Residuals, base: Residuals, held: Held) -> Law:
     """Return the law with the shapes of standardised residuals."""
-    many, odd = own.sensed.groups < CONSPICUOUS, np.zeros(EDGES.size - 1)
-    many_base, odd_base = base.sensed.groups < CONSPICUOUS, np.zeros(EDGES.size - 1)
+    many, many_base = (virtual.sensed.groups < CONSPICUOUS for virtual in (own, base))
+    both = many & many_base
+    odd, odd_base = np.zeros(EDGES.size - 1), np.zeros(EDGES.size - 1)
     laws = dict(own.law.exposures)
     for e in held.exposures:
-        u, v = own.standardised(e.name, held), base.standardised(e.name, held)
+        u, v = (
+            interval_of(virtual.standardised(e.name, held)).reshape(-1, *held.shape)
+            for virtual in (own, base)
+        )
         shapes = []
         for place in site_places(held.cfa):
-            counts = counted(u[:, *place][:, many[place]])
-            shapes.append(shape_of(counts, counted(v[:, *place][:, many_base[place]])))
+            one, other = u[:, *place], v[:, *place]
+            counts = counted(one[:, many[place]].reshape(-1))
+            base_counts = counted(other[:, many_base[place]].reshape(-1))
+            shared = both[place]
+            exchanged = moved(one[:, shared].reshape(-1), other[:, shared].reshape(-1))
+            shapes.append(shape_of(counts, base_counts, exchanged))
         laws[e.name] = replace(laws[e.name], shapes=tuple(shapes))
         if not many.all():
-            odd += counted(u[:, ~many])
-            odd_base += counted(v[:, ~many_base])
-    shape: Shape = shape_of(odd, odd_base) if odd.sum() >= _LEAST_SCORES else NORMAL
+            odd += counted(u[:, ~many].reshape(-1))
+            odd_base += counted(v[:, ~many_base].reshape(-1))
+    few = odd.sum() < _LEAST_SCORES
+    shape: Shape = NORMAL if few else shape_of(odd, odd_base, odd + odd_base)
     return replace(own.law, exposures=laws, pixels=replace(own.law.pixels, shape=shape))

@@ -10,7 +10,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr
+from scipy.special import ndtr, pdtr, pdtrc
 
 from dsis.compiled import kernel
 
@@ -18,7 +18,9 @@ Array = NDArray[np.float64]
 _OUTER = np.array([4.5, 5.0, 6.0, 8.0, 12.0, 20.0, 40.0, 80.0, 200.0])
 EDGES: Array = np.concatenate([-_OUTER[::-1], np.arange(-16, 17) / 4, _OUTER])
 _NORMAL: Array = np.diff(ndtr(EDGES))
-_LEAST = 1e-3  # of the normal mass: an interval that was never met
+_MANY = 10.0  # residuals expected in an interval, from which their number is nearly normal
+_SURE = 2.5  # standard errors of chi-squared below which departures count as none
+_CHANCE = 0.01  # probability of as many, or as few, below which an interval differs
 _REACH, _PER_UNIT = 200, 64  # of the table of the distribution function
 
 
@@ -62,29 +64,62 @@ class Shape:
 NORMAL = Shape(_NORMAL / _NORMAL.sum(), normal=True)
 
 
-def counted(residuals: NDArray[np.floating]) -> Array:
-    """Return how many standardised residuals lie in each interval; the last takes all beyond."""
+def interval_of(residuals: NDArray[np.floating]) -> NDArray[np.intp]:
+    """Return the interval of each standardised residual; the last ones take all beyond."""
     flat = residuals.reshape(-1)
-    near = np.bincount(  # the many, in intervals of 1 / 4
-        np.floor(np.clip(flat, -4.25, 4.0) * 4).astype(np.intp) + 17, minlength=34
-    )
-    far = flat[np.abs(flat) >= 4]
-    found, _ = np.histogram(np.clip(far, -199.0, 199.0), EDGES)
-    found[_OUTER.size : -_OUTER.size] = near[1:33]
-    return found.astype(np.float64)
+    # The many lie in intervals of 1 / 4.
+    near = np.floor(np.clip(flat, -4.25, 4.0) * 4)
+    found: NDArray[np.intp] = near.astype(np.intp) + (_OUTER.size + 16)
+    far = np.flatnonzero(np.abs(flat) >= 4)
+    found[far] = np.searchsorted(EDGES, np.clip(flat[far], -199.0, 199.0), side="right") - 1
+    return found
 
 
-def shape_of(counts: Array, base_counts: Array) -> Shape:
+def counted(intervals: NDArray[np.intp]) -> Array:
+    """Return how many residuals lie in each interval."""
+    return np.bincount(intervals, minlength=EDGES.size - 1).astype(np.float64)
+
+
+def moved(own: NDArray[np.intp], base: NDArray[np.intp]) -> Array:
+    """Return how many residuals came to each interval or left it, of the same draws."""
+    other = own != base
+    return counted(own[other]) + counted(base[other])
+
+
+def shape_of(counts: Array, base_counts: Array, exchanged: Array) -> Shape:
     """Return the law whose residuals were counted, beside normal ones of the same draws.
 
-    The chance departures of the base model's counts from the normal law are taken off.
+    The chance departures of the base model's counts from the normal law are taken off. What then
+    departs from it is believed as far as it exceeds chance: of intervals where many are expected
+    all together (James and Stein, 1961), of the others each that chance alone would hardly fill, or
+    empty, so.
+
+    Parameters
+    ----------
+    counts, base_counts
+        Of the model and of its base model, by interval.
+    exchanged
+        How many came or left, by interval: the variance of the difference.
     """
-    total = counts.sum()
-    if not total:
+    total = base_counts.sum()
+    if not counts.sum() or not total:
         return NORMAL
-    mass = (counts - base_counts + base_counts.sum() * NORMAL.mass) / total
-    mass = np.maximum(mass, np.maximum(_LEAST * NORMAL.mass, 1e-12))
+    expected = total * NORMAL.mass
+    difference = counts * (total / counts.sum()) - base_counts
+    many = expected >= _MANY
+    chi2 = float((difference[many] ** 2 / np.maximum(exchanged[many], 1)).sum())
+    chance = many.sum() + _SURE * np.sqrt(2 * many.sum())
+    believed = max(1 - chance / chi2, 0.0) if chi2 else 0.0
+    shrunk = expected + believed * difference
+    mass = np.maximum(np.where(many, shrunk, _sparse(expected, difference)) / total, 1e-12)
     return Shape(mass / mass.sum(), normal=False)
+
+
+def _sparse(expected: Array, difference: Array) -> Array:
+    """Return how many to expect where few are: none met is no proof that there are none."""
+    met = np.rint(np.maximum(expected + difference, 0))
+    crowded = (met > 0) & (pdtrc(np.maximum(met - 1, 0), expected) < _CHANCE)
+    return np.where(crowded, met, np.where(pdtr(met, expected) < _CHANCE, met + 1, expected))
 
 
 @kernel

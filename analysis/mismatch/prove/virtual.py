@@ -19,7 +19,7 @@ from dsis.simulate.shot import tiled
 
 Array = NDArray[np.float64]
 Signals = Mapping[str, NDArray[np.float64]]
-_SAMPLES = 100_000  # of an exposure, in frames that nothing was learned from
+_SAMPLES = 400_000  # of an exposure, in frames that nothing was learned from
 
 
 class Analogue(Camera):
@@ -86,7 +86,7 @@ def virtual_sensor(camera: Camera, held: Held, signals: Signals, seed: int) -> d
     """Return the frames of a virtual sensor, by exposure."""
     analogue = Analogue.model_construct(**{n: getattr(camera, n) for n in Camera.model_fields})
     sensor = sensor_draw(seed)
-    fresh = int(np.clip(round(_SAMPLES / held.grid.rows / held.grid.columns), 4, 8))
+    fresh = int(np.clip(round(_SAMPLES / held.grid.rows / held.grid.columns), 4, 32))
     stacks = {}
     for exposure in held.exposures:
         clean = clean_signal(held, exposure, signals)

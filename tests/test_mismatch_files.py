@@ -232,7 +232,10 @@ def test_bad_input_is_refused_before_the_search(
     text = model.read_text(encoding="utf-8").replace("MONO", "RGGB").replace("4095", "1023")
     other.write_text(text.replace("bit_depth = 12", "bit_depth = 10"), encoding="utf-8")
     good = [str(model), str(recording), "-o"]
+    shots = [dark("dark", frames=8, exposure_time_s=0.01)]
+    line = simulate(CAMERA, shots, 3, 64, tmp_path / "line").folder
     cases = {
+        "64 x 3 pixels, must have 4 x 4": [str(model), str(line), "-o", str(out)],
         "did you mean row_noise": [*good, str(out), "--without", "row_nose", "dsnu"],
         "holds no mismatch.json": [*good, str(ours)],
         "sensor.white_level": [str(other), str(recording), "-o", str(out)],

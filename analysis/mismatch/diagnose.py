@@ -31,6 +31,7 @@ from analysis.mismatch.state import Setting, State
 from analysis.mismatch.taking import layout_of
 from analysis.mismatch.thinned import thinned
 from analysis.mismatch.trial import Trial
+from analysis.mismatch.wholecells import whole_cells
 from dsis.camera import Camera
 from dsis.recording import Recording
 
@@ -58,6 +59,7 @@ def find_mismatch(
         if progress is not None:
             progress(done, done + 1, what)
 
+    recording = whole_cells(recording)
     split = Split.of(recording)
     development = split.development
     source = Source(recording)

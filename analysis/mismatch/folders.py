@@ -11,12 +11,14 @@ from analysis.mismatch.diagnose import VOCABULARY, find_mismatch
 from analysis.mismatch.files import MARK, fill, finding_folder
 from analysis.mismatch.finding import Finding
 from dsis.camera import Camera, read_camera
+from dsis.cfa import Cfa
 from dsis.errors import Fault, InputError
 from dsis.recording import Recording, read_recording
 from dsis.simulate.maps import MAPS, SensorMaps, owner_of, read_maps
 from dsis.workers import completed, workers
 
 Progress = Callable[[int, int, str], None]
+_LEAST_LINES = 4  # of each colour: surfaces of third degree fit fewer exactly
 
 
 @dataclass(frozen=True)
@@ -161,11 +163,21 @@ def _read(
             faults += error.faults
             continue
         opened.append(recording)
+        faults += _too_small(recording, path)
         if camera is not None:
             faults += _other_camera(camera, camera_file, recording, path)
     if camera is None or faults:
         raise InputError(faults)
     return camera, opened
+
+
+def _too_small(recording: Recording, path: Path) -> list[Fault]:
+    """Return what says that a channel has too few lines to tell patterns from smooth surfaces."""
+    least = _LEAST_LINES * (1 if recording.sensor.cfa is Cfa.MONO else 2)
+    if min(recording.rows, recording.columns) >= least:
+        return []
+    fact = f"are of {recording.columns} x {recording.rows} pixels, must have {least} x {least}"
+    return [Fault(str(path), "frames", f"{fact} or more ({recording.sensor.cfa.value})")]
 
 
 def _other_camera(

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 
 from analysis.mismatch.layout import Layout
+from analysis.mismatch.wholecells import Cropped
 from dsis.recording import Recording
 
 _SHOWN = 8
@@ -16,6 +17,12 @@ def remarks_on(
     used |= {*layout.scenes, *layout.moving}
     unfit = [e.name for e in recording.exposures if e.name in development and e.name not in used]
     found = []
+    if isinstance(recording, Cropped):
+        size = f"{recording.stored.columns} x {recording.stored.rows}"
+        found.append(
+            f"Frames of {size} pixels are looked at without their odd last row or column: "
+            "colours stand on one grid then."
+        )
     if unfit:
         found.append(
             "Exposures left out, clipped at the white level, of a single frame or of copies: "

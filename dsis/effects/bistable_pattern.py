@@ -1,9 +1,11 @@
 """Bistable pattern: a fixed pattern whose sign flips from frame to frame."""
 
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, field_validator
 
 from dsis.cfa import Cfa
@@ -63,13 +65,9 @@ class BistablePattern(Effect):
 
     def apply(self, image: Image, exposure: Exposure) -> Image:
         """Add the pattern with the frame's sign."""
-        grid, (u, w) = exposure.grid, self.frequency
         draw = exposure.temporal.uniform("bistable_pattern", _POINT, exposure.frame)[0, 0]
         sign = np.float32(1 if draw < 0.5 else -1)
-        turns = u * grid.column_numbers() + w * grid.row_numbers()
-        return image + sign * np.float32(self.amplitude_dn) * np.cos(2 * np.pi * turns).astype(
-            np.float32
-        )
+        return image + sign * np.float32(self.amplitude_dn) * _cosine(exposure.grid, self.frequency)
 
     def contributions(self, point: OperatingPoint) -> Mapping[str, float]:
         """Return the pattern's variance, split between pixels and means of lines and frame."""
@@ -82,3 +80,13 @@ class BistablePattern(Effect):
             float((pattern.mean(0) ** 2).mean()),
             float(pattern.mean() ** 2),
         )
+
+
+@lru_cache(maxsize=4)
+def _cosine(grid: PixelGrid, frequency: tuple[float, float]) -> NDArray[np.float32]:
+    """Return cos(2 pi (u x + w y)): the same in all frames, and most of the effect's time."""
+    u, w = frequency
+    turns = u * grid.column_numbers() + w * grid.row_numbers()
+    pattern: NDArray[np.float32] = np.cos(2 * np.pi * turns).astype(np.float32)
+    pattern.flags.writeable = False
+    return pattern

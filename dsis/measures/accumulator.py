@@ -134,7 +134,10 @@ class Accumulator:
         if self.frames % 2:
             self.pair_squares.append(found.squares)
         for sheet in self.sheets:
-            sheet.add(self.difference, means, self.threads)
+            if self.frames:
+                sheet.add(self.difference, means, self.threads)
+            else:
+                sheet.start()
         if self.frames:
             self._take_noise(row_offset, column_offset)
 

@@ -106,7 +106,8 @@ def _noise(sums: Accumulator, sheet: Sheets) -> list[_Noise]:
         )
         for k, plane in enumerate(sheet.planes)
     ]
-    transform = scipy.fft.rfft2(changes, workers=sums.threads, overwrite_x=True)
+    # As exact as the transforms of the frames, from whose power its own is taken off.
+    transform = scipy.fft.rfft2(changes.astype(np.float32), workers=sums.threads, overwrite_x=True)
     noise = []
     for k, plane in enumerate(sheet.planes):
         variance, neighbour, scatter = pixel_moments(
@@ -138,8 +139,11 @@ def _noise(sums: Accumulator, sheet: Sheets) -> list[_Noise]:
 
 def _temporal_correlations(sums: Accumulator, noise: list[_Noise]) -> list[Autocorrelation]:
     """Return the correlations of the residual: sums of u u' less those of its mean over time."""
-    mean = (sums.moments[0] / sums.frames).astype(np.float32)
-    left = lag_products(mean, sums.reach, sums.threads)
+    if sums.frames == 2:  # the first is zero: the mean is half the second, products are quarters
+        left = sums.lag_sums / 4
+    else:
+        mean = (sums.moments[0] / sums.frames).astype(np.float32)
+        left = lag_products(mean, sums.reach, sums.threads)
     table = LagTable.of(sums.reach, sums.lag_sums - sums.frames * left, sums.shape)
     variances = np.empty((2, 2))
     for one in noise:

@@ -1,14 +1,14 @@
 """Each pixel's moments over time from its sums over frames, and how the pixels scatter.
 
-Two passes over the pixels, the same work about zero and then about the means it found. Nothing of
-the size of a frame is kept but the two maps that are asked for.
+Two passes over the pixels: sums of powers about zero, then of products about the means found.
+Nothing of the size of a frame is kept but the two maps that are asked for.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
-from dsis.compiled import ROWS_PER_BLOCK, kernel, over_rows
+from dsis.compiled import ROWS_PER_BLOCK, inlined, kernel, over_rows
 from dsis.measures.kernels import FiveSums, Frame, Sums
 
 _BLOCK = ROWS_PER_BLOCK
@@ -81,26 +81,64 @@ def pixel_moments(
     variance, neighbour = np.empty(shape), np.empty(shape)
     by_block = np.empty((-(-n // _BLOCK), _FIRST + _SECOND))
 
-    def summed(centre: tuple[float, ...]) -> Sums:
+    def summed(centre: tuple[float, ...], *, about_zero: bool = False) -> Sums:
         numbers = np.array([t, kept, *centre])
 
         def block(start: int, stop: int) -> None:
-            lines = np.empty((4 + _FIRST + _SECOND, m))
+            lines = np.empty((10 + _FIRST + _SECOND, m))
             _add_powers(
-                *sums, last, *place, numbers, variance, neighbour, start, stop, lines, by_block
-            )
+                *sums, last, *place, numbers, about_zero, variance, neighbour, start, stop, lines,
+                by_block,
+            )  # fmt: skip
 
         over_rows(block, n, threads)
         whole: Sums = by_block.sum(0) / size
         return whole
 
-    square, cube, fourth, pairs, of_squares = summed((0.0,) * 7)[: _FIRST + 1].tolist()
+    powers = summed((0.0,) * 7, about_zero=True)[: _FIRST + 1]
+    square, cube, fourth, pairs, of_squares = powers.tolist()
     a = t**2 * (t + 1) / ((t - 1) * (t - 2) * (t - 3)) if t > 3 else 0.0
     b = 3 * (t - 1) / (t + 1)
     k4 = a * (fourth - b * of_squares)
     p = summed((square, cube, fourth, pairs, a, b, k4))[_FIRST:].tolist()
     some = of_squares > 0
     return variance, neighbour, Scatter(some, square, cube, fourth, pairs, k4, *p)
+
+
+@inlined
+def _sum_powers(square: Sums, cube: Sums, fourth: Sums, pairs: Sums, total: Sums) -> None:
+    """Add the powers of a row, and squares squared, to sums by column."""
+    for x in range(square.size):
+        total[0, x] += square[x]
+        total[1, x] += cube[x]
+        total[2, x] += fourth[x]
+        total[3, x] += pairs[x]
+        total[4, x] += square[x] * square[x]
+
+
+@inlined
+def _sum_products(
+    square: Sums, cube: Sums, fourth: Sums, pairs: Sums, numbers: Sums, total: Sums
+) -> None:
+    """Add products of the powers of a row about their means to sums by column."""
+    mean2, mean3, mean4, mean11 = numbers[2], numbers[3], numbers[4], numbers[5]
+    a, b, k4 = numbers[6], numbers[7], numbers[8]
+    for x in range(square.size):
+        d, e = square[x] - mean2, cube[x] - mean3
+        dd = d * d
+        total[4, x] += dd
+        total[5, x] += dd * d
+        total[6, x] += dd * dd
+        total[7, x] += e * e
+        total[8, x] += e * d
+    for x in range(square.size):
+        d, e, f = square[x] - mean2, fourth[x] - mean4, pairs[x] - mean11
+        k = a * (fourth[x] - b * (square[x] * square[x])) - k4
+        total[9, x] += e * e
+        total[10, x] += e * d
+        total[11, x] += f * f
+        total[12, x] += f * d
+        total[13, x] += k * k
 
 
 @kernel
@@ -115,6 +153,7 @@ def _add_powers(
     x0: int,
     step: int,
     numbers: Sums,
+    about_zero: bool,
     variance: Sums,
     neighbour: Sums,
     first: int,
@@ -122,14 +161,16 @@ def _add_powers(
     lines: Sums,
     out: Sums,
 ) -> None:
-    """Write the maps, and sums over blocks of rows (block, _FIRST + _SECOND), to `out`.
+    """Write sums over blocks of rows (block, _FIRST + _SECOND) to `out`, about zero also the maps.
 
+    About zero these are the sums of powers and of squares squared, else those of products of two.
     `numbers`: frames, kept, means of square, cube, fourth and product, a, b, mean of k4. `lines`
-    (4 + _FIRST + _SECOND, column) are what a row and its sums by column are kept in.
+    (10 + _FIRST + _SECOND, column) are what a row, its powers and its sums by column are kept in:
+    loops over them alone are vector instructions, whatever the step.
     """
-    frames, kept, a, b, k4 = numbers[0], numbers[1], numbers[6], numbers[7], numbers[8]
-    mean2, mean3, mean4, mean11 = numbers[2], numbers[3], numbers[4], numbers[5]
-    square, cube, fourth, pairs, total = lines[0], lines[1], lines[2], lines[3], lines[4:]
+    frames, kept = numbers[0], numbers[1]
+    square, cube, fourth, pairs, total = lines[0], lines[1], lines[2], lines[3], lines[10:]
+    r1, r2, r3, r4, r11, r_end = lines[4], lines[5], lines[6], lines[7], lines[8], lines[9]
     m = variance.shape[1]
     for y in range(first, last):
         line = y0 + y * step
@@ -137,37 +178,24 @@ def _add_powers(
             total[:] = 0
         for x in range(m):
             i = x0 + x * step
-            m1, m2, m3 = s1[line, i] / frames, s2[line, i] / frames, s3[line, i] / frames
+            r1[x], r2[x], r3[x] = s1[line, i], s2[line, i], s3[line, i]
+            r4[x], r11[x], r_end[x] = s4[line, i], s11[line, i], end[line, i]
+        for x in range(m):
+            m1, m2, m3, m4 = r1[x] / frames, r2[x] / frames, r3[x] / frames, r4[x] / frames
             of_mean = m1 * m1
             square[x] = m2 - of_mean
             cube[x] = m3 - 3 * m1 * m2 + 2 * (of_mean * m1)
-            m4 = s4[line, i] / frames
             fourth[x] = m4 - 4 * m1 * m3 + 6 * of_mean * m2 - 3 * (of_mean * of_mean)
-            ends = 2 * frames * m1 - end[line, i]
-            product = frames * (s11[line, i] / frames) - m1 * ends + (frames - 1) * of_mean
+            ends = 2 * frames * m1 - r_end[x]
+            product = frames * (r11[x] / frames) - m1 * ends + (frames - 1) * of_mean
             pairs[x] = product / (frames - 1)
-        for x in range(m):
-            variance[y, x] = square[x] / kept
-            neighbour[y, x] = pairs[x]
-            d, e = square[x] - mean2, cube[x] - mean3
-            dd = d * d
-            total[0, x] += d
-            total[1, x] += e
-            total[4, x] += dd
-            total[5, x] += dd * d
-            total[6, x] += dd * dd
-            total[7, x] += e * e
-            total[8, x] += e * d
-        for x in range(m):
-            d, e, f = square[x] - mean2, fourth[x] - mean4, pairs[x] - mean11
-            k = a * (fourth[x] - b * (square[x] * square[x])) - k4
-            total[2, x] += e
-            total[3, x] += f
-            total[9, x] += e * e
-            total[10, x] += e * d
-            total[11, x] += f * f
-            total[12, x] += f * d
-            total[13, x] += k * k
+        if about_zero:
+            for x in range(m):
+                variance[y, x] = square[x] / kept
+                neighbour[y, x] = pairs[x]
+            _sum_powers(square, cube, fourth, pairs, total)
+        else:
+            _sum_products(square, cube, fourth, pairs, numbers, total)
         if (y + 1) % _BLOCK == 0 or y + 1 == last:
             for part in range(total.shape[0]):
                 whole = 0.0

@@ -101,8 +101,13 @@ class Sheets:
         columns = np.array([column_sums[:, y, x::2] for y, x in starts])
         return rows / m, columns / n
 
+    def start(self) -> None:
+        """Take the first frame: it differs from itself by nothing."""
+        size = self.planes[0].smooth.degree + 1
+        self.surfaces.append(np.zeros((len(self.planes), size, size)))
+
     def add(self, difference: Frame, means: Sums, threads: int) -> None:
-        """Take a frame, less the mean of each phase (2, 2)."""
+        """Take a further frame, less the mean of each phase (2, 2)."""
         kernels.split(difference, self.places, means, self.images)
         kernels.add_power(scipy.fft.rfft2(self.images, workers=threads), self.power)
         self.surfaces.append(self.planes[0].smooth.coefficients(self.images))

@@ -97,7 +97,9 @@ class PatternSums:
         """Take the mean frame of an exposure and the variance of a pixel over time."""
         row, weight = self.regressors.rows[exposure], self.regressors.weights[exposure]
         flat = mean_frame - mean_frame.mean()
-        self.moments += weight * row[:, None, None] * flat
+        for i, share in enumerate(weight * row):
+            if share:  # darks have no gain
+                self.moments[i] += share * flat
         self.gram += weight * np.outer(row, row)
         self.noise += weight**2 * np.outer(row, row) * variance_dn2 / frames
 

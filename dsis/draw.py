@@ -10,6 +10,7 @@ same bytes wherever IEEE 754 holds. The largest deviate is 6.7.
 
 import hashlib
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -25,6 +26,7 @@ _LOW, _HALF = np.uint64(0xFFFFFFFF), np.uint64(32)
 _ONE, _TWO, _THREE, _THIRTY = np.uint64(1), np.uint64(2), np.uint64(3), np.uint64(30)
 _EIGHTH_TURN = np.uint64(1 << 29)
 _TURN_TO_RADIANS = np.float32(2 * np.pi / 2**32)
+_MOST_KEPT = 1 << 22  # deviates of a field that is kept
 _NINE, _UNIT_23 = np.uint64(9), np.float32(2.0**-23)
 _F, _I = np.float32, np.int32
 _SQRT_HALF_BITS = np.int32(0x3F3504F3)
@@ -182,6 +184,15 @@ class Draw:
         """Return independent standard normal deviates on `grid`: float32, `grid.shape`."""
         return self._field(purpose, grid, frame, threads, normal=True)
 
+    def fixed(self, purpose: str, grid: PixelGrid, threads: int = 1) -> NDArray[np.float32]:
+        """Return `normal(purpose, grid)`, read-only: what every frame of a sensor asks for is kept.
+
+        Fields of more than 4 million deviates are made anew.
+        """
+        if grid.rows * grid.columns > _MOST_KEPT:
+            return self.normal(purpose, grid, threads=threads)
+        return _kept(self, purpose, grid)
+
     def uniform(
         self, purpose: str, grid: PixelGrid, frame: int = 0, threads: int = 1
     ) -> NDArray[np.float32]:
@@ -242,3 +253,10 @@ class Draw:
             hashlib.blake2b(name, digest_size=8).digest(), "<u4"
         )
         return words.astype(np.uint64)
+
+
+@lru_cache(maxsize=8)
+def _kept(draw: Draw, purpose: str, grid: PixelGrid) -> NDArray[np.float32]:
+    field = draw.normal(purpose, grid)
+    field.flags.writeable = False
+    return field

@@ -29,7 +29,7 @@ class Dsnu(Effect):
 
     def apply(self, image: Image, exposure: Exposure) -> Image:
         """Add the offset of each pixel."""
-        offsets = exposure.sensor.normal("dsnu", exposure.grid, threads=exposure.threads)
+        offsets = exposure.sensor.fixed("dsnu", exposure.grid, threads=exposure.threads)
         return image + np.float32(self.sigma_dn) * offsets
 
     def contributions(self, point: OperatingPoint) -> Mapping[str, float]:

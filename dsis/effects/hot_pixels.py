@@ -46,7 +46,7 @@ class HotPixels(Effect):
         """Add the dark charge of the hot pixels."""
         if not self.pixel_fraction:
             return image
-        deviates = exposure.sensor.normal("hot_pixels", exposure.grid, threads=exposure.threads)
+        deviates = exposure.sensor.fixed("hot_pixels", exposure.grid, threads=exposure.threads)
         hot = deviates < ndtri(self.pixel_fraction)
         # Below the threshold the normal law's tail is uniform: it gives the height as well.
         tail = ndtr(deviates[hot].astype(np.float64)) / self.pixel_fraction

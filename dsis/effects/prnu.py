@@ -26,7 +26,7 @@ class Prnu(Effect):
 
     def apply(self, image: Image, exposure: Exposure) -> Image:
         """Multiply each pixel by its gain."""
-        gains = exposure.sensor.normal("prnu", exposure.grid, threads=exposure.threads)
+        gains = exposure.sensor.fixed("prnu", exposure.grid, threads=exposure.threads)
         return image * (np.float32(1) + np.float32(self.sigma_percent / 100) * gains)
 
     def contributions(self, point: OperatingPoint) -> Mapping[str, float]:

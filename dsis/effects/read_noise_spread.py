@@ -40,7 +40,7 @@ class ReadNoiseSpread(Effect):
 
     def reshape(self, deviates: Image, exposure: Exposure) -> Image:
         """Return the deviates times each pixel's own level."""
-        own = exposure.sensor.normal("read_noise_spread", exposure.grid)
+        own = exposure.sensor.fixed("read_noise_spread", exposure.grid)
         s = np.float32(self.log_sigma)
         scaled: Image = deviates * np.exp(s * own - s * s)
         return scaled

@@ -50,7 +50,7 @@ class Rts(Effect):
         """Add the state of each trap."""
         if not self.pixel_fraction:
             return image
-        deviates = exposure.sensor.normal("rts", exposure.grid, threads=exposure.threads)
+        deviates = exposure.sensor.fixed("rts", exposure.grid, threads=exposure.threads)
         places = np.nonzero(deviates < ndtri(self.pixel_fraction))
         # Below the threshold the normal law's tail is uniform: it gives the height as well.
         tail = ndtr(deviates[places].astype(np.float64)) / self.pixel_fraction

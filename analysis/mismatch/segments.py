@@ -1,6 +1,6 @@
 """A second read-out path that the camera model does not have: dual gain."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import sqrt
 
@@ -26,9 +26,12 @@ class Path:
 
 
 def second_path(state: State) -> Path | None:
-    """Return the second segment that explains the variances best; None where levels are too few."""
-    setting, calibrated = state.setting, state.calibrated
-    layout, seen = setting.layout, setting.seen
+    """Return the second segment that explains the variances best; None where levels are too few.
+
+    Its switch lies anywhere in a gap between levels, and in other gaps as likely as those explain
+    the variances: its error is the root mean square distance.
+    """
+    calibrated, layout = state.calibrated, state.setting.layout
     if len(calibrated.switches) > 0:
         return None
     means = sorted(
@@ -37,41 +40,44 @@ def second_path(state: State) -> Path | None:
             for e in layout.uniform
         }
     )
+    paths = [
+        path for low, high in pairwise(means[1:-1]) if (path := _path(state, low, high)) is not None
+    ]
+    if not paths:
+        return None
+    best = max(paths, key=lambda path: path.gain)
+    chances = np.exp([path.gain - best.gain for path in paths])
+    squares = [path.error_dn**2 + (path.switch_dn - best.switch_dn) ** 2 for path in paths]
+    return replace(best, error_dn=sqrt(float(np.average(squares, weights=chances))))
+
+
+def _path(state: State, low: float, high: float) -> Path | None:
+    """Return the second segment that begins between two levels; None: no camera has it."""
+    setting, calibrated = state.setting, state.calibrated
+    layout, seen = setting.layout, setting.seen
     which = [
         i
         for i, key in enumerate(state.vector.keys)
         if key.statistic == "pixel_variance" and key.scope == "exposure" and state.null.known[i]
     ]
+    switch = sqrt(max(low, high / 50) * high)
+    try:
+        fit = fit_base(
+            layout, seen.levels, (switch,), calibrated.offsets,
+            black_dn=calibrated.model.camera.black_level - layout.black_dn,
+            left_out=calibrated.left_out,
+        )  # fmt: skip
+    except (ValueError, np.linalg.LinAlgError):
+        return None
+    places = [(state.vector.keys[i].exposure, state.vector.keys[i].channel) for i in which]
+    expected = np.array([fit.expected_dn2[place] for place in places])
+    if any(p.slope < 0 for p in fit.pieces) or (expected <= 0).any():
+        return None
+    own = np.log(np.array([seen.levels[place].variance_dn2 for place in places]) / expected)
     before = _loglik((state.vector.values[which] - state.null.mean[which]) / state.null.sd[which])
-    best: Path | None = None
-    for low, high in pairwise(means[1:-1]):
-        switch = sqrt(max(low, high / 50) * high)
-        try:
-            fit = fit_base(
-                layout, seen.levels, (switch,), calibrated.offsets,
-                black_dn=calibrated.model.camera.black_level - layout.black_dn,
-                left_out=calibrated.left_out,
-            )  # fmt: skip
-        except (ValueError, np.linalg.LinAlgError):
-            continue
-        if any(p.slope < 0 for p in fit.pieces):
-            continue
-        z = []
-        for i in which:
-            key = state.vector.keys[i]
-            place = (key.exposure, key.channel)
-            expected = fit.expected_dn2[place]
-            if expected <= 0:
-                break
-            own = np.log(seen.levels[place].variance_dn2 / expected)
-            z.append(own / state.null.sd[i])
-        if len(z) < len(which):
-            continue
-        gain = _loglik(np.array(z)) - before - _PENALTY
-        if best is None or gain > best.gain:
-            camera = with_numbers(state.camera, fit, (switch,), layout.black_dn)
-            best = Path(camera, switch, (high - low) / sqrt(12), gain)
-    return best
+    gain = _loglik(own / state.null.sd[which]) - before - _PENALTY
+    camera = with_numbers(state.camera, fit, (switch,), layout.black_dn)
+    return Path(camera, switch, (high - low) / sqrt(12), gain)
 
 
 def _loglik(z: np.ndarray) -> float:

@@ -14,7 +14,7 @@ from dsis.camera import Camera
 from dsis.effects import Effect
 
 Array = NDArray[np.float64]
-_STEP = 0.12  # of the logarithm, for the derivative
+STEP = 0.12  # of the logarithm, for the derivative
 _LARGEST = 1.2  # step of a logarithm
 _SMALL = 0.05  # gain of log-likelihood below which another round is in vain
 Free = tuple[int, str, bool]
@@ -106,7 +106,7 @@ def jacobian(
     """Return how the predicted numbers move with each free parameter: (number, parameter)."""
     columns = []
     for i, name, signed in free:
-        other = moved(effects, i, name, signed, _STEP)
+        other = moved(effects, i, name, signed, STEP)
         shifted = None if other is None else with_effects(camera, other[0])
         if other is None or shifted is None:
             columns.append(np.zeros_like(mean))
@@ -120,15 +120,19 @@ def information(predictor: Predictor, mean: Array, j: Array) -> tuple[Array, Arr
 
     The second is the inverse information, were the numbers independent.
     """
-    rest, sd, known = predictor.weights(mean)
-    known &= np.isfinite(j).all(1)
-    w = np.where(known, (_NU + 1) / _NU / (1 + (rest / sd) ** 2 / _NU) / sd**2, 0.0)
-    usable = np.where(known[:, None], j, 0.0)
-    score = (usable * w[:, None]).T
+    usable = np.where(np.isfinite(j), j, 0.0)
+    score = (usable * precisions(predictor, mean, j)[:, None]).T
     normal = score @ usable
     size = np.sqrt(np.maximum(np.diag(normal), 1e-12))
     scaled = normal / np.outer(size, size) + 1e-6 * np.eye(len(normal))
     return score, np.linalg.pinv(scaled, rcond=1e-8) / np.outer(size, size)
+
+
+def precisions(predictor: Predictor, mean: Array, j: Array) -> Array:
+    """Return by how much each number's residual counts; 0 where it or a derivative is unknown."""
+    rest, sd, known = predictor.weights(mean)
+    known &= np.isfinite(j).all(1)
+    return np.where(known, (_NU + 1) / _NU / (1 + (rest / sd) ** 2 / _NU) / sd**2, 0.0)
 
 
 def _along(

@@ -68,17 +68,23 @@ class Predictor:
         self.forms = form_errors(reference.vector.keys)
         self.base = simulations.of(reference.camera, replicates)
 
-    def mean(self, camera: Camera) -> Array:
-        """Return the mean of every number under a camera; nan where it is unknown.
+    def changes(self, camera: Camera) -> Array:
+        """Return what a camera changes in each replicate: (replicate, number); nan where unknown.
 
-        Numbers that the effects in which the cameras differ cannot change stay as they are, and a
-        change counts as far as the replicates agree on it: their noise would otherwise be fitted.
+        Numbers that the effects in which the cameras differ cannot change stay as they are.
         """
         mine, theirs = Counter(camera.effect), Counter(self.reference.camera.effect)
         different = list(((mine - theirs) + (theirs - mine)).keys())
         may = touched(self.reference.vector.keys, different)
         made = self.simulations.of(camera, self.replicates)
-        change = np.where(may, made - self.base, 0.0)
+        return np.asarray(np.where(may, made - self.base, 0.0))
+
+    def mean(self, camera: Camera) -> Array:
+        """Return the mean of every number under a camera; nan where it is unknown.
+
+        A change counts as far as the replicates agree on it: their noise would otherwise be fitted.
+        """
+        change = self.changes(camera)
         mean = change.mean(0)
         noise = change.var(0, ddof=1) / len(change) if len(change) > 1 else 0.0 * mean
         with np.errstate(invalid="ignore", divide="ignore"):

@@ -2,25 +2,41 @@
 
 The score of the final fit is evaluated on every simulation of the final model. Its mean corrects
 what the fit does wrong by itself, its covariance gives the sandwich error (Huber 1967).
+
+Slopes are means over few simulated sensors. Their scatter adds to their squares what looks like
+information (errors in variables: Fuller, "Measurement error models", 1987, section 1.2), so that
+the information is made of products of different sensors: unbiased, however few pixels an effect
+has.
 """
 
 from collections.abc import Sequence
 
 import numpy as np
+import scipy.stats
+from numpy.typing import NDArray
 
 from analysis.mismatch.candidates import Proposal
-from analysis.mismatch.polish import Free, information, jacobian, moved
+from analysis.mismatch.polish import STEP, Free, moved, precisions, with_effects
+from analysis.mismatch.predict import Predictor
 from analysis.mismatch.state import State
 from dsis.camera import Camera
 from dsis.effects import Effect
 
+Array = NDArray[np.float64]
 _LARGEST = 0.7  # correction of a logarithm
+_CLEAR = 0.9  # share of what slopes show that is theirs: more sensors are not needed
+_LEAST = 0.05  # of it, from which on errors are said as if it were that much
+_LEAST_SENSORS = 2  # that show a scatter
+_NORMAL = 1.96
 
 
 def settled(
     state: State, bare: Camera, proposals: Sequence[Proposal]
 ) -> tuple[tuple[Effect, ...], tuple[dict[str, float], ...]]:
     """Return effects and standard errors of their free parameters.
+
+    1.96 errors reach to the end of the 95 % interval: by Student's law, for the variance is known
+    from few simulations, and of a parameter whose logarithm is fitted to the farther end.
 
     Parameters
     ----------
@@ -38,21 +54,73 @@ def settled(
     errors: tuple[dict[str, float], ...] = tuple({} for _ in proposals)
     if not free:
         return effects, errors
-    predictor = state.predictor()
-    mean = state.null.mean
-    j = jacobian(predictor, bare, effects, free, mean)
-    score, inverse = information(predictor, mean, j)
-    known = state.null.known
+    mean, known = state.null.mean, state.null.known
+    score, inverse = _information(state, bare, effects, free)
     rest = np.where(known, state.vector.values - mean, 0.0)
     simulated = np.where(known, np.nan_to_num(state.simulated) - mean, 0.0) @ score.T
     count = len(simulated)
     covariance = np.atleast_2d(np.cov(simulated, rowvar=False)) * (1 + 1 / count)
     sandwich = inverse @ covariance @ inverse
     step = inverse @ (score @ rest)
-    for (i, name, signed), delta, variance in zip(free, step, np.diag(sandwich), strict=True):
-        error = float(np.sqrt(variance))
+    reach = float(scipy.stats.t.ppf(0.975, count - 1)) * np.sqrt(np.diag(sandwich))
+    for (i, name, signed), delta, half in zip(free, step, reach, strict=True):
         limited = float(delta if signed else np.clip(delta, -_LARGEST, _LARGEST))
         changed = moved(effects, i, name, signed, limited, as_is=True)
         effects = effects if changed is None else changed[0]
-        errors[i][name] = error * (1.0 if signed else abs(float(getattr(effects[i], name))))
+        value = abs(float(getattr(effects[i], name)))
+        errors[i][name] = float(half if signed else value * np.expm1(half)) / _NORMAL
     return effects, errors
+
+
+def _information(
+    state: State, bare: Camera, effects: tuple[Effect, ...], free: Sequence[Free]
+) -> tuple[Array, Array]:
+    """Return the score's weights (parameter, number), and the inverse of its information.
+
+    Sensors are simulated until their scatter is little beside the slopes, or all are used.
+    """
+    replicates, most = max(state.setting.replicates, _LEAST_SENSORS), len(state.simulated)
+    while True:
+        predictor = state.predictor(replicates)
+        slopes = _slopes(predictor, bare, effects, free)
+        j = slopes.mean(0)
+        weights = precisions(predictor, state.null.mean, j)
+        slopes = np.where(weights[:, None] > 0, np.nan_to_num(slopes), 0.0)
+        score = (slopes.mean(0) * weights[:, None]).T
+        inverse, share = inverse_information(slopes, weights)
+        if share > _CLEAR or replicates >= most:
+            return score, inverse
+        replicates = min(2 * replicates, most)
+
+
+def _slopes(
+    predictor: Predictor, bare: Camera, effects: tuple[Effect, ...], free: Sequence[Free]
+) -> Array:
+    """Return how numbers move with each parameter: (replicate, number, parameter)."""
+    columns = []
+    for i, name, signed in free:
+        other = moved(effects, i, name, signed, STEP)
+        shifted = None if other is None else with_effects(bare, other[0])
+        if other is None or shifted is None:
+            columns.append(np.zeros_like(predictor.base))
+        else:
+            columns.append(predictor.changes(shifted) / other[1])
+    return np.stack(columns, 2)
+
+
+def inverse_information(slopes: Array, weights: Array) -> tuple[Array, float]:
+    """Return the inverse information of slopes, and the share that is no scatter between sensors.
+
+    What is unbiased is compared with the plain square in its own units, direction by direction.
+    """
+    count = len(slopes)
+    total = slopes.sum(0)
+    plain = (total * weights[:, None]).T @ total
+    size = np.sqrt(np.maximum(np.diag(plain), 1e-12))
+    values, vectors = np.linalg.eigh(plain / np.outer(size, size) + 1e-6 * np.eye(len(plain)))
+    root = vectors / np.sqrt(values) / size[:, None]
+    own = np.einsum("rnp,n,rnq->pq", slopes, weights, slopes, optimize=True)
+    values, vectors = np.linalg.eigh(root.T @ (count / (count - 1) * (plain - own)) @ root)
+    turned = root @ vectors * count
+    share = float(values.min())
+    return (turned / np.clip(values, _LEAST, 1.0)) @ turned.T, share

@@ -28,6 +28,7 @@ _CLEAR = 0.9  # share of what slopes show that is theirs: more sensors are not n
 _LEAST = 0.05  # of it, from which on errors are said as if it were that much
 _LEAST_SENSORS = 2  # that show a scatter
 _NORMAL = 1.96
+_FARTHEST = 50.0  # end of a logarithm's interval: beyond, nothing is known
 
 
 def settled(
@@ -68,7 +69,8 @@ def settled(
         changed = moved(effects, i, name, signed, limited, as_is=True)
         effects = effects if changed is None else changed[0]
         value = abs(float(getattr(effects[i], name)))
-        errors[i][name] = float(half if signed else value * np.expm1(half)) / _NORMAL
+        far = half if signed else value * np.expm1(min(half, _FARTHEST))
+        errors[i][name] = float(far) / _NORMAL
     return effects, errors
 
 

@@ -36,8 +36,8 @@ def settled(
 ) -> tuple[tuple[Effect, ...], tuple[dict[str, float], ...]]:
     """Return effects and standard errors of their free parameters.
 
-    1.96 errors reach to the end of the 95 % interval: by Student's law, for the variance is known
-    from few simulations, and of a parameter whose logarithm is fitted to the farther end.
+    1.96 errors are half the 95 % interval: by Student's law, for the variance is known from few
+    simulations, and of a parameter whose logarithm is fitted as long as its own interval.
 
     Parameters
     ----------
@@ -69,8 +69,8 @@ def settled(
         changed = moved(effects, i, name, signed, limited, as_is=True)
         effects = effects if changed is None else changed[0]
         value = abs(float(getattr(effects[i], name)))
-        far = half if signed else value * np.expm1(min(half, _FARTHEST))
-        errors[i][name] = float(far) / _NORMAL
+        own = half if signed else value * np.sinh(min(half, _FARTHEST))
+        errors[i][name] = float(own) / _NORMAL
     return effects, errors
 
 
@@ -79,9 +79,10 @@ def _information(
 ) -> tuple[Array, Array]:
     """Return the score's weights (parameter, number), and the inverse of its information.
 
-    Sensors are simulated until their scatter is little beside the slopes, or all are used.
+    Sensors are added until their scatter is little beside the slopes, or as many as of a draft.
     """
-    replicates, most = max(state.setting.replicates, _LEAST_SENSORS), len(state.simulated)
+    replicates = max(state.setting.replicates, _LEAST_SENSORS)
+    most = min(state.setting.drafts, len(state.simulated))
     while True:
         predictor = state.predictor(replicates)
         slopes = _slopes(predictor, bare, effects, free)

@@ -156,3 +156,13 @@ def test_line_offsets_follow_the_sensor_not_the_crop() -> None:
     columns = Draw(2).columns("columns", PixelGrid(8, 50))
     part = Draw(2).columns("columns", PixelGrid(3, 10, None, 5, 21))
     np.testing.assert_array_equal(part, columns[21:31])
+
+
+def test_a_field_that_is_kept_is_the_field_and_nobody_changes_it() -> None:
+    grid = PixelGrid(6, 10, Cfa.RGGB)
+    kept = Draw(5).within("sensor").fixed("prnu", grid)
+    assert (kept == Draw(5).within("sensor").normal("prnu", grid)).all()
+    assert (kept == Draw(5).within("sensor").fixed("prnu", grid)).all()
+    assert (kept != Draw(6).within("sensor").fixed("prnu", grid)).all()
+    with pytest.raises(ValueError, match="read-only"):
+        kept[0, 0] = 0

@@ -1,19 +1,19 @@
 """What the bank's numbers gain on the locked frames: the second witness beside the pixels.
 
-By the chain rule ln p(locked | rest) = ln p(all) - ln p(rest). Both are taken of one sum of the
-numbers, weighted by what the effect changes; its law with and without the effect is simulated, on
-the same draws. So a fixed pattern that locked frames share with the rest counts, as it should.
+Recordings with and without an effect are simulated on the same draws; what the locked frames add to
+the others is judged by `given`. So a fixed pattern that locked frames share with the rest counts,
+as it should.
 """
 
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-import scipy.stats
 from numpy.typing import NDArray
 
-from analysis.mismatch.finding import Gain
+from analysis.mismatch.given import Numbers, Ratio, ratio
 from analysis.mismatch.layout import Layout
 from analysis.mismatch.model import simulate
 from analysis.mismatch.observe import Observation, observe
@@ -22,7 +22,8 @@ from analysis.mismatch.source import Source
 from analysis.mismatch.split import Split
 from analysis.mismatch.state import Setting, State
 from analysis.mismatch.taking import layout_of
-from analysis.mismatch.vector import vector
+from analysis.mismatch.touches import touched
+from analysis.mismatch.vector import Vector, vector
 from dsis.camera import Camera
 from dsis.recording import Recording
 
@@ -30,8 +31,6 @@ Array = NDArray[np.float64]
 _SIMULATIONS = 16
 _FEW = 5  # where simulations are large
 _LARGE = 2.5e7  # samples
-_CLEAR = 3.0  # standard errors from which a simulated change counts
-_NORMAL = 1.96
 
 
 @dataclass(frozen=True)
@@ -66,50 +65,33 @@ class HeldNumbers:
             layout, lambda name: self.source.frames(name, numbers[name]), keep=True
         )
 
-    def gain(self, final: State, without: Camera) -> tuple[Gain, float]:
-        """Return the gain of the final model over a camera without an effect, and its chance size.
+    @property
+    def frames(self) -> int:
+        """How many frames are locked."""
+        return sum(len(self.split.locked.get(e.name, ())) for e in self.setting.layout.exposures)
 
-        The gain is per locked frame, with its interval by the parametric bootstrap: recordings of
-        the final model, as simulated. Chance gains more than the second in 2.5 % of recordings
-        without the effect at most, and it is not below zero.
+    def gain(self, final: State, without: Camera) -> Ratio | None:
+        """Return the gain of the final model over a camera without an effect, nats in all.
+
+        None: the locked frames cannot tell.
         """
-        frames = sum(len(self.split.locked.get(e.name, ())) for e in self.setting.layout.exposures)
-        if not frames:
-            return Gain(0.0, (-np.inf, np.inf)), np.inf
-        own, made, chance = self._ratios(final, without, *self.whole)
-        less, made_less, chance_less = self._ratios(
-            final, without, self.setting.layout, self.setting.seen
+        if not self.frames:
+            return None
+        whole, rest = (
+            self._numbers(final, without, *self.whole),
+            self._numbers(final, without, self.setting.layout, self.setting.seen),
         )
-        total = own - less
-        error = float(np.std(made - made_less, ddof=1)) / frames
-        without_it = chance - chance_less
-        clear = float(without_it.mean() + _NORMAL * without_it.std(ddof=1)) / frames
-        value = total / frames
-        return Gain(value, (value - _NORMAL * error, value + _NORMAL * error)), max(clear, 0.0)
+        keys = final.vector.keys
+        mine, theirs = Counter(final.camera.effect), Counter(without.effect)
+        effects = list(((mine - theirs) + (theirs - mine)).keys())
+        may = touched(keys, effects) if effects else np.ones(len(keys), bool)
+        return ratio(whole, rest, [(key.statistic, key.scope) for key in keys], may)
 
-    def _ratios(
-        self, final: State, without: Camera, layout: Layout, seen: Observation
-    ) -> tuple[float, Array, Array]:
-        """Return ln p(with) - ln p(without): as recorded, of recordings with it, and without."""
-        of = _numbers_of(final.calibrated, layout)
+    def _numbers(self, final: State, without: Camera, layout: Layout, seen: Observation) -> Numbers:
+        """Return the numbers of some frames: as recorded, and simulated by both cameras."""
+        own = _vector_of(final.calibrated, layout)(seen)
         one, other = (self._made(final, camera, layout) for camera in (final.camera, without))
-        recorded = of(seen)
-        weights = _weights(one, other, recorded)
-        if not weights.any():
-            return 0.0, np.zeros(len(one)), np.zeros(len(other))
-        first, second, value = (np.nan_to_num(x) @ weights for x in (one, other, recorded))
-        places = first.mean(), second.mean()
-        spread = max(float(first.std(ddof=1)), float(second.std(ddof=1)))
-        dof = 2 * (len(first) - 1)
-
-        def ratio(x: Array | float) -> Array:
-            law = scipy.stats.t(dof)
-            wide = spread * np.sqrt(1 + 1 / len(first))
-            return np.asarray(
-                law.logpdf((x - places[0]) / wide) - law.logpdf((x - places[1]) / wide)
-            )
-
-        return float(ratio(float(value))), ratio(first), ratio(second)
+        return Numbers(own.values, one, other, own.errors)
 
     def _made(self, final: State, camera: Camera, layout: Layout) -> Array:
         """Return the numbers of simulated recordings of a camera: (recording, number)."""
@@ -119,24 +101,12 @@ class HeldNumbers:
         if key not in self.kept:
             count = _SIMULATIONS if frames * layout.rows * layout.columns <= _LARGE else _FEW
             model = final.calibrated.model.with_camera(camera)
-            setting, of = self.setting, _numbers_of(final.calibrated, layout)
+            setting, of = self.setting, _vector_of(final.calibrated, layout)
             made = simulate(model, layout, range(count), setting.seed + 3, setting.jobs)
-            self.kept[key] = np.stack([of(one) for one in made])
+            self.kept[key] = np.stack([of(one).values for one in made])
         return self.kept[key]
 
 
-def _numbers_of(calibrated: Calibrated, layout: Layout) -> Callable[[Observation], Array]:
+def _vector_of(calibrated: Calibrated, layout: Layout) -> Callable[[Observation], Vector]:
     # One yardstick for all: the final model's base numbers.
-    return lambda one: vector(layout, one, calibrated.refit(layout, one.levels)).values
-
-
-def _weights(one: Array, other: Array, recorded: Array) -> Array:
-    """Return the weight of each number: its change in units of its variance, where clear."""
-    known = np.isfinite(one).all(0) & np.isfinite(other).all(0) & np.isfinite(recorded)
-    difference = np.where(known, np.nan_to_num(one) - np.nan_to_num(other), 0.0)
-    change = difference.mean(0)
-    error = difference.std(0, ddof=1) / np.sqrt(len(one))
-    variance = (np.where(known, one, 0.0).var(0, ddof=1) + np.where(known, other, 0.0).var(0)) / 2
-    clear = known & (np.abs(change) > _CLEAR * error) & (variance > 0)
-    middle = float(np.median(variance[clear])) if clear.any() else 0.0
-    return np.where(clear, change / (variance + 1e-6 * middle + 1e-300), 0.0)
+    return lambda one: vector(layout, one, calibrated.refit(layout, one.levels))

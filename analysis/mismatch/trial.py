@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.finding import Change, Gain, Proof
+from analysis.mismatch.given import Ratio
 from analysis.mismatch.heldnumbers import HeldNumbers
 from analysis.mismatch.model import in_threads, simulate
 from analysis.mismatch.observe import Observation, observe
@@ -27,6 +28,7 @@ from dsis.recording import Recording
 Array = NDArray[np.float64]
 _REPLICATES = 6
 _TOTAL = 4.6  # nats: chance gains as much in 1 % of recordings at most, whatever the frames
+_NORMAL = 1.96
 _ERRORS = 2.2  # standard errors from a gain to the end of its interval, of few frames
 
 
@@ -48,6 +50,11 @@ def _of_pixels(gain: Gain, frames: int) -> Gained:
     own = gain.nats_per_frame
     above = own > (own - gain.ci95[0]) / _ERRORS
     return Gained(gain, above and (gain.ci95[0] > 0 or own * frames > _TOTAL))
+
+
+def _per_frame(told: Ratio, frames: int) -> Gain:
+    value, error = told.nats / frames, _NORMAL * told.error / frames
+    return Gain(value, (value - error, value + error))
 
 
 @dataclass(frozen=True)
@@ -97,9 +104,9 @@ class Trial:
         for (kind, camera), less in zip(without.items(), rest, strict=True):
             found[kind] = _of_pixels(heldout_gain(less, whole, seed=self.seed), frames)
             if not found[kind].certain:
-                gain, error = self.numbers.gain(final, camera)
-                if gain.nats_per_frame > error:
-                    found[kind] = Gained(gain, certain=True)
+                told = self.numbers.gain(final, camera)
+                if told is not None and told.certain:
+                    found[kind] = Gained(_per_frame(told, self.numbers.frames), certain=True)
         return found
 
     def proof(self, base: State, final: State, step: Callable[[], None], source: Source) -> Proof:

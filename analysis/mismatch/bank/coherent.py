@@ -13,7 +13,8 @@ from dsis.measures import Channel
 
 Array = NDArray[np.float64]
 OUTSTANDING = (4, 7, 12)  # standard deviations of a pixel's summed variance
-_BLOCKS = ((1, 1), (1, 2), (2, 1), (2, 2))
+_SINGLE = ((1, 1),)
+_BLOCKS = (*_SINGLE, (1, 2), (2, 1), (2, 2))
 _LEAST_BINS = 8
 _ALTERNATES = 0.1  # bins from half a cycle per pixel: phases of a line drift by less than a tenth
 _ALONE = 2.0  # times as high a bin elsewhere is the peak, whatever a block sums up to
@@ -90,6 +91,8 @@ class SpectrumSums:
         self.power, self.relative = np.zeros((2, n, m // 2 + 1))
         self.rows = {key: np.zeros(n // 2 + 1) for key in ("", "signal")}
         self.columns = np.zeros(m // 2 + 1)
+        # Of row means, on half bins: a sinusoid loses a fifth at most between two of them.
+        self.fine = {key: np.zeros(n + 1) for key in self.rows}
         self.seen = 0
         self.weight = {key: [0.0, 0.0] for key in ("", "signal")}
 
@@ -104,8 +107,10 @@ class SpectrumSums:
         self.relative += seen * channel.power_spectrum / pixel
         self.seen += seen
         self.columns += weights[""] * channel.column_spectrum / pixel
+        fine = _half_bins(channel, seen)
         for key, weight in weights.items():
             self.rows[key] += weight * channel.row_spectrum / pixel
+            self.fine[key] += weight * fine / pixel
             self.weight[key][0] += weight
             self.weight[key][1] += weight**2 / seen
 
@@ -120,6 +125,7 @@ class SpectrumSums:
             found.columns += part.columns
             for key in found.rows:
                 found.rows[key] += part.rows[key]
+                found.fine[key] += part.fine[key]
                 found.weight[key][0] += part.weight[key][0]
                 found.weight[key][1] += part.weight[key][1]
         return found
@@ -145,7 +151,8 @@ class SpectrumSums:
         for key, label in (("", "row_spectrum_peak"), ("signal", "row_spectrum_peak of light")):
             if self.weight[key][0]:
                 degrees = max(round(self.degrees(key)), 1)
-                found[label] = _largest(_line(self.rows[key]), degrees)
+                # From one cycle a frame on: less is much like the frame's mean, which is off.
+                found[label] = _largest(self.fine[key][np.newaxis, 2:-1], degrees, blocks=_SINGLE)
         return found
 
     def peak(self) -> Peak | None:
@@ -181,10 +188,10 @@ class SpectrumSums:
         """Return where the spectrum of row means is largest."""
         if not self.weight[key][0]:
             return None
-        power = self.rows[key][1:] / self.weight[key][0]
+        power = self.fine[key][2:] / self.weight[key][0]
         place = int(power.argmax())
-        off = _within_bin(power, place)
-        return Peak(0.0, (place + 1) / self.shape[0], float(power.max()), off)
+        off = _top(power, place) / 2
+        return Peak(0.0, (place / 2 + 1) / self.shape[0], float(power.max()), off)
 
     def _corners(self, degrees: int) -> dict[str, Number]:
         """Return the power of what alternates from pixel to pixel: real, one square a frame."""
@@ -218,7 +225,30 @@ def _line(power: Array) -> Array:
     return power[np.newaxis, 1 : power.size - 1]
 
 
-def _largest(inner: Array, degrees: int, edge: Array | None = None) -> Number:
+def _half_bins(channel: Channel, seen: int) -> Array:
+    """Return the temporal power of row means as `row_spectrum`, at half bins too: (rows + 1,)."""
+    moved = channel.row_means - channel.frame_means[:, None]
+    moved = moved - moved.mean(0)
+    lines = moved.shape[1]
+    power = np.abs(np.fft.rfft(moved, 2 * lines, axis=1)) ** 2
+    return np.asarray(power.sum(0) * (channel.mean_frame.shape[1] / lines / max(seen, 1)))
+
+
+def _top(power: Array, place: int) -> float:
+    """Return where the parabola through a bin and its neighbours is highest, -0.5 to 0.5."""
+    if not 0 < place < power.size - 1:
+        return 0.0
+    below, at, above = (float(p) for p in power[place - 1 : place + 2])
+    bend = below - 2 * at + above
+    return float(np.clip((below - above) / (2 * bend), -0.5, 0.5)) if bend < 0 else 0.0
+
+
+def _largest(
+    inner: Array,
+    degrees: int,
+    edge: Array | None = None,
+    blocks: Sequence[tuple[int, int]] = _BLOCKS,
+) -> Number:
     """Return the normal score of the largest bin, or block of two bins a side.
 
     A sinusoid between bins shows in all of a block, in a single one by 0.4 per axis at worst. White
@@ -230,7 +260,7 @@ def _largest(inner: Array, degrees: int, edge: Array | None = None) -> Number:
     if not white > 0:
         return UNKNOWN
     shape = inner.shape
-    parts = [(b, _summed(inner, b)) for b in _BLOCKS if b[0] <= shape[0] and b[1] <= shape[1]]
+    parts = [(b, _summed(inner, b)) for b in blocks if b[0] <= shape[0] and b[1] <= shape[1]]
     if edge is not None and edge.size:
         parts.append(((1, 1), edge))
     least = 1.0

@@ -8,6 +8,8 @@ import numpy as np
 from analysis.mismatch.candidates.candidate import Candidate, Proposal, proposals
 from analysis.mismatch.clues import Clues
 
+_SWITCHING = (0.35, 0.1)  # a frame: seen in the noise, and in maps of few frames too
+
 
 def _poisson(clues: Clues) -> Sequence[Proposal]:
     if clues.camera.noise.shot == "poisson":
@@ -33,21 +35,23 @@ def _spread(clues: Clues) -> Sequence[Proposal]:
 
 def _rts(clues: Clues) -> Sequence[Proposal]:
     """Start from a share of pixels and the height that the mean excess variance then asks for."""
-    k, _ = clues.amplitude("kurtosis", lambda place: clues.read_share(place) ** 2)
-    if k <= 0:
+    k, error = clues.amplitude("kurtosis", lambda place: clues.read_share(place) ** 2)
+    k = max(k, error)  # few pixels show in maps before they show in the mean
+    if not np.isfinite(k):
         return []
     read = max(float(clues.fit.line_dn2(np.zeros(1))[0]), 0.02)
     found: list[Proposal] = []
     for fraction in (0.001, 0.003, 0.01, 0.03, 0.1):
         # The kurtosis of a mixture: 3 f E[(a^2/4)^2] / V^2, E[a^4] = 24 A^4.
         height = (k * read**2 / (3 * fraction * 24 / 16)) ** 0.25
-        found += proposals(
-            "rts",
-            ["pixel_fraction", "amplitude_dn"],
-            pixel_fraction=fraction,
-            amplitude_dn=height,
-            switch_probability=0.35,
-        )
+        for switching in _SWITCHING:
+            found += proposals(
+                "rts",
+                ["pixel_fraction", "amplitude_dn"],
+                pixel_fraction=fraction,
+                amplitude_dn=height,
+                switch_probability=switching,
+            )
     return found
 
 
@@ -101,7 +105,7 @@ CANDIDATES = (
     Candidate(
         "rts",
         ("variance_spread", "variance_persistence", "kurtosis", "one_off_outliers",
-         "noisy_pixels", "frame_correlation"),
+         "noisy_pixels", "frame_correlation", "outlying_pixels"),
         _rts,
     ),
     Candidate("impulse", ("one_off_outliers", "kurtosis", "skewness"), _impulse),

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.stats import norm
 
 from analysis.mismatch.candidates.candidate import Candidate, Proposal, proposals
 from analysis.mismatch.clues import Clues
@@ -44,13 +45,30 @@ def _nonlinearity(clues: Clues) -> Sequence[Proposal]:
 
 
 def _saturation(clues: Clues) -> Sequence[Proposal]:
+    """Start where the skewness of the brightest level puts the full well, and around it."""
     top = max(clues.places, key=clues.signal)
     level = clues.signal(top)
     sd = clues.seen.levels[top].variance_dn2 ** 0.5
+    skewness, error = clues.excess("skewness").get(top, (0.0, np.inf))
+    beyond = np.linspace(-1, 4, 51)
+    expected = np.array([_skewness_below(z) for z in beyond])
+    nearest = beyond[np.abs(expected - min(skewness, 0.0)).argmin()]
+    if not np.isfinite(error):
+        nearest = 1.5
     found: list[Proposal] = []
-    for well in (level + 1.5 * sd, level + 0.3 * sd, 0.99 * level):
-        found += proposals("saturation", ["full_well_dn"], full_well_dn=well)
-    return found
+    for z in (nearest, nearest + 0.5, nearest - 0.5, 0.3):
+        found += proposals("saturation", ["full_well_dn"], full_well_dn=level + float(z) * sd)
+    return [*found, *proposals("saturation", ["full_well_dn"], full_well_dn=0.99 * level)]
+
+
+def _skewness_below(limit: float) -> float:
+    """Return the skewness of a standard normal variate that is cut at a limit."""
+    density, below = norm.pdf(limit), norm.cdf(limit)
+    first = -density + limit * (1 - below)
+    second = below - limit * density + limit**2 * (1 - below)
+    third = -(limit**2 + 2) * density + limit**3 * (1 - below)
+    variance = second - first**2
+    return float((third - 3 * first * second + 2 * first**3) / variance**1.5)
 
 
 def _gain_mismatch(clues: Clues) -> Sequence[Proposal]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.mismatch.bank.bands import Bands
 from analysis.mismatch.bank.coherent import Peak, SpectrumSums, VarianceSums
 from analysis.mismatch.bank.common import common
 from analysis.mismatch.bank.local import local_scalars, variances, widened
@@ -136,6 +137,7 @@ def observe(
     found: dict[Place, Mapping[str, Number]] = {}
     sums: dict[str, _Channel] = {}
     shared: dict[str, Mapping[str, Number]] = {}
+    bands = Bands(layout.rows, layout.sites)
     for exposure in layout.uniform:
         measured = measure(layout, frames_of(exposure.name))
         if watch is not None:
@@ -144,6 +146,8 @@ def observe(
         if len(measured.channels) > 1:
             signals = {name: layout.signal_dn[exposure.name, name] for name in measured.channels}
             shared[exposure.name] = common(measured.channels, signals, frames, layout.sites)
+            expected = {name: layout.variance_dn2[exposure.name, name] for name in signals}
+            bands.add(measured.channels, expected, signals, frames)
         for name, channel in measured.channels.items():
             place = (exposure.name, name)
             levels[place] = _level(channel, frames)
@@ -159,12 +163,21 @@ def observe(
     if len(spectra) > 1:  # what all channels of a mosaic show
         spectra[""] = SpectrumSums.merged(list(spectra.values()))
     pooled = {name: own.variances.numbers() for name, own in sums.items()}
+    found_peaks = {
+        (name, kind): peak for name, own in spectra.items() for kind, peak in own.peaks()
+    }
+    found_pooled = {
+        name: {**pooled.get(name, {}), **own.numbers()} for name, own in spectra.items()
+    }
+    if len(layout.sites) > 1:
+        found_peaks |= {("", kind): peak for kind, peak in bands.peaks().items()}
+        found_pooled.setdefault("", {}).update(bands.numbers())
     return Observation(
         levels,
         found,
         maps,
-        {name: {**pooled.get(name, {}), **own.numbers()} for name, own in spectra.items()},
-        {(name, kind): peak for name, own in spectra.items() for kind, peak in own.peaks()},
+        found_pooled,
+        found_peaks,
         images if keep else {},
         shared,
         local,

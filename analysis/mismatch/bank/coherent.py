@@ -149,10 +149,9 @@ class SpectrumSums:
             found |= self._lags()
             found |= self._corners(degrees)
         for key, label in (("", "row_spectrum_peak"), ("signal", "row_spectrum_peak of light")):
-            if self.weight[key][0]:
-                degrees = max(round(self.degrees(key)), 1)
-                # From one cycle a frame on: less is much like the frame's mean, which is off.
-                found[label] = _largest(self.fine[key][np.newaxis, 2:-1], degrees, blocks=_SINGLE)
+            total = self.weight[key][0]
+            if total:
+                found[label] = largest_line(self.fine[key] / total, self.degrees(key))
         return found
 
     def peak(self) -> Peak | None:
@@ -188,10 +187,8 @@ class SpectrumSums:
         """Return where the spectrum of row means is largest."""
         if not self.weight[key][0]:
             return None
-        power = self.fine[key][2:] / self.weight[key][0]
-        place = int(power.argmax())
-        off = _top(power, place) / 2
-        return Peak(0.0, (place / 2 + 1) / self.shape[0], float(power.max()), off)
+        cycles, off, power = line_top(self.fine[key] / self.weight[key][0])
+        return Peak(0.0, cycles / self.shape[0], power, off)
 
     def _corners(self, degrees: int) -> dict[str, Number]:
         """Return the power of what alternates from pixel to pixel: real, one square a frame."""
@@ -232,6 +229,20 @@ def _half_bins(channel: Channel, seen: int) -> Array:
     lines = moved.shape[1]
     power = np.abs(np.fft.rfft(moved, 2 * lines, axis=1)) ** 2
     return np.asarray(power.sum(0) * (channel.mean_frame.shape[1] / lines / max(seen, 1)))
+
+
+def largest_line(power: Array, degrees: float) -> Number:
+    """Return the normal score of the largest of half bins, from 0 to half a cycle per line.
+
+    From one cycle a frame on: less is much like the frame's mean, which is off.
+    """
+    return _largest(power[np.newaxis, 2:-1], max(round(degrees), 1), blocks=_SINGLE)
+
+
+def line_top(power: Array) -> tuple[float, float, float]:
+    """Return cycles a frame of the largest of half bins, what is beyond it, and its power."""
+    place = int(power[2:].argmax())
+    return place / 2 + 1, _top(power[2:], place) / 2, float(power[place + 2])
 
 
 def _top(power: Array, place: int) -> float:

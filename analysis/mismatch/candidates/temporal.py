@@ -31,9 +31,6 @@ def _flicker(clues: Clues) -> Sequence[Proposal]:
 
 
 def _line_flicker(clues: Clues) -> Sequence[Proposal]:
-    variance, _ = clues.amplitude("row_variance", lambda place: clues.signal(place) ** 2)
-    if variance <= 0:
-        return []
     found: list[Proposal] = []
     for kind in ("rows of light", "rows"):
         clear = clearest(clues, kind)
@@ -48,10 +45,22 @@ def _line_flicker(clues: Clues) -> Sequence[Proposal]:
             found += proposals(
                 "line_flicker",
                 ["depth_percent", "cycles_per_frame"],
-                depth_percent=100 * sqrt(2 * variance),
+                depth_percent=100 * _depth(clues, channel, peak),
                 cycles_per_frame=cycles,
             )
     return found
+
+
+def _depth(clues: Clues, channel: str, peak: Peak) -> float:
+    """Return the relative depth of a band of light: of power d^2 S^2 n m / (4 v) beyond noise."""
+    places = [p for p in clues.places if channel in ("", p[1]) and clues.signal(p) > 0]
+    bright = [clues.signal(p) ** 2 / clues.seen.levels[p].variance_dn2 for p in places]
+    weights = [b * (clues.frames(p[0]) - 1) for p, b in zip(places, bright, strict=True)]
+    if not sum(weights) > 0:
+        return 0.0
+    mean = sum(w * b for w, b in zip(weights, bright, strict=True)) / sum(weights)
+    n, m = clues.shape(channel)
+    return 2 * sqrt(max(peak.power - 1, 0.05) / (n * m * mean))
 
 
 def _pink(clues: Clues) -> Sequence[Proposal]:

@@ -1,0 +1,84 @@
+"""Bands across a mosaic: the temporal spectrum of its rows, all colours in phase.
+
+A row of the sensor crosses two channels. Their means, each in proportion to what a band moves it by
+and to the inverse of its noise, make one series over all rows (a matched filter), so that channels
+add by amplitude, not by power.
+"""
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.mismatch.bank.coherent import Peak, largest_line, line_top
+from analysis.mismatch.bank.scalars import Number
+from dsis.measures import Channel
+
+Array = NDArray[np.float64]
+_LABELS = {"": "row_spectrum_peak", "signal": "row_spectrum_peak of light"}
+_KINDS = {"": "rows", "signal": "rows of light"}
+
+
+class Bands:
+    """Power of row series over all exposures on half bins, white noise scaled to 1.
+
+    Two weightings: bands of one amplitude in DN, and in proportion to the light.
+
+    Parameters
+    ----------
+    rows
+        Of the mosaic.
+    sites
+        First row and column of each channel.
+    """
+
+    def __init__(self, rows: int, sites: Mapping[str, tuple[int, int]]) -> None:
+        self.rows, self.sites = rows, sites
+        self.power = {key: np.zeros(rows + 1) for key in _LABELS}
+        self.weight = {key: [0.0, 0.0] for key in _LABELS}
+
+    def add(
+        self,
+        channels: Mapping[str, Channel],
+        variance_dn2: Mapping[str, float],
+        signal_dn: Mapping[str, float],
+        frames: int,
+    ) -> None:
+        """Take one exposure; the variance and signal that are expected weigh it."""
+        if not all(c.estimates["pixel_variance"].value > 0 for c in channels.values()):
+            return
+        shapes = {"": dict.fromkeys(channels, 1.0), "signal": signal_dn}
+        for key, shape in shapes.items():
+            series = np.zeros((frames, self.rows))
+            noise = told = 0.0
+            for name, channel in channels.items():
+                moved = channel.row_means - channel.frame_means[:, None]
+                lines, across = channel.mean_frame.shape
+                own = max(shape[name], 0.0) * across / variance_dn2[name]
+                series[:, self.sites[name][0] :: 2][:, :lines] += own * (moved - moved.mean(0))
+                noise += lines * own**2 * channel.estimates["pixel_variance"].value / across
+                told += lines * own * max(shape[name], 0.0)
+            if noise > 0:
+                seen = frames - 1
+                power = (np.abs(np.fft.rfft(series, 2 * self.rows, axis=1)) ** 2).sum(0)
+                self.power[key] += told * power / noise
+                self.weight[key][0] += told * seen
+                self.weight[key][1] += told**2 * seen
+
+    def numbers(self) -> dict[str, Number]:
+        """Return the largest of each weighting."""
+        return {
+            _LABELS[key]: largest_line(self.power[key] / total, total**2 / squares)
+            for key, (total, squares) in self.weight.items()
+            if total
+        }
+
+    def peaks(self) -> dict[str, Peak]:
+        """Return where each is largest: cycles per row of a plane, power as a plane shows it."""
+        found = {}
+        for key, (total, _) in self.weight.items():
+            if total:
+                cycles, off, power = line_top(self.power[key] / total)
+                as_plane = 1 + (power - 1) / len(self.sites)
+                found[_KINDS[key]] = Peak(0.0, 2 * cycles / self.rows, as_plane, off)
+        return found

@@ -6,8 +6,8 @@ as it should.
 """
 
 from collections import Counter
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from analysis.mismatch.given import Numbers, Ratio, ratio
 from analysis.mismatch.layout import Layout
-from analysis.mismatch.model import simulate
+from analysis.mismatch.model import in_threads
 from analysis.mismatch.observe import Observation, observe
 from analysis.mismatch.recalibrate import Calibrated
 from analysis.mismatch.source import Source
@@ -28,9 +28,11 @@ from dsis.camera import Camera
 from dsis.recording import Recording
 
 Array = NDArray[np.float64]
+Simulated = Callable[[str], Iterable[NDArray[np.generic]]]
 _SIMULATIONS = 16
 _FEW = 5  # where simulations are large
 _LARGE = 2.5e7  # samples
+_MOST_KEPT = 2.5e8  # samples, of two bytes
 
 
 @dataclass(frozen=True)
@@ -44,14 +46,14 @@ class HeldNumbers:
     setting
         Of the diagnosis.
     kept
-        Numbers of simulated recordings, by camera and frames.
+        Numbers of simulated recordings, by yardstick and camera.
     """
 
     recording: Recording
     split: Split
     source: Source
     setting: Setting
-    kept: dict[tuple[str, int], Array] = field(default_factory=dict)
+    kept: dict[str, tuple[Array, Array]] = field(default_factory=dict)
 
     @cached_property
     def whole(self) -> tuple[Layout, Observation]:
@@ -77,9 +79,13 @@ class HeldNumbers:
         """
         if not self.frames:
             return None
+        yardstick = _yardstick(final, without)
+        one, other = (self._made(yardstick, final, camera) for camera in (final.camera, without))
+        layout, seen = self.whole
+        parts = ((layout, seen), (self.setting.layout, self.setting.seen))
+        recorded = [_vector_of(yardstick, *part) for part in parts]
         whole, rest = (
-            self._numbers(final, without, *self.whole),
-            self._numbers(final, without, self.setting.layout, self.setting.seen),
+            Numbers(own.values, one[i], other[i], own.errors) for i, own in enumerate(recorded)
         )
         keys = final.vector.keys
         mine, theirs = Counter(final.camera.effect), Counter(without.effect)
@@ -87,26 +93,71 @@ class HeldNumbers:
         may = touched(keys, effects) if effects else np.ones(len(keys), bool)
         return ratio(whole, rest, [(key.statistic, key.scope) for key in keys], may)
 
-    def _numbers(self, final: State, without: Camera, layout: Layout, seen: Observation) -> Numbers:
-        """Return the numbers of some frames: as recorded, and simulated by both cameras."""
-        own = _vector_of(final.calibrated, layout)(seen)
-        one, other = (self._made(final, camera, layout) for camera in (final.camera, without))
-        return Numbers(own.values, one, other, own.errors)
+    def _made(self, yardstick: Calibrated, final: State, camera: Camera) -> tuple[Array, Array]:
+        """Return the numbers of simulated recordings: of all frames, and without the locked ones.
 
-    def _made(self, final: State, camera: Camera, layout: Layout) -> Array:
-        """Return the numbers of simulated recordings of a camera: (recording, number)."""
-        frames = sum(len(e.numbers) for e in layout.exposures)
-        yardstick = final.camera.model_dump_json()
-        key = (f"{yardstick} {camera.model_dump_json()}", frames)
+        Each is (recording, number).
+        """
+        judge = yardstick.model.camera.model_dump_json()
+        key = f"{judge} {final.camera.model_dump_json()} {camera.model_dump_json()}"
         if key not in self.kept:
-            count = _SIMULATIONS if frames * layout.rows * layout.columns <= _LARGE else _FEW
-            model = final.calibrated.model.with_camera(camera)
-            setting, of = self.setting, _vector_of(final.calibrated, layout)
-            made = simulate(model, layout, range(count), setting.seed + 3, setting.jobs)
-            self.kept[key] = np.stack([of(one).values for one in made])
+            whole, rest = self.whole[0], self.setting.layout
+            count = _SIMULATIONS if _samples(whole) <= _LARGE else _FEW
+            model, seed = final.calibrated.model.with_camera(camera), self.setting.seed + 3
+
+            def numbers(replicate: int) -> tuple[Array, Array]:
+                frames = model.frames(whole, replicate, seed)
+                both = _observed(whole, rest, frames, model.frames(rest, replicate, seed))
+                one, two = (
+                    _vector_of(yardstick, layout, seen).values
+                    for layout, seen in zip((whole, rest), both, strict=True)
+                )
+                return one, two
+
+            made = in_threads(numbers, range(count), self.setting.jobs)
+            first, second = (np.stack(part) for part in zip(*made, strict=True))
+            self.kept[key] = first, second
         return self.kept[key]
 
 
-def _vector_of(calibrated: Calibrated, layout: Layout) -> Callable[[Observation], Vector]:
-    # One yardstick for all: the final model's base numbers.
-    return lambda one: vector(layout, one, calibrated.refit(layout, one.levels))
+def _yardstick(final: State, without: Camera) -> Calibrated:
+    """Return whose base numbers judge all: the final model's.
+
+    Of a camera with fewer read-out segments, that one's: with a segment more, both would fit.
+    """
+    calibrated = final.calibrated
+    segments = without.noise.segment
+    if len(segments) == len(final.camera.noise.segment):
+        return calibrated
+    switches = tuple(s.upper_dn for s in segments if s.upper_dn is not None)
+    return replace(calibrated, model=calibrated.model.with_camera(without), switches=switches)
+
+
+def _vector_of(calibrated: Calibrated, layout: Layout, seen: Observation) -> Vector:
+    return vector(layout, seen, calibrated.refit(layout, seen.levels))
+
+
+def _samples(layout: Layout) -> int:
+    return sum(len(e.numbers) for e in layout.exposures) * layout.rows * layout.columns
+
+
+def _observed(
+    whole: Layout, rest: Layout, frames: Simulated, again: Simulated
+) -> tuple[Observation, Observation]:
+    """Return what all simulated frames show, and what those of `rest` show.
+
+    Frames are simulated once and kept, or again where there are too many to keep.
+    """
+    if _samples(rest) > _MOST_KEPT:
+        return observe(whole, frames), observe(rest, again)
+    numbers = {e.name: e.numbers for e in whole.exposures}
+    wanted = {e.name: frozenset(e.numbers) for e in rest.exposures}
+    kept: dict[str, list[NDArray[np.uint16]]] = {name: [] for name in wanted}
+
+    def watched(name: str) -> Iterator[NDArray[np.generic]]:
+        for number, codes in zip(numbers[name], frames(name), strict=True):
+            if number in wanted[name]:
+                kept[name].append(codes.astype(np.uint16))
+            yield codes
+
+    return observe(whole, watched), observe(rest, kept.pop)

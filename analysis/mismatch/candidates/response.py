@@ -51,7 +51,7 @@ def _saturation(clues: Clues) -> Sequence[Proposal]:
     sd = clues.seen.levels[top].variance_dn2 ** 0.5
     skewness, error = clues.excess("skewness").get(top, (0.0, np.inf))
     beyond = np.linspace(-1, 4, 51)
-    expected = np.array([_skewness_below(z) for z in beyond])
+    expected = np.array([skewness_below(z) for z in beyond])
     nearest = beyond[np.abs(expected - min(skewness, 0.0)).argmin()]
     if not np.isfinite(error):
         nearest = 1.5
@@ -61,7 +61,7 @@ def _saturation(clues: Clues) -> Sequence[Proposal]:
     return [*found, *proposals("saturation", ["full_well_dn"], full_well_dn=0.99 * level)]
 
 
-def _skewness_below(limit: float) -> float:
+def skewness_below(limit: float) -> float:
     """Return the skewness of a standard normal variate that is cut at a limit."""
     density, below = norm.pdf(limit), norm.cdf(limit)
     first = -density + limit * (1 - below)

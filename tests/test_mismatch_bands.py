@@ -1,0 +1,71 @@
+"""Bands of light that cross a mosaic, and where a search for saturation starts."""
+
+import numpy as np
+import pytest
+import scipy.stats
+from numpy.typing import NDArray
+
+from analysis.mismatch.bank.bands import Bands
+from analysis.mismatch.bank.coherent import SpectrumSums
+from analysis.mismatch.candidates.response import skewness_below
+from analysis.mismatch.layout import sites
+from dsis.cfa import Cfa
+from dsis.measures import Accumulator, Channel
+
+Array = NDArray[np.float64]
+ROWS, COLUMNS, FRAMES = 64, 48, 8
+SIGNAL = {"R": 200.0, "Gr": 500.0, "Gb": 500.0, "B": 300.0}
+VARIANCE = {name: signal / 4 + 9 for name, signal in SIGNAL.items()}
+PLACES = sites(Cfa.RGGB)
+
+
+def recorded(rng: np.random.Generator, depth: float, cycles: float) -> dict[str, Channel]:
+    """Return the measures of a flat under a lamp that flickers while rows are read."""
+    rows = np.arange(ROWS)[:, None]
+    sums = Accumulator(ROWS, COLUMNS, Cfa.RGGB, 0.0, 65535.0)
+    clean, sd = np.zeros((2, ROWS, COLUMNS))
+    for name, (y, x) in PLACES.items():
+        clean[y::2, x::2], sd[y::2, x::2] = SIGNAL[name], VARIANCE[name] ** 0.5
+    for phase in rng.uniform(0, 2 * np.pi, FRAMES):
+        band = 1 + depth * np.sin(2 * np.pi * cycles * rows / ROWS + phase)
+        sums.add(clean * band + rng.normal(0, sd))
+    return dict(sums.result().channels)
+
+
+def bands_of(channels: dict[str, Channel]) -> Bands:
+    """Return the mosaic's bands."""
+    bands = Bands(ROWS, PLACES)
+    bands.add(channels, VARIANCE, SIGNAL, FRAMES)
+    return bands
+
+
+def score(channels: dict[str, Channel]) -> float:
+    """Return how clear a band of light is."""
+    return bands_of(channels).numbers()["row_spectrum_peak of light"][0]
+
+
+@pytest.mark.parametrize("cycles", [5.0, 8.25, 13.5, 20.75])
+def test_a_band_is_clearer_in_all_colours_together_and_where_it_is(cycles: float) -> None:
+    channels = recorded(np.random.default_rng(3), 0.004, cycles)
+    alone = []
+    for name, channel in channels.items():
+        sums = SpectrumSums((ROWS // 2, COLUMNS // 2))
+        sums.add(channel, FRAMES, VARIANCE[name], SIGNAL[name])
+        alone.append(sums.numbers()["row_spectrum_peak of light"][0])
+    assert score(channels) > max(alone) + 2
+    peak = bands_of(channels).peaks()["rows of light"]
+    assert peak.fy * ROWS / 2 + peak.off == pytest.approx(cycles, abs=0.2)
+
+
+def test_noise_alone_is_scored_as_a_normal_deviate_or_less() -> None:
+    rng = np.random.default_rng(4)
+    scores = np.array([score(recorded(rng, 0.0, 1.0)) for _ in range(120)])
+    for level in (0.1, 0.02):
+        allowed = level + 3 * (level * (1 - level) / scores.size) ** 0.5
+        assert (scores > scipy.stats.norm.isf(level)).mean() <= allowed
+
+
+@pytest.mark.parametrize("limit", [-0.5, 0.5, 2.0])
+def test_skewness_of_charge_that_is_cut(limit: float) -> None:
+    cut = np.minimum(np.random.default_rng(5).normal(size=400_000), limit)
+    assert skewness_below(limit) == pytest.approx(scipy.stats.skew(cut), abs=0.03)

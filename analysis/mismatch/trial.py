@@ -103,7 +103,8 @@ class Trial:
         found = {}
         for (kind, camera), less in zip(without.items(), rest, strict=True):
             found[kind] = _of_pixels(heldout_gain(less, whole, seed=self.seed), frames)
-            if not found[kind].certain:
+            # Where the pixels are sure that it is worse, sums of numbers do not overrule them.
+            if not found[kind].certain and found[kind].gain.ci95[1] > 0:
                 told = self.numbers.gain(final, camera)
                 if told is not None and told.certain:
                     found[kind] = Gained(_per_frame(told, self.numbers.frames), certain=True)

@@ -54,6 +54,8 @@ class Layout:
         Static scenes among the exposures; their signals and variances are as recorded.
     moving
         Exposures of kind scene that are left out, for the picture moves between frames.
+    still
+        Where codes move too seldom for noise to be judged: only levels are.
     """
 
     exposures: tuple[Taken, ...]
@@ -66,6 +68,7 @@ class Layout:
     variance_dn2: Mapping[Place, float]
     scenes: Mapping[str, Scene] = field(default_factory=dict)
     moving: tuple[str, ...] = ()
+    still: frozenset[Place] = frozenset()
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -106,7 +109,7 @@ class Layout:
 
     def regressors(self, channel: str) -> Regressors:
         """Return what the mean frames of a channel are regressed on."""
-        names = [e.name for e in self.uniform]
+        names = [e.name for e in self.uniform if (e.name, channel) not in self.still]
         return Regressors.of(
             names,
             {name: self.signal_dn[name, channel] for name in names},

@@ -13,7 +13,7 @@ from analysis.mismatch.bank.coherent import Peak, SpectrumSums, VarianceSums
 from analysis.mismatch.bank.common import common
 from analysis.mismatch.bank.local import local_scalars, variances, widened
 from analysis.mismatch.bank.maps import Parts, PatternSums, Regressors, parts
-from analysis.mismatch.bank.scalars import Number, scalars
+from analysis.mismatch.bank.scalars import NAMES, UNKNOWN, Number, scalars
 from analysis.mismatch.bank.together import together
 from analysis.mismatch.layout import Layout, Place
 from analysis.mismatch.scenes import Local
@@ -107,7 +107,12 @@ class _Channel:
         self.spectra = SpectrumSums(shape)
 
     def add(
-        self, exposure: str, channel: Channel, frames: int, variance_dn2: float, signal_dn: float
+        self,
+        exposure: str,
+        channel: Channel,
+        frames: int,
+        variance_dn2: float,
+        signal_dn: float,
     ) -> None:
         """Take one exposure; the variance and signal that are expected weigh it."""
         pixel = channel.estimates["pixel_variance"].value
@@ -143,7 +148,8 @@ def observe(
         if watch is not None:
             watch(exposure.name, measured)
         frames = len(exposure.numbers)
-        if len(measured.channels) > 1:
+        still = {name for name in measured.channels if (exposure.name, name) in layout.still}
+        if len(measured.channels) > 1 and not still:
             signals = {name: layout.signal_dn[exposure.name, name] for name in measured.channels}
             shared[exposure.name] = common(measured.channels, signals, frames, layout.sites)
             expected = {name: layout.variance_dn2[exposure.name, name] for name in signals}
@@ -151,10 +157,13 @@ def observe(
         for name, channel in measured.channels.items():
             place = (exposure.name, name)
             levels[place] = _level(channel, frames)
-            found[place] = scalars(channel, frames)
             if name not in sums:
                 n, m = channel.mean_frame.shape
                 sums[name] = _Channel(layout.regressors(name), (n, m))
+            if name in still:
+                found[place] = dict.fromkeys(NAMES, UNKNOWN)
+                continue
+            found[place] = scalars(channel, frames)
             variance, signal = layout.variance_dn2[place], layout.signal_dn[place]
             sums[name].add(exposure.name, channel, frames, variance, signal)
     local = _scenes(layout, frames_of, watch, found, shared)

@@ -14,6 +14,8 @@ from dsis.errors import InputError
 from dsis.recording import Recording
 
 _LEAST_FRAMES = 2
+# Pairs of neighbours that both moved, below which sums of their products are not near normal.
+_LEAST_PAIRS = 30.0
 
 
 def layout_of(
@@ -35,6 +37,7 @@ def layout_of(
     sensor = recording.sensor
     taken = []
     means: dict[Place, float] = {}
+    still: set[Place] = set()
     variances: dict[Place, float] = {}
     step = 1 if sensor.cfa is Cfa.MONO else 2
     for recorded in recording.exposures:
@@ -56,6 +59,9 @@ def layout_of(
             spread = np.percentile(two - one, [15.865, 84.135])
             robust = float(spread[1] - spread[0]) ** 2 / 8
             variances[e.name, channel] = max(robust, 0.05)
+            moved = float((one != two).mean()) / 2
+            if e.kind != SCENE and moved**2 * one.size * len(own) < _LEAST_PAIRS:
+                still.add((e.name, channel))
     if not any(e.kind != SCENE for e in taken):
         fact = "holds no dark or flat of two different frames that are not clipped"
         raise InputError.of(recording.folder, "exposure", fact)
@@ -76,5 +82,6 @@ def layout_of(
         sensor.white_level,
         signal,
         variances,
+        still=frozenset(still),
     )
     return with_scenes(layout, means, first)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from analysis.mismatch.bank.coherent import split_name
 from analysis.mismatch.bank.key import MOSAIC, Key
 from analysis.mismatch.bank.local import LOCAL_NAMES
-from analysis.mismatch.bank.scalars import NAMES, Number
+from analysis.mismatch.bank.scalars import NAMES, UNKNOWN, Number
 from analysis.mismatch.basefit import CLIPPED_SHARE, BaseFit, colour
 from analysis.mismatch.layout import Layout, Place
 from analysis.mismatch.observe import Observation
@@ -47,7 +47,8 @@ def vector(layout: Layout, seen: Observation, fit: BaseFit) -> Vector:
         for channel in layout.channels:
             place = (exposure.name, channel)
             rows += [(Key(name, "exposure", *place), seen.scalars[place][name]) for name in NAMES]
-            rows.append((Key("pixel_variance", "exposure", *place), _variance(place, seen, fit)))
+            variance = UNKNOWN if place in layout.still else _variance(place, seen, fit)
+            rows.append((Key("pixel_variance", "exposure", *place), variance))
             level = _level(layout, exposure.name, channel, seen, fit)
             rows.append((Key("level", "exposure", *place), level))
         if "Gr" in layout.channels and exposure.kind == "flat":

@@ -18,6 +18,7 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 _FAR = 6.0  # robust standard deviations from which a pixel is an outlier of a map
 _LEAST_OUTLIERS = 4
+_SURE = 3.0  # standard deviations of chance
 _AXIS_BANDS = 24
 _MANY = 64  # waves in a class from which the base model's own noise cancels
 _LOW = 3  # bands of low frequency that are told apart off the axes
@@ -94,8 +95,12 @@ def pattern_of(model: Halves, base: Halves, variance_dn2: Array, trained: Array)
     trained
         Training frames of the recording: (exposure,).
     """
-    far, odd = far_pixels(model.early) & far_pixels(model.late), None
-    if far.sum() - (far_pixels(base.early) & far_pixels(base.late)).sum() >= _LEAST_OUTLIERS:
+    first, second = far_pixels(model.early), far_pixels(model.late)
+    far, odd = first & second, None
+    others = (far_pixels(base.early) & far_pixels(base.late)).sum()
+    # Pixels that were hit in both halves by chance are no pattern.
+    chance = float(first.sum()) * float(second.sum()) / first.size
+    if far.sum() - others - chance >= max(_LEAST_OUTLIERS, _SURE * chance**0.5):
         shared = _cross(model.early[:, far], model.late[:, far])
         odd = _gain(_positive(shared, variance_dn2, 0.0), variance_dn2, trained)
     early, late = (np.where(far, 0.0, half) for half in (model.early, model.late))

@@ -12,7 +12,8 @@ from scipy.stats import norm, poisson
 from analysis.mismatch.bank.coherent import SpectrumSums
 from analysis.mismatch.bank.home import LAG, homes, one_sided
 from analysis.mismatch.bank.key import Key
-from analysis.mismatch.bank.maps import STANDING_OUT, WHOLE, parts
+from analysis.mismatch.bank.parts import STANDING_OUT, parts
+from analysis.mismatch.bank.seams import WHOLE
 from analysis.mismatch.bank.together import TOGETHER
 from dsis.cfa import Cfa
 from dsis.measures import Accumulator

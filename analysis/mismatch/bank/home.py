@@ -9,7 +9,9 @@ from collections.abc import Mapping, Sequence
 from analysis.mismatch.bank.coherent import OUTSTANDING
 from analysis.mismatch.bank.common import SIGNS
 from analysis.mismatch.bank.key import MOSAIC, Key
-from analysis.mismatch.bank.maps import LOW, STANDING_OUT, WHOLE
+from analysis.mismatch.bank.parts import STANDING_OUT
+from analysis.mismatch.bank.seams import WHOLE
+from analysis.mismatch.bank.surfaces import LOW
 from analysis.mismatch.bank.together import TOGETHER
 
 BOTH = "along rows and columns"

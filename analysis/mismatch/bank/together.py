@@ -10,8 +10,10 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.mismatch.bank.maps import WHOLE, Parts, slopes, surfaces
+from analysis.mismatch.bank.parts import Parts
 from analysis.mismatch.bank.scalars import Number, ratio_root
+from analysis.mismatch.bank.seams import WHOLE
+from analysis.mismatch.bank.surfaces import slopes, surfaces
 
 Array = NDArray[np.float64]
 TOGETHER = "all channels"

@@ -1,0 +1,117 @@
+"""The parts of a map: pixels, lines and smooth surfaces, and the numbers of each."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import log, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.mismatch.bank.scalars import Number, ratio_root
+from analysis.mismatch.bank.seams import seams
+from analysis.mismatch.bank.surfaces import slopes, surfaces
+from dsis.compiled import kernel
+from dsis.measures.fixed_pattern import Smooth
+from dsis.measures.residuals import pixel_residuals
+
+Array = NDArray[np.float64]
+STANDING_OUT = (3.5, 5)  # standard deviations of a map above its middle
+
+
+@dataclass(frozen=True)
+class Parts:
+    """A map split by the hierarchy pixel -> row and column -> smooth surface.
+
+    Attributes
+    ----------
+    pixels
+        What is left of the map: (row, column).
+    rows, columns
+        Line means beyond smooth ones: (row), (column).
+    square
+        Mean square of the pixels per degree of freedom.
+    coefficients
+        Of smooth polynomials (row degree, column degree), in units of the map's noise.
+    numbers
+        The statistics.
+    """
+
+    pixels: Array
+    rows: Array
+    columns: Array
+    square: float
+    coefficients: Array
+    numbers: Mapping[str, Number]
+
+
+def parts(image: Array, noise: float) -> Parts:
+    """Return the hierarchy of a map (row, column) whose noise per pixel is known."""
+    n, m = image.shape
+    smooth = Smooth.of(n, m)
+    unit = (image - image.mean()) / noise
+    coefficients = smooth.coefficients(unit)
+    by_row, by_column, pixels, squares, scatter = pixel_residuals(
+        unit, smooth.weights(coefficients), smooth.across
+    )
+    dof = (n - 1) * (m - 1) - smooth.kinds
+    square = squares / dof
+    rows = by_row - smooth.along_rows @ (smooth.along_rows.T @ by_row)
+    columns = by_column - smooth.along_columns @ (smooth.along_columns.T @ by_column)
+    degree = smooth.degree
+    row = m * float(rows @ rows) / (n - 1 - degree)
+    column = n * float(columns @ columns) / (m - 1 - degree)
+    mean_square = squares / pixels.size
+    numbers = {
+        "fixed_pixel_variance": ratio_root(square, dof),
+        "fixed_row_variance": ratio_root(row / square, n - 1 - degree, dof),
+        "fixed_column_variance": ratio_root(column / square, m - 1 - degree, dof),
+        **surfaces(coefficients, (row, column, square), dof),
+        **slopes(coefficients, (row, column, square), image.shape),
+        **_correlations(pixels, mean_square),
+        "outlying_pixels": _outlying(scatter + mean_square**2, square, pixels.size),
+        **_standing_out(pixels, square),
+        **seams(by_row, by_column, (row, column)),
+    }
+    return Parts(pixels, rows, columns, square, coefficients, numbers)
+
+
+def _correlations(pixels: Array, square: float) -> dict[str, Number]:
+    n, m = pixels.shape
+    sd = 1 / sqrt(pixels.size)
+    beside, below = _neighbours(pixels)
+    return {
+        "fixed_correlation_0_1": (float(beside) / (n * (m - 1)) / square, sd),
+        "fixed_correlation_1_0": (float(below) / ((n - 1) * m) / square, sd),
+    }
+
+
+@kernel
+def _neighbours(pixels: Array) -> tuple[float, float]:
+    """Return the sums of products of neighbours in a row, and in a column."""
+    rows, columns = pixels.shape
+    beside, below = 0.0, 0.0
+    for y in range(rows):
+        line, total = pixels[y], 0.0
+        for x in range(1, columns):
+            total += line[x - 1] * line[x]
+        beside += total
+        if y:
+            total, above = 0.0, pixels[y - 1]
+            for x in range(columns):
+                total += above[x] * line[x]
+            below += total
+    return beside, below
+
+
+def _outlying(fourth: float, square: float, size: int) -> Number:
+    """Return the excess kurtosis of a map: few pixels that stand far out."""
+    return log(max(fourth / square**2, 0.1) / 3), sqrt(24 / size) / 3
+
+
+def _standing_out(pixels: Array, square: float) -> dict[str, Number]:
+    """Return how many pixels lie far above the others, as twice the root (Anscombe 1948)."""
+    sd = sqrt(square)
+    return {
+        f"outlying_pixels of {limit:g}": (2 * sqrt((pixels > limit * sd).sum() + 3 / 8), 1.0)
+        for limit in STANDING_OUT
+    }

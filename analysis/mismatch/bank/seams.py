@@ -1,0 +1,44 @@
+"""Steps of a map: between its halves, and between even and odd lines."""
+
+from functools import lru_cache
+from math import sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.mismatch.bank.scalars import Number
+
+Array = NDArray[np.float64]
+WHOLE = "halves as a whole"
+
+
+def seams(by_row: Array, by_column: Array, squares: tuple[float, float]) -> dict[str, Number]:
+    """Return the step between halves, and between even and odd lines, in its own noise.
+
+    Each is the coefficient of its shape beside smooth polynomials, over its error; that of halves
+    as a whole is not, and sees a tilt too.
+    """
+    found: dict[str, Number] = {}
+    for axis, means, square, across in (
+        ("rows", by_row, squares[0], by_column.size),
+        ("columns", by_column, squares[1], by_row.size),
+    ):
+        sd = sqrt(square / across)
+        for name, shape in zip(("half_seam", "parity"), _seam_shapes(means.size), strict=True):
+            found[f"{name} of {axis}"] = (float(shape @ means) / sd, 1.0)
+        half = np.where(np.arange(means.size) < means.size / 2, -1.0, 1.0)
+        half = (half - half.mean()) / (sqrt(means.size) * half.std())
+        found[f"half_seam of {axis}, {WHOLE}"] = (float(half @ means) / sd, 1.0)
+    return found
+
+
+@lru_cache(maxsize=64)
+def _seam_shapes(size: int) -> tuple[Array, Array]:
+    """Return the step between halves and the comb, less smooth polynomials, of norm 1."""
+    place, line = np.linspace(-1, 1, size), np.arange(size)
+    smooth = np.polynomial.legendre.legvander(place, min(4, size - 3))
+    step, comb = np.where(line < size / 2, -0.5, 0.5), np.where(line % 2 == 0, -0.5, 0.5)
+    both = np.stack([step, comb], 1)
+    rest = both - smooth @ np.linalg.lstsq(smooth, both, rcond=None)[0]
+    rest /= np.linalg.norm(rest, axis=0)
+    return np.ascontiguousarray(rest[:, 0]), np.ascontiguousarray(rest[:, 1])

@@ -79,28 +79,39 @@ def find_mismatch(
         return source.frames(name, numbers[name])
 
     trial = Trial.of(recording, split, source, setting)
-    # Whether anything differs is asked of all frames; what it is, of those that are not locked.
-    judged = setting
-    if samples <= _LARGE:
-        layout, seen = trial.numbers.whole
-        judged = replace(setting, layout=layout, seen=seen)
-    everything = base if judged is setting else State.of(judged, camera, step)
-    base = replace(base, mismatches=everything.mismatches)
-    search = Search(setting, camera, base, words, step, frames_of=frames_of)
-    final = _searched(search, source) if samples > _LARGE else search.run()
-    if samples > _LARGE:  # simulations of large recordings tell more, and cost more
+    large = samples > _LARGE
+    whole = base if large else _of_all_frames(camera, setting, trial, step)
+    search = Search(
+        setting,
+        camera,
+        replace(base, mismatches=whole.mismatches),
+        words,
+        step,
+        frames_of=frames_of,
+    )
+    final = _searched(search, source) if large else search.run()
+    if large:  # simulations of large recordings tell more, and cost more
         search.setting = replace(setting, nulls=setting.drafts)
     final, gains = _proven(search, search.settle(final), trial)
-    proof = trial.proof(base, final, step, source)
-    evidence = evidence_of(base, final, album, split)
-    if judged is not setting:
-        search.setting, search.base = judged, everything
-        base = everything
-        final = State.of(judged, final.camera, step) if search.named else everything
-        departures = Change(len(base.mismatches), len(final.mismatches))
+    proof = trial.proof(search.base, final, step, source)
+    evidence = evidence_of(search.base, final, album, split)
+    if not large:
+        final = State.of(whole.setting, final.camera, step) if search.named else whole
+        departures = Change(len(whole.mismatches), len(final.mismatches))
         proof = replace(proof, discrepancies=departures)
-    found = _finding(camera, base, final, search, gains, proof)
+    found = _finding(camera, whole, final, search, gains, proof)
     return replace(found, remarks=(*remarks, *found.remarks), evidence=evidence)
+
+
+def _of_all_frames(
+    camera: Camera, setting: Setting, trial: Trial, step: Callable[[], None]
+) -> State:
+    """Return the base state of all frames, the locked ones too.
+
+    Whether anything differs is asked of all; what it is, of those that are not locked.
+    """
+    layout, seen = trial.numbers.whole
+    return State.of(replace(setting, layout=layout, seen=seen), camera, step)
 
 
 def _searched(search: Search, source: Source) -> State:
@@ -145,7 +156,7 @@ def _finding(
     proof: Proof,
 ) -> Finding:
     errors = parameter_errors(camera, final.calibrated, final.setting.layout, final.fits)
-    explanations = explained(base, final, search.changes(final))
+    explanations = explained(base, final, search.changes(base, final))
     mismatches = tuple(
         replace(m, explained_by=explanations[m.statistic][0], z_after=explanations[m.statistic][1])
         for m in base.mismatches

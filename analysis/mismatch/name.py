@@ -115,18 +115,18 @@ class Search:
         self.named.remove(named)
         return State.of(self.setting, self.without(state, named), self.step)
 
-    def changes(self, state: State) -> dict[str, Array]:
+    def changes(self, base: State, final: State) -> dict[str, Array]:
         """Return what each effect named changes in the numbers, in deviations of the base null."""
-        base = self.base.null
+        null = base.null
         found = {}
-        predictor = state.predictor() if self.named else None
+        predictor = final.predictor() if self.named else None
         for named in self.named:
             if named.proposal is None or predictor is None:
-                change = _bent(self.base, state)
+                change = _bent(base, final)
             else:
-                change = state.null.mean - predictor.mean(self.without(state, named))
-            known = base.known & np.isfinite(change)
-            found[named.kind] = np.where(known, change, 0.0) / base.sd
+                change = final.null.mean - predictor.mean(self.without(final, named))
+            known = null.known & np.isfinite(change)
+            found[named.kind] = np.where(known, change, 0.0) / null.sd
         return found
 
     def _best(self, state: State) -> tuple[Named, Camera] | None:

@@ -9,6 +9,7 @@ from analysis.mismatch.candidates.candidate import Candidate, Proposal, proposal
 from analysis.mismatch.clues import Clues
 
 _SWITCHING = (0.35, 0.1)  # a frame: seen in the noise, and in maps of few frames too
+_SPIKED = 1.1  # times the variance without impulses, from which their share of it is known
 
 
 def _poisson(clues: Clues) -> Sequence[Proposal]:
@@ -59,11 +60,16 @@ def _impulse(clues: Clues) -> Sequence[Proposal]:
     k, _ = clues.amplitude("kurtosis", lambda place: clues.read_share(place) ** 2)
     if k <= 0:
         return []
-    place = min(clues.places, key=lambda p: clues.seen.levels[p].variance_dn2)
-    v = clues.seen.levels[place].variance_dn2
+    place = min(clues.places, key=lambda p: clues.layout.variance_dn2[p])
+    # Between the 16th and the 84th percentile there are no impulses.
+    v, without = clues.seen.levels[place].variance_dn2, clues.layout.variance_dn2[place]
+    means = [height * sqrt(without) for height in (20.0, 100.0, 500.0)]
+    if v > _SPIKED * without:
+        # E[h^2] = 2 mean^2 and E[h^4] = 24 mean^4 say both numbers.
+        means.append(sqrt(k * v**2 / (12 * (v - without))))
+    most = clues.layout.white_dn - clues.layout.black_dn
     found: list[Proposal] = []
-    for height in (20.0, 100.0, 500.0):
-        mean = height * sqrt(v)
+    for mean in (min(mean, most) for mean in means):
         # E[h^4] = 24 mean^4: kurtosis p 24 mean^4 / V^2.
         rate = k * v**2 / (24 * mean**4) * 1e6
         if rate > 0.01:

@@ -102,7 +102,8 @@ def virtual_sensor(camera: Camera, held: Held, signals: Signals, seed: int) -> d
             )
             for number in range(exposure.trained + fresh)
         ]
-        whole = np.stack(frames)
+        # What is far above white would move means as no code can.
+        whole = np.minimum(np.stack(frames), np.float32(held.white_code - held.black_dn))
         stacks[exposure.name] = Stack(whole[: exposure.trained], whole[exposure.trained :])
     return stacks
 

@@ -19,7 +19,7 @@ from analysis.mismatch.report.figures import MOST, curves, pictures, series
 from analysis.mismatch.report.figures.spectra import folded
 from analysis.mismatch.report.numbers import measured
 from analysis.mismatch.report.sentences import numbers_in_short
-from analysis.mismatch.report.words import effect_says, effect_words
+from analysis.mismatch.words import effect_says, effect_words
 from dsis.effects import registry
 from mismatch_findings import FOUND, LINE, NAMED, NAN, NOTHING, ROWS, evidence
 

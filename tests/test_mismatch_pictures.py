@@ -22,11 +22,11 @@ from analysis.mismatch.pictures.album import Counts
 from analysis.mismatch.pictures.natural import UNITS, Scale, back
 from analysis.mismatch.report import figures
 from analysis.mismatch.report.figures import pictures
-from analysis.mismatch.report.words import STATISTICS
 from analysis.mismatch.source import Source
 from analysis.mismatch.split import Split
 from analysis.mismatch.state import Setting, State
 from analysis.mismatch.taking import layout_of
+from analysis.mismatch.words import STATISTICS
 from dsis.camera import BaseNoise, Camera, Segment
 from dsis.cfa import Cfa
 from dsis.effects import Effect, registry

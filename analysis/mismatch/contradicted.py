@@ -7,6 +7,7 @@ import numpy as np
 from analysis.mismatch.candidates import CANDIDATES
 from analysis.mismatch.predict import Predictor
 from analysis.mismatch.state import State
+from analysis.mismatch.words import statistic_words
 from dsis.camera import Camera
 
 _LEAST_SHARE = 0.5  # of what an effect predicts, that a recording must show
@@ -49,6 +50,7 @@ def contradicted(state: State, predictor: Predictor, kind: str, without: Camera)
         square = float(own @ own)
         share = 1 + float(own @ rest) / square
         if share + _SURE / np.sqrt(square) < _LEAST_SHARE:
-            why = f"the recording shows {max(share, 0):.0%} of what it predicts of {statistic}"
+            words = statistic_words(statistic)
+            why = f"the recording shows {max(share, 0):.0%} of the change it predicts in: {words}"
             found.append(Denial(share, why))
     return min(found, key=lambda denial: denial.share, default=None)

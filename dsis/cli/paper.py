@@ -21,7 +21,7 @@ def add_paper(add: Add) -> None:
     sub.add_argument("names", nargs="*", metavar="NAME", help=names)
     sub.add_argument("--out", type=Path, default=Path("dsis-paper"), metavar="DIR")
     full = (
-        "20 frames of 1920 x 1080, about 1.5 processor hours; "
+        "20 frames of 1920 x 1080, about an hour of one processor; "
         "default: 1 frame of 480 x 270, minutes"
     )
     sub.add_argument("--full", action="store_true", help=full)

@@ -21,7 +21,7 @@ from analysis.mismatch.report.sentences import (
     strongest,
     verdict,
 )
-from analysis.mismatch.report.words import (
+from analysis.mismatch.words import (
     effect_says,
     effect_words,
     listed,

@@ -16,7 +16,7 @@ from analysis.mismatch.finding import (
     ParameterError,
 )
 from analysis.mismatch.report.numbers import interval, measured, plain
-from analysis.mismatch.report.words import effect_words, place, statistic_words, unit
+from analysis.mismatch.words import effect_words, place, statistic_words, unit
 
 _NAMED = 3
 

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from analysis.mismatch.finding import Change, Finding
 from analysis.mismatch.report.numbers import plain
 from analysis.mismatch.report.sentences import considered, fitted, gain, strongest, verdict
-from analysis.mismatch.report.words import effect_words, place, statistic_words
+from analysis.mismatch.words import effect_words, place, statistic_words
 
 _SHOWN = 8
 

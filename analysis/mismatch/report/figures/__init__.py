@@ -25,7 +25,7 @@ from analysis.mismatch.report.figures import (
     spectra,
 )
 from analysis.mismatch.report.sentences import strongest
-from analysis.mismatch.report.words import parted, statistic_words
+from analysis.mismatch.words import parted, statistic_words
 
 MOST = 12  # pictures on a page
 MAPPED = ("fixed_", "half_seam", "parity", "outlying_pixels")

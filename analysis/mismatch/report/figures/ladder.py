@@ -11,7 +11,7 @@ from matplotlib.ticker import MaxNLocator, SymmetricalLogLocator
 from analysis.figures import COLOURS, GREY, INK
 from analysis.mismatch.finding import Finding, Gain
 from analysis.mismatch.report.figures.ticks import plain_numbers
-from analysis.mismatch.report.words import effect_words
+from analysis.mismatch.words import effect_words
 
 _LINEAR = 1.0  # nats per frame: within, the scale is linear
 LOOKS = {

@@ -87,12 +87,7 @@ def ratio(
     """
     may = may & everything.known & before.known
     scales = _scales((everything, before), names, may)
-    seen, one, other = (
-        all_of_them - earlier
-        for all_of_them, earlier in zip(
-            _sums(everything, scales, may), _sums(before, scales, may), strict=True
-        )
-    )
+    seen, one, other = _sums((everything, before), scales, may)
     laws = [scipy.stats.t(len(x) - 1, x.mean(), _wide(x)) for x in (one, other)]
     if not all(_wide(x) > 0 for x in (one, other)):
         return None
@@ -123,30 +118,28 @@ def _scales(parts: Sequence[Numbers], names: Sequence[Hashable], may: NDArray[np
     return scales
 
 
-def _sums(numbers: Numbers, scales: Array, may: NDArray[np.bool_]) -> tuple[Array, Array, Array]:
-    """Return the weighted sums: recorded (1,), and of recordings with and without the effect."""
-    sd = (numbers.errors * scales)[may]
-    one, other = numbers.one[:, may], numbers.other[:, may]
-    count = len(one)
+def _sums(
+    parts: Sequence[Numbers], scales: Array, may: NDArray[np.bool_]
+) -> tuple[Array, Array, Array]:
+    """Return what is added: recorded (1,), and of recordings with and without the effect."""
+    sds = [(part.errors * scales)[may] for part in parts]
+    ones, others = [part.one[:, may] for part in parts], [part.other[:, may] for part in parts]
+    count = len(ones[0])
     first, second = np.empty(count), np.empty(count)
     for i in range(count):
         rest = np.arange(count) != i
-        of = _Score.of(one[rest], other[rest], sd)
-        first[i], second[i] = of(one[i]), of(other[i])
-    return np.array([_Score.of(one, other, sd)(numbers.recorded[may])]), first, second
+        added = _Added.of([x[rest] for x in ones], [x[rest] for x in others], sds)
+        first[i], second[i] = added([x[i] for x in ones]), added([x[i] for x in others])
+    recorded = [part.recorded[may] for part in parts]
+    return np.array([_Added.of(ones, others, sds)(recorded)]), first, second
 
 
 @dataclass(frozen=True)
 class _Score:
-    """A sum of numbers beside their mean without an effect, over their standard deviation.
-
-    `low` and `high` bound what one number can contribute; `weights` are changes by the effect.
-    """
+    """Numbers beside their mean without an effect, each times its weight."""
 
     mean: Array
     sd: Array
-    low: Array
-    high: Array
     weights: Array
 
     @classmethod
@@ -159,13 +152,46 @@ class _Score:
         change = difference.mean(0)
         noise = difference.var(0, ddof=1) / len(difference)
         kept = change**2 / np.maximum(change**2 + noise, np.finfo(float).tiny)
-        means = other.mean(0), one.mean(0)
-        wide = sd, np.maximum(sd, one.std(0, ddof=1))
-        low = np.minimum(*(m - _BEYOND * s for m, s in zip(means, wide, strict=True)))
-        high = np.maximum(*(m + _BEYOND * s for m, s in zip(means, wide, strict=True)))
-        return cls(means[0], sd, low, high, change * kept / sd)
+        return cls(other.mean(0), sd, change * kept / sd)
 
-    def __call__(self, values: Array) -> float:
-        """Return the score of one recording's numbers."""
-        bounded = np.clip(values, self.low, self.high)
-        return float(self.weights @ ((bounded - self.mean) / self.sd))
+    def __call__(self, values: Array) -> Array:
+        """Return the terms of the score, by number."""
+        return np.asarray(self.weights * ((values - self.mean) / self.sd))
+
+
+@dataclass(frozen=True)
+class _Added:
+    """What further frames add to the score of those before.
+
+    `low` and `high` bound what one number can add. Bounds of the scores themselves would not do:
+    of a number far off in the frames before, more would be let through in all frames, for there it
+    is better known, and the difference would say so of frames that show nothing.
+    """
+
+    everything: _Score
+    before: _Score
+    low: Array
+    high: Array
+
+    @classmethod
+    def of(cls, ones: Sequence[Array], others: Sequence[Array], sds: Sequence[Array]) -> "_Added":
+        """Return it of simulations of all frames and of those before, in this order."""
+        everything, before = (
+            _Score.of(one, other, sd) for one, other, sd in zip(ones, others, sds, strict=True)
+        )
+        # Additions are independent of the score before, so that variances add: that of a score's
+        # term is its weight squared.
+        square = everything.weights**2 - before.weights**2
+        one, other = (everything(of[0]) - before(of[1]) for of in (ones, others))
+        sd = np.sqrt(np.maximum(square, 0.0))
+        ends = [
+            (own.mean(0) - _BEYOND * wide, own.mean(0) + _BEYOND * wide)
+            for own, wide in ((other, sd), (one, np.maximum(sd, one.std(0, ddof=1))))
+        ]
+        low, high = np.minimum(ends[0][0], ends[1][0]), np.maximum(ends[0][1], ends[1][1])
+        return cls(everything, before, low, high)
+
+    def __call__(self, values: Sequence[Array]) -> float:
+        """Return what is added by one recording's numbers, of all frames and of those before."""
+        terms = self.everything(values[0]) - self.before(values[1])
+        return float(np.clip(terms, self.low, self.high).sum())

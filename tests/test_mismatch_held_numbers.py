@@ -1,0 +1,57 @@
+"""Numbers of locked frames: an effect gains by them where it is there, and only there."""
+
+import pytest
+
+from analysis.mismatch import heldnumbers
+from analysis.mismatch.heldnumbers import HeldNumbers
+from analysis.mismatch.observe import observe
+from analysis.mismatch.source import Source
+from analysis.mismatch.split import Split
+from analysis.mismatch.state import Setting, State
+from analysis.mismatch.taking import layout_of
+from analysis.mismatch.vector import vector
+from dsis.camera import Camera
+from dsis.effects.row_noise import RowNoise
+from mismatch_recordings import camera, recorded
+
+LEVELS = (100.0, 500.0, 1600.0)
+# DN; of the 4.5 DN of a pixel the mean of a row of 128 has 0.4.
+EFFECT = RowNoise(sigma_dn=0.3)
+
+
+def held(true: Camera, model: Camera, seed: int) -> tuple[HeldNumbers, State]:
+    """Return the locked frames' numbers of a recording, and the state of the others."""
+    recording = recorded(true, seed, rows=64, columns=128, levels=LEVELS)
+    split, source = Split.of(recording), Source(recording)
+    layout = layout_of(recording, split.development, source.frames)
+    numbers = {e.name: e.numbers for e in layout.exposures}
+    seen = observe(layout, lambda name: source.frames(name, numbers[name]), keep=True)
+    setting = Setting(layout, seen, None, 0, 1, 16, 16, 2, 2, 4)
+    state = State.of(setting, model, lambda: None)
+    return HeldNumbers(recording, split, source, setting), state
+
+
+@pytest.mark.parametrize("there", [True, False])
+def test_an_effect_gains_where_it_is(there: bool) -> None:
+    with_it, without = camera(EFFECT), camera()
+    numbers, final = held(with_it if there else without, with_it, 7)
+    told = numbers.gain(final, final.camera.model_copy(update={"effect": ()}))
+    assert told is not None
+    assert told.certain == there
+    assert (told.nats > 0) == there
+
+
+def test_frames_that_are_kept_show_what_they_show_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Simulated frames that are not locked: picked from among all, or made again alone."""
+    numbers, state = held(camera(), camera(), 8)
+    whole, rest = numbers.whole[0], numbers.setting.layout
+    calibrated = state.calibrated
+
+    def values() -> list[float]:
+        frames = (calibrated.model.frames(layout, 0, 3) for layout in (whole, rest))
+        seen = heldnumbers._observed(whole, rest, *frames)[1]
+        return vector(rest, seen, calibrated.refit(rest, seen.levels)).values.tolist()
+
+    kept = values()
+    monkeypatch.setattr(heldnumbers, "_MOST_KEPT", 0)
+    assert kept == pytest.approx(values(), rel=1e-12, nan_ok=True)

@@ -1,6 +1,8 @@
 """Numbers of locked frames: an effect gains by them where it is there, and only there."""
 
+import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from analysis.mismatch import heldnumbers
 from analysis.mismatch.heldnumbers import HeldNumbers
@@ -19,9 +21,11 @@ LEVELS = (100.0, 500.0, 1600.0)
 EFFECT = RowNoise(sigma_dn=0.3)
 
 
-def held(true: Camera, model: Camera, seed: int) -> tuple[HeldNumbers, State]:
+def held(
+    true: Camera, model: Camera, seed: int, scene: NDArray[np.float32] | None = None
+) -> tuple[HeldNumbers, State]:
     """Return the locked frames' numbers of a recording, and the state of the others."""
-    recording = recorded(true, seed, rows=64, columns=128, levels=LEVELS)
+    recording = recorded(true, seed, rows=64, columns=128, levels=LEVELS, scene=scene)
     split, source = Split.of(recording), Source(recording)
     layout = layout_of(recording, split.development, source.frames)
     numbers = {e.name: e.numbers for e in layout.exposures}
@@ -39,6 +43,27 @@ def test_an_effect_gains_where_it_is(there: bool) -> None:
     assert told is not None
     assert told.certain == there
     assert (told.nats > 0) == there
+
+
+def test_a_scene_that_more_frames_tell_apart_more_finely_is_no_hindrance() -> None:
+    """Of a picture of little contrast, all frames show more ranges of signal than some of them."""
+    cells = np.random.default_rng(1).uniform(-1, 1, (8, 16)).astype(np.float32)
+    shape = np.repeat(np.repeat(cells, 8, 0), 8, 1)
+    for contrast in range(16, 60, 2):
+        scene = 500 + contrast * shape
+        recording = recorded(camera(EFFECT), 7, rows=64, columns=128, levels=LEVELS, scene=scene)
+        split, source = Split.of(recording), Source(recording)
+        fine, coarse = (
+            len(layout_of(recording, which, source.frames).scenes["scene"].channels["MONO"].bins)
+            for which in (split.all_of_development, split.development)
+        )
+        if fine > coarse:
+            break
+    assert fine > coarse
+    numbers, final = held(camera(EFFECT), camera(EFFECT), 7, scene)
+    told = numbers.gain(final, camera())
+    assert told is not None
+    assert told.certain
 
 
 def test_frames_that_are_kept_show_what_they_show_anew(monkeypatch: pytest.MonkeyPatch) -> None:

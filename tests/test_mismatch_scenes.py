@@ -27,6 +27,7 @@ LEVELS = {"dark-0": 0.0, "dark-1": 0.0, "flat-0": 60.0, "flat-1": 300.0, "flat-2
           "flat-3": 2000.0}  # fmt: skip
 SCENES = {"street": 800.0, "room": 250.0}
 SURE = 5.0
+LOCKED = 7  # a frame that is locked
 RIVALS = frozenset(
     {"row_noise", "line_flicker", "flicker", "image_lag", "rts", "crosstalk", "spatial_filtering"}
 )
@@ -205,11 +206,11 @@ def test_noise_of_bright_places_is_located_by_signal(tmp_path: Path) -> None:
     assert where.signal_dn[0] > 500  # the bin that holds 1000
 
 
-def test_a_scene_that_shifts_is_left_out(tmp_path: Path) -> None:
+@pytest.mark.parametrize("frames", ["all", "a locked one"])
+def test_a_scene_that_shifts_is_left_out(frames: str, tmp_path: Path) -> None:
     def pan(_rng: np.random.Generator, name: str, light: Array, frame: int) -> Array:
-        return (
-            shift(light, (0, 0.2 * frame), order=1, mode="nearest") if name == "street" else light
-        )
+        path = 0.2 * frame if frames == "all" else 1.5 * (frame == LOCKED)
+        return shift(light, (0, path), order=1, mode="nearest") if name == "street" else light
 
     finding = found(recorded(tmp_path, 8, light=pan))
     assert finding.verdict == "match"

@@ -61,9 +61,13 @@ def find_mismatch(
 
     recording = whole_cells(recording)
     split = Split.of(recording)
-    development = split.development
     source = Source(recording)
+    # What moves in a locked frame only is no static scene either.
+    moving = layout_of(recording, split.all_of_development, source.frames).moving
+    split = split.without(moving)
+    development = split.development
     layout = layout_of(recording, development, source.frames)
+    layout = replace(layout, moving=(*moving, *layout.moving))
     numbers = {e.name: e.numbers for e in layout.exposures}
     remarks = remarks_on(recording, development, layout)
     split = split.without(layout.moving)

@@ -6,13 +6,14 @@ as it should.
 """
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.mismatch.bank.key import Key
 from analysis.mismatch.given import Numbers, Ratio, ratio
 from analysis.mismatch.layout import Layout
 from analysis.mismatch.model import in_threads
@@ -84,10 +85,11 @@ class HeldNumbers:
         layout, seen = self.whole
         parts = ((layout, seen), (self.setting.layout, self.setting.seen))
         recorded = [_vector_of(yardstick, *part) for part in parts]
+        keys, places = _shared(recorded)
         whole, rest = (
-            Numbers(own.values, one[i], other[i], own.errors) for i, own in enumerate(recorded)
+            Numbers(own.values[of], one[i][:, of], other[i][:, of], own.errors[of])
+            for i, (own, of) in enumerate(zip(recorded, places, strict=True))
         )
-        keys = final.vector.keys
         mine, theirs = Counter(final.camera.effect), Counter(without.effect)
         effects = list(((mine - theirs) + (theirs - mine)).keys())
         may = touched(keys, effects) if effects else np.ones(len(keys), bool)
@@ -135,6 +137,16 @@ def _yardstick(final: State, without: Camera) -> Calibrated:
 
 def _vector_of(calibrated: Calibrated, layout: Layout, seen: Observation) -> Vector:
     return vector(layout, seen, calibrated.refit(layout, seen.levels))
+
+
+def _shared(parts: Sequence[Vector]) -> tuple[list[Key], list[list[int]]]:
+    """Return what all have a number of, and where each has it.
+
+    More frames may tell apart more ranges of a scene's signal: those are other numbers.
+    """
+    places = [{key: i for i, key in enumerate(part.keys)} for part in parts]
+    keys = [key for key in parts[0].keys if all(key in own for own in places)]
+    return keys, [[own[key] for key in keys] for own in places]
 
 
 def _samples(layout: Layout) -> int:

@@ -41,6 +41,14 @@ class Split:
             for name in names
         }
 
+    @property
+    def all_of_development(self) -> dict[str, tuple[int, ...]]:
+        """All frames, the locked ones too, of exposures that have some in development."""
+        return {
+            name: tuple(sorted((*numbers, *self.locked.get(name, ()))))
+            for name, numbers in self.development.items()
+        }
+
     def without(self, names: Collection[str]) -> "Split":
         """Return the split without some exposures."""
         train, select, locked = (

@@ -1,5 +1,8 @@
 """Bands of light that cross a mosaic, and where a search for saturation starts."""
 
+from types import SimpleNamespace
+from typing import cast
+
 import numpy as np
 import pytest
 import scipy.stats
@@ -7,7 +10,9 @@ from numpy.typing import NDArray
 
 from analysis.mismatch.bank.bands import Bands
 from analysis.mismatch.bank.coherent import SpectrumSums
+from analysis.mismatch.candidates import temporal
 from analysis.mismatch.candidates.response import skewness_below
+from analysis.mismatch.clues import Clues
 from analysis.mismatch.layout import sites
 from dsis.cfa import Cfa
 from dsis.measures import Accumulator, Channel
@@ -55,6 +60,24 @@ def test_a_band_is_clearer_in_all_colours_together_and_where_it_is(cycles: float
     assert score(channels) > max(alone) + 2
     peak = bands_of(channels).peaks()["rows of light"]
     assert peak.fy * ROWS / 2 + peak.off == pytest.approx(cycles, abs=0.2)
+
+
+@pytest.mark.parametrize("cycles", [5.0, 8.25, 13.5, 20.75])
+def test_a_fit_starts_where_the_band_is_and_at_its_depth(cycles: float) -> None:
+    """Half bins lose 1 - sinc(1/4)^2 = 0.19 of the power, 0.1 of the depth, at most."""
+    depth, places = 0.01, [("flat", name) for name in SIGNAL]
+    clues = SimpleNamespace(
+        places=places,
+        signal=lambda place: SIGNAL[place[1]],
+        seen=SimpleNamespace(
+            levels={p: SimpleNamespace(variance_dn2=VARIANCE[p[1]]) for p in places}
+        ),
+        frames=lambda _: FRAMES,
+        shape=lambda _: (ROWS // 2, COLUMNS // 2),
+    )
+    peak = bands_of(recorded(np.random.default_rng(6), depth, cycles)).peaks()["rows of light"]
+    assert peak.fy * ROWS / 2 + peak.off == pytest.approx(cycles, abs=0.1)
+    assert 0.8 * depth < temporal._depth(cast(Clues, clues), "", peak) < 1.1 * depth
 
 
 def test_noise_alone_is_scored_as_a_normal_deviate_or_less() -> None:

@@ -38,6 +38,10 @@ def remarks_on(
             "cannot be told from it."
         )
     flats = [e for e in layout.uniform if e.kind == "flat"]
+    if not flats and not layout.scenes:
+        found.append(
+            "There are no flats: noise that grows with light and the response to it are not judged."
+        )
     if flats and any(e.light is None for e in flats):
         found.append(
             "The light of some flats is unknown: their levels cannot show a bent response."

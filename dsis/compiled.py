@@ -165,8 +165,10 @@ def over_rows(work: Callable[[int, int], None], rows: int, threads: int = 1) -> 
     try:
         take()
     finally:
-        wait(others)
-    for other in others:
+        # Who has not begun finds no block any more: it may stand behind work that calls this one.
+        begun = [other for other in others if not other.cancel()]
+        wait(begun)
+    for other in begun:
         other.result()
 
 

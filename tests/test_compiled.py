@@ -88,6 +88,25 @@ def test_rows_within_rows_and_from_many_threads_wait_for_nobody() -> None:
     assert (times == 4).all()
 
 
+def test_rows_within_rows_do_not_wait_for_those_around() -> None:
+    begun: list[int] = []
+    met, inner_is_done = threading.Barrier(2), threading.Event()
+
+    def outer(first: int, last: int) -> None:
+        del last
+        begun.append(first)
+        if len(begun) > 2:
+            return
+        met.wait(timeout=60)
+        if threading.current_thread() is threading.main_thread():
+            over_rows(lambda _first, _last: None, 4 * ROWS_PER_BLOCK, 2)
+            inner_is_done.set()
+        else:
+            assert inner_is_done.wait(timeout=10)
+
+    over_rows(outer, 6 * ROWS_PER_BLOCK, 2)
+
+
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="this system does not fork")
 @pytest.mark.filterwarnings("ignore:.*multi-threaded.*fork:DeprecationWarning")
 def test_threads_are_found_after_a_fork() -> None:

@@ -1,4 +1,4 @@
-"""Promise: exposures that are left out are left out of the proof too, and what is absent is said."""
+"""Promise: exposures that are left out prove nothing, and what a recording lacks is said."""
 
 from dataclasses import replace
 

@@ -48,4 +48,5 @@ def test_a_tilt_is_no_step_between_halves(direction: int) -> None:
     said = fixed(1 + GAIN_PERCENT / 100 * tilt)
     assert said is not None
     assert said.share < 0.5
-    assert direction < 0 or "half_seam" in said.why  # the wrong way round all else denies it too
+    # The wrong way round all else denies it too.
+    assert direction < 0 or "step between two halves" in said.why

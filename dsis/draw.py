@@ -190,7 +190,9 @@ class Draw:
         Fields of more than 4 million deviates are made anew.
         """
         if grid.rows * grid.columns > _MOST_KEPT:
-            return self.normal(purpose, grid, threads=threads)
+            field = self.normal(purpose, grid, threads=threads)
+            field.flags.writeable = False
+            return field
         return _kept(self, purpose, grid)
 
     def uniform(

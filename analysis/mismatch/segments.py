@@ -77,7 +77,9 @@ def _path(state: State, low: float, high: float) -> Path | None:
     before = _loglik((state.vector.values[which] - state.null.mean[which]) / state.null.sd[which])
     gain = _loglik(own / state.null.sd[which]) - before - _PENALTY
     camera = with_numbers(state.camera, fit, (switch,), layout.black_dn)
-    return Path(camera, switch, (high - low) / sqrt(12), gain)
+    # Anywhere between the levels: about the place that is taken, their geometric middle.
+    error = sqrt((high - low) ** 2 / 12 + ((low + high) / 2 - switch) ** 2)
+    return Path(camera, switch, error, gain)
 
 
 def _loglik(z: np.ndarray) -> float:

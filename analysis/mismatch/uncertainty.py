@@ -65,17 +65,18 @@ def settled(
     step = inverse @ (score @ rest)
     reach = float(scipy.stats.t.ppf(0.975, count - 1)) * np.sqrt(np.diag(sandwich))
     corrected = effects
-    for (i, name, signed), delta, half in zip(free, step, reach, strict=True):
+    for (i, name, signed), delta in zip(free, step, strict=True):
         limited = float(delta if signed else np.clip(delta, -_LARGEST, _LARGEST))
         changed = moved(corrected, i, name, signed, limited, as_is=True)
         corrected = corrected if changed is None else changed[0]
-        value = abs(float(getattr(corrected[i], name)))
-        own = half if signed else value * np.sinh(min(half, _FARTHEST))
-        errors[i][name] = float(own) / _NORMAL
     # Where a parameter acts by a threshold the step is no guide: it must not make things worse.
     predictor, camera = state.predictor(), with_effects(bare, corrected)
     if camera is None or predictor.loglik(predictor.mean(camera)) < predictor.loglik(mean):
-        return effects, errors
+        corrected = effects
+    for (i, name, signed), half in zip(free, reach, strict=True):
+        value = abs(float(getattr(corrected[i], name)))
+        own = half if signed else value * np.sinh(min(half, _FARTHEST))
+        errors[i][name] = float(own) / _NORMAL
     return corrected, errors
 
 

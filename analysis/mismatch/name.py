@@ -222,11 +222,12 @@ class Search:
             if denied is not None:  # first: it may explain what is another's
                 state = self.drop(state, *denied)
                 continue
-            whole = predictor.loglik(state.null.mean)
             worst: tuple[float, Named, str] | None = None
             for named in mine:
                 mean = predictor.mean(self.without(state, named))
-                gain = whole - predictor.loglik(mean)
+                # Both models answer for the numbers that both know.
+                whole = np.where(np.isfinite(mean), state.null.mean, np.nan)
+                gain = predictor.loglik(whole) - predictor.loglik(mean)
                 share = resolved(predictor, state, mean)
                 reason = ""
                 if gain < LEAST_GAIN:

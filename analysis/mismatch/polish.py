@@ -1,6 +1,6 @@
 """Parameters of effects by Gauss-Newton steps on the bank's numbers, predicted by simulation."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import exp, log
 
@@ -104,15 +104,20 @@ def jacobian(
     mean: Array,
 ) -> Array:
     """Return how the predicted numbers move with each free parameter: (number, parameter)."""
-    columns = []
+    columns = [
+        np.zeros_like(mean) if other is None else (predictor.mean(other) - mean) / step
+        for other, step in shifted(camera, effects, free)
+    ]
+    return np.stack(columns, 1)
+
+
+def shifted(
+    camera: Camera, effects: tuple[Effect, ...], free: Sequence[Free]
+) -> Iterator[tuple[Camera | None, float]]:
+    """Yield the camera with each free parameter moved in turn, or None, and by how much."""
     for i, name, signed in free:
         other = moved(effects, i, name, signed, STEP)
-        shifted = None if other is None else with_effects(camera, other[0])
-        if other is None or shifted is None:
-            columns.append(np.zeros_like(mean))
-        else:
-            columns.append((predictor.mean(shifted) - mean) / other[1])
-    return np.stack(columns, 1)
+        yield (None, 1.0) if other is None else (with_effects(camera, other[0]), other[1])
 
 
 def information(predictor: Predictor, mean: Array, j: Array) -> tuple[Array, Array]:

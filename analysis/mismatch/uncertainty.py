@@ -16,7 +16,7 @@ import scipy.stats
 from numpy.typing import NDArray
 
 from analysis.mismatch.candidates import Proposal
-from analysis.mismatch.polish import STEP, Free, moved, precisions, with_effects
+from analysis.mismatch.polish import Free, moved, precisions, shifted, with_effects
 from analysis.mismatch.predict import Predictor
 from analysis.mismatch.state import State
 from dsis.camera import Camera
@@ -106,14 +106,10 @@ def _slopes(
     predictor: Predictor, bare: Camera, effects: tuple[Effect, ...], free: Sequence[Free]
 ) -> Array:
     """Return how numbers move with each parameter: (replicate, number, parameter)."""
-    columns = []
-    for i, name, signed in free:
-        other = moved(effects, i, name, signed, STEP)
-        shifted = None if other is None else with_effects(bare, other[0])
-        if other is None or shifted is None:
-            columns.append(np.zeros_like(predictor.base))
-        else:
-            columns.append(predictor.changes(shifted) / other[1])
+    columns = [
+        np.zeros_like(predictor.base) if other is None else predictor.changes(other) / step
+        for other, step in shifted(bare, effects, free)
+    ]
     return np.stack(columns, 2)
 
 

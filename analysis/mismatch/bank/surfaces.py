@@ -45,14 +45,8 @@ def slopes(
 ) -> dict[str, Number]:
     """Return the tilt along each axis and the fall to the corners, each in its own noise.
 
-    Parameters
-    ----------
-    coefficients
-        (row degree, column degree), in units of the map's noise.
-    squares
-        Mean squares of rows, columns and pixels.
-    shape
-        Rows and columns: a fall with the distance from the centre bends along both.
+    Of the same coefficients and squares as `surfaces`; by the shape, rows and columns, a fall with
+    the distance from the centre bends along both.
     """
     row, column, square = squares
     if len(coefficients) < 3:

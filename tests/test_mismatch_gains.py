@@ -31,16 +31,49 @@ def test_one_locked_frame_tells_no_interval() -> None:
 def test_gap_closed() -> None:
     """Normal measures, 300 of them, off by 3 standard deviations before: closed forms.
 
-    D0 - Df = 9; D1 - Df is 0, 9 or 9/4 on average, its standard error some sqrt(8 / 300) / 9 and
-    the shared spread estimate's: 0.05 in all.
+    D0 - Df = 9; D1 - Df is 0, 9 or 9/4 on average, its standard error some sqrt(8 / 300) / 9.
     """
     rng = np.random.default_rng(7)
     n, k = 300, 12
     after = rng.standard_normal((k, n)) * 2
     x = rng.standard_normal(n) * 2
     before = rng.standard_normal((k, n)) * 2 + 6
-    assert gap_closed(x, before, after) == pytest.approx(1, abs=0.25)
-    assert gap_closed(x + 6, after, after + 3) == pytest.approx(0.75, abs=0.25)
-    assert gap_closed(x, before, before) == pytest.approx(0, abs=0.25)
-    assert gap_closed(x, rng.standard_normal((k, n)) * 2, after) is None
-    assert gap_closed(np.full(n, np.nan), before, after) is None
+    sd = np.full(n, 2.0)
+    assert gap_closed(x, before, after, sd) == pytest.approx(1, abs=0.1)
+    assert gap_closed(x + 6, after, after + 3, sd) == pytest.approx(0.75, abs=0.1)
+    assert gap_closed(x, before, before, sd) == pytest.approx(0, abs=0.1)
+    assert gap_closed(x, rng.standard_normal((k, n)) * 2, after, sd) is None
+    assert gap_closed(np.full(n, np.nan), before, after, sd) is None
+    assert gap_closed(x, before, after, np.full(n, np.nan)) is None
+
+
+def test_gap_knows_how_far_numbers_hang_together() -> None:
+    """One disturbance in all of 300 numbers: a distance of 3 in each is no more than chance.
+
+    Independent, 300 numbers that are off by 1.5 each leave a gap that is open.
+    """
+    rng = np.random.default_rng(8)
+    n, k = 300, 12
+    sd = np.ones(n)
+    shared = rng.standard_normal((k, 1)) + 0.01 * rng.standard_normal((k, n))
+    assert gap_closed(np.full(n, 2.0), np.zeros((k, n)) - 0.5, shared, sd) is None
+    alone = rng.standard_normal((k, n))
+    assert gap_closed(rng.standard_normal(n) + 1.5, alone, alone + 1.5, sd) == pytest.approx(
+        1, abs=0.15
+    )
+
+
+def test_gap_is_not_that_of_numbers_nearly_without_spread() -> None:
+    """A count that nearly always is the same has next to no spread among few simulations.
+
+    Given its spread it weighs as one of 301 numbers, not as all of them.
+    """
+    rng = np.random.default_rng(9)
+    n, k = 301, 8
+    sd = np.ones(n)
+    before, after = rng.standard_normal((k, n)), rng.standard_normal((k, n)) + 2
+    x = rng.standard_normal(n) + 2
+    for sims in (before, after):
+        sims[:, 0] = 1e-9 * np.arange(k)
+    x[0] = 1.0
+    assert gap_closed(x, before, after, sd) == pytest.approx(1, abs=0.15)

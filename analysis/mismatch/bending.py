@@ -11,6 +11,7 @@ from analysis.mismatch.layout import Layout, Place
 from analysis.mismatch.model import Model, in_threads
 from dsis.camera import Camera
 from dsis.compiled import kernel
+from dsis.effects import Effect
 from dsis.effects.quantisation import Quantisation
 
 _BENT = frozenset({"level", "pixel_variance"})
@@ -21,9 +22,9 @@ Pair = tuple[float, float]
 """Level and variance."""
 
 
-def bends(camera: Camera) -> bool:
+def bends(effects: Iterable[Effect]) -> bool:
     """Return whether effects change levels or variances; of coarse codes that is known exactly."""
-    return any(e.measures & _BENT for e in camera.effect if not isinstance(e, Quantisation))
+    return any(e.measures & _BENT for e in effects if not isinstance(e, Quantisation))
 
 
 def bending_offsets(model: Model, layout: Layout, seed: int, jobs: int) -> Offsets:
@@ -31,7 +32,7 @@ def bending_offsets(model: Model, layout: Layout, seed: int, jobs: int) -> Offse
 
     Only effects that change either are simulated, with and without: the draws are the same.
     """
-    if not bends(model.camera):
+    if not bends(model.camera.effect):
         return Offsets()
     codes = [e for e in model.camera.effect if isinstance(e, Quantisation)]
     bent = [e for e in model.camera.effect if isinstance(e, Quantisation) or e.measures & _BENT]

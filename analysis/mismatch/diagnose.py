@@ -141,7 +141,7 @@ def _proven(search: Search, final: State, trial: Trial) -> tuple[State, dict[str
         if denied is not None:
             final = search.drop(final, *denied)
             continue
-        without = {named.kind: search.without(final, named) for named in search.named}
+        without = {named.kind: search.fitted_without(final, named) for named in search.named}
         gained = trial.gains(final, without)
         weak = [named for named in search.named if not gained[named.kind].certain]
         if not weak:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.mismatch.bending import bends
 from analysis.mismatch.candidates import Proposal
 from analysis.mismatch.contradicted import contradicted
 from analysis.mismatch.observe import Frames
@@ -13,6 +14,7 @@ from analysis.mismatch.phase import keeps_phase
 from analysis.mismatch.polish import polish, with_effects
 from analysis.mismatch.predict import Predictor
 from analysis.mismatch.rank import Memory, Ranked, ranked
+from analysis.mismatch.recalibrate import calibrate
 from analysis.mismatch.segments import second_path
 from analysis.mismatch.state import Setting, State
 from analysis.mismatch.uncertainty import settled
@@ -108,6 +110,20 @@ class Search:
         if named.proposal is None:
             return state.camera.model_copy(update={"noise": self.base.camera.noise})
         return _without(state.camera, [named.proposal.effect], self.camera)
+
+    def fitted_without(self, state: State, named: Named) -> Camera:
+        """Return the camera without one of the effects named, its base numbers fitted once more.
+
+        No physics is credited with what better numbers give.
+        """
+        camera = self.without(state, named)
+        if named.proposal is not None and not bends([named.proposal.effect]):
+            return camera  # levels and variances know nothing of it
+        own = self.setting
+        model = calibrate(
+            camera, own.layout, own.seen, own.interpolated, seed=own.seed, jobs=own.jobs
+        )
+        return model.model.camera
 
     def drop(self, state: State, named: Named, why: str) -> State:
         """Return the state without an effect, which is refused from now on."""

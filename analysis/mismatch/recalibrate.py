@@ -21,6 +21,7 @@ from dsis.effects.quantisation import Quantisation
 _ROUNDS = 3
 _SAME = 0.05  # of an error: the fit has settled
 _SWITCH_DEVIANCE = 12.0  # by which another gap must fit better before the switch is moved
+_APART = 1.005  # ratio of signals from which they are two levels
 
 
 @dataclass(frozen=True)
@@ -85,7 +86,7 @@ def calibrate(
         )
 
     before: BaseFit | None = None
-    for _ in range(_ROUNDS if bends(camera) else 1):
+    for _ in range(_ROUNDS if bends(camera.effect) else 1):
         recorded = _sum(undone, effects)
         fit = fitted(recorded, switches)
         if before is not None and _same(before, fit):
@@ -219,7 +220,8 @@ def _moved(
             total += level.dof / 2 * float(np.log(level.variance_dn2 / expected)) ** 2
         return total
 
-    gaps = [sqrt(max(a, b / 100) * b) for a, b in pairwise(signals) if b > 1.02 * a and b > 1.0]
+    # Both greens of an exposure are one level; a switch may part its colours.
+    gaps = [sqrt(max(a, b / 100) * b) for a, b in pairwise(signals) if b > _APART * a and b > 1.0]
     here = deviance(switches[0])
     best = min(gaps, key=deviance, default=switches[0])
     return (best,) if deviance(best) < here - _SWITCH_DEVIANCE else switches

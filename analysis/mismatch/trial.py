@@ -1,6 +1,6 @@
 """The locked frames: what they say of the base model, the final model and every effect."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,23 +10,23 @@ from analysis.mismatch.finding import Change, Gain, Proof
 from analysis.mismatch.given import Ratio
 from analysis.mismatch.heldnumbers import HeldNumbers
 from analysis.mismatch.model import in_threads, simulate
+from analysis.mismatch.null import null_of
 from analysis.mismatch.observe import Observation, observe
 from analysis.mismatch.prove.gain import heldout_gain
 from analysis.mismatch.prove.gap import gap_closed
 from analysis.mismatch.prove.held import Held, hold
 from analysis.mismatch.prove.proof import loglik_of, prove_held
-from analysis.mismatch.recalibrate import Calibrated
 from analysis.mismatch.source import Source
 from analysis.mismatch.split import Split
 from analysis.mismatch.state import Setting, State
 from analysis.mismatch.taking import layout_of
-from analysis.mismatch.vector import vector
+from analysis.mismatch.vector import Vector, vector
 from dsis.camera import Camera
 from dsis.errors import InputError
 from dsis.recording import Recording
 
 Array = NDArray[np.float64]
-_REPLICATES = 6
+_REPLICATES = 8
 _TOTAL = 4.6  # nats: chance gains as much in 1 % of recordings at most, whatever the frames
 _NORMAL = 1.96
 _ERRORS = 2.2  # standard errors from a gain to the end of its interval, of few frames
@@ -135,16 +135,23 @@ class Trial:
         seen = observe(layout, lambda name: source.frames(name, numbers[name]))
         setting = base.setting
 
-        def values(calibrated: Calibrated, one: Observation) -> Array:
+        def vector_of(one: Observation) -> Vector:
             # One yardstick for all: the final model's base numbers.
-            return vector(layout, one, calibrated.refit(layout, one.levels)).values
+            return vector(layout, one, final.calibrated.refit(layout, one.levels))
 
-        def simulated(state: State) -> Array:
+        def simulated(state: State) -> list[Vector]:
             model = state.calibrated.model
             made = simulate(model, layout, range(_REPLICATES), setting.seed + 2, setting.jobs)
-            return np.stack([values(final.calibrated, one) for one in made])
+            return [vector_of(one) for one in made]
 
-        return gap_closed(values(final.calibrated, seen), simulated(base), simulated(final))
+        own, before, after = vector_of(seen), simulated(base), simulated(final)
+        null = null_of(layout, after, own)
+        sd = np.where(null.known, null.sd, np.nan)
+        return gap_closed(own.values, _values(before), _values(after), sd)
+
+
+def _values(made: Sequence[Vector]) -> Array:
+    return np.stack([one.values for one in made])
 
 
 def _chi2(state: State) -> float:

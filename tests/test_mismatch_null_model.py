@@ -38,7 +38,7 @@ def test_wide_noise_adds_sheppard_s_twelfth() -> None:
 
 @given(
     mean=st.floats(60, 61),
-    sigma=st.floats(0.3, 3.0),
+    sigma=st.floats(0.2, 3.0),
 )
 def test_rounding_is_undone(mean: float, sigma: float) -> None:
     shift, added = rounded(mean, sigma**2, 4095)
@@ -46,6 +46,24 @@ def test_rounding_is_undone(mean: float, sigma: float) -> None:
     assert back == pytest.approx(mean, abs=1e-6)
     assert variance == pytest.approx(sigma**2, rel=1e-5)
     assert stretch > 0
+
+
+@pytest.mark.parametrize(("mean", "sigma"), [(48.243, 0.25), (48.4, 0.3), (48.0, 0.8)])
+def test_errors_of_few_codes_are_those_of_repeated_samples(mean: float, sigma: float) -> None:
+    """Spread of what is undone, over that of a normal variate of the recorded variance."""
+    rng, n, repeats = np.random.default_rng(3), 20_000, 150
+    shift, added = rounded(mean, sigma**2, 4095)
+    _, _, stretch = unrounded(mean + shift, sigma**2 + added, 4095)
+    samples = np.rint(rng.normal(mean, sigma, (repeats, n)))
+    own = [unrounded(float(x.mean()), float(x.var()), 4095)[1] for x in samples]
+    normal = (sigma**2 + added) * (2 / n) ** 0.5
+    # Of 150 repeats a spread is known to 6 %.
+    assert np.std(own, ddof=1) / normal == pytest.approx(stretch, rel=0.2)
+
+
+def test_a_single_code_says_nothing_of_the_noise() -> None:
+    assert unrounded(48.0, 0.0, 4095)[2] == np.inf
+    assert unrounded(48.15, 0.1270, 4095)[2] == np.inf  # less than two codes can have
 
 
 def test_clipping_at_zero_takes_variance_away() -> None:

@@ -2,12 +2,14 @@
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import least_squares
 from scipy.special import ndtr
 
 Array = NDArray[np.float64]
 _WIDE = 1.0  # DN; above, and away from the ends, rounding adds 1/12 to 1e-8
 _REACH = 8.0
-_STEPS, _SMALL = 40, 1e-5
+_SOLVED = 1e-8  # codes and squared codes
+_NARROW = (0.08, 0.12, 0.17, 0.24, 0.34, 0.48)  # standard deviations, codes
 
 
 def rounded(
@@ -24,55 +26,71 @@ def rounded(
     inside = _REACH * sigma < mean_dn < white_dn - _REACH * sigma
     if sigma > _WIDE and inside:
         return 0.0, 1 / 12
-    low = max(int(np.floor(mean_dn - _REACH * sigma)) - 1, 0)
-    high = min(int(np.ceil(mean_dn + _REACH * sigma)) + 1, int(white_dn))
-    if high - low > 4096:  # far wider than a code: only the ends matter
-        codes = np.unique(np.linspace(low, high, 4097).round())
-    else:
-        codes = np.arange(low, high + 1, dtype=np.float64)
+    codes, share = _codes(mean_dn, sigma, white_dn)
     if codes.size < 2:
         return float(codes[0] - mean_dn) if codes.size else 0.0, -variance_dn2
-    edges = (codes[1:] + codes[:-1]) / 2
-    below = np.concatenate([[0.0], ndtr((edges - mean_dn) / sigma), [1.0]])
-    share = np.diff(below)
     mean = float((share * codes).sum())
     variance = float((share * (codes - mean) ** 2).sum())
     return mean - mean_dn, variance - max(variance_dn2, 0.0)
 
 
+def _codes(mean_dn: float, sigma_dn: float, white_dn: float) -> tuple[Array, Array]:
+    """Return the codes that occur, and the share of samples that each has."""
+    low = max(int(np.floor(mean_dn - _REACH * sigma_dn)) - 1, 0)
+    high = min(int(np.ceil(mean_dn + _REACH * sigma_dn)) + 1, int(white_dn))
+    if high - low > 4096:  # far wider than a code: only the ends matter
+        codes = np.unique(np.linspace(low, high, 4097).round())
+    else:
+        codes = np.arange(low, high + 1, dtype=np.float64)
+    edges = (codes[1:] + codes[:-1]) / 2
+    below = np.concatenate([[0.0], ndtr((edges - mean_dn) / sigma_dn), [1.0]])
+    return codes, np.diff(below)
+
+
 def unrounded(
     mean_dn: float, variance_dn2: float, white_dn: float, step_dn: float = 1.0
 ) -> tuple[float, float, float]:
-    """Return the mean, the variance and d variance / d recorded variance before rounding.
+    """Return the mean and the variance before rounding, and by how much its error grows.
 
-    The inverse of `rounded`, by Newton's steps on both. Where all samples have one code nothing can
-    be told: the variance comes back as recorded, and the derivative as infinite.
+    The inverse of `rounded`. The third is the standard error of the variance before rounding over
+    that of a normal variate of the recorded variance: mean and variance of few codes err together,
+    as their third and fourth moments say. Where all samples have one code nothing can be told: the
+    variance comes back as recorded, and the third is infinite.
     """
     if step_dn != 1:
-        before, variance, slope = unrounded(
+        before, variance, grown = unrounded(
             mean_dn / step_dn, variance_dn2 / step_dn**2, white_dn // step_dn
         )
-        return before * step_dn, variance * step_dn**2, slope
+        return before * step_dn, variance * step_dn**2, grown
     if variance_dn2 > 4 * _WIDE**2 and variance_dn2**0.5 * _REACH < mean_dn:
         return mean_dn, variance_dn2 - 1 / 12, 1.0
     if variance_dn2 <= 1e-4:
         return mean_dn, variance_dn2, np.inf
-    mean, log_variance = mean_dn, np.log(max(variance_dn2 - 1 / 12, 0.03))
-    inverse = np.eye(2)
-    for _ in range(_STEPS):
-        here = _recorded(mean, log_variance, white_dn)
-        columns = [
-            (_recorded(mean + _SMALL, log_variance, white_dn) - here) / _SMALL,
-            (_recorded(mean, log_variance + _SMALL, white_dn) - here) / _SMALL,
+    recorded = np.array([mean_dn, variance_dn2])
+
+    def miss(at: Array) -> Array:
+        return _recorded(float(at[0]), float(at[1]), white_dn) - recorded
+
+    usual = np.array([mean_dn, np.log(max(variance_dn2 - 1 / 12, 0.03))])
+    found = least_squares(miss, usual, xtol=1e-13, ftol=1e-13, gtol=1e-13)
+    if np.abs(found.fun).max() > _SOLVED:  # narrow noise: far from the start, past flat stretches
+        starts = [
+            np.array([mean_dn + offset, 2 * np.log(sigma)])
+            for offset in np.linspace(-0.45, 0.45, 7)
+            for sigma in _NARROW
         ]
-        inverse = np.linalg.pinv(np.stack(columns, 1), rcond=1e-6)
-        step = inverse @ (np.array([mean_dn, variance_dn2]) - here)
-        mean += float(np.clip(step[0], -0.2, 0.2))
-        log_variance += float(np.clip(step[1], -0.5, 0.5))
-        if np.abs(step).max() < 1e-9:
-            break
+        start = min(starts, key=lambda at: float(np.abs(miss(at)).max()))
+        other = least_squares(miss, start, xtol=1e-13, ftol=1e-13, gtol=1e-13)
+        found = min(found, other, key=lambda one: float(one.cost))
+    mean, log_variance = (float(value) for value in found.x)
     variance = float(np.exp(log_variance))
-    return float(mean), variance, float(abs(inverse[1, 1]) * variance)
+    inverse = np.linalg.pinv(found.jac, rcond=1e-9)[1] * variance
+    codes, share = _codes(mean, variance**0.5, white_dn)
+    second, third, fourth = (float((share * (codes - mean_dn) ** k).sum()) for k in (2, 3, 4))
+    errors = np.array([[second, third], [third, fourth - second**2]])
+    grown = float(inverse @ errors @ inverse) / (2 * variance_dn2**2)
+    solved = bool(np.abs(found.fun).max() < _SOLVED) and grown > 0
+    return mean, variance, float(np.sqrt(grown)) if solved else np.inf
 
 
 def _recorded(mean_dn: float, log_variance: float, white_dn: float) -> Array:

@@ -137,7 +137,7 @@ def _searched(search: Search, source: Source) -> State:
 def _proven(search: Search, final: State, trial: Trial) -> tuple[State, dict[str, Gain]]:
     """Drop, one by one, effects that are denied, or whose gain is within its uncertainty."""
     while True:
-        denied = search.denied(final, final.predictor())
+        denied = search.denied(final)
         if denied is not None:
             final = search.drop(final, *denied)
             continue

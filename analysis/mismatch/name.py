@@ -13,7 +13,7 @@ from analysis.mismatch.observe import Frames
 from analysis.mismatch.phase import keeps_phase
 from analysis.mismatch.polish import polish, with_effects
 from analysis.mismatch.predict import Predictor
-from analysis.mismatch.rank import Memory, Ranked, ranked
+from analysis.mismatch.rank import Memory, Ranked, ranked, replicates_for
 from analysis.mismatch.recalibrate import calibrate
 from analysis.mismatch.segments import second_path
 from analysis.mismatch.state import Setting, State
@@ -206,7 +206,8 @@ class Search:
         if not mine:
             return state
         bare = _without(state.camera, [p.effect for _, p in mine], self.camera)
-        predictor = state.predictor(self.setting.polishing)
+        sparse = replicates_for(self.setting, [p.effect for _, p in mine])
+        predictor = state.predictor(max(self.setting.polishing, sparse))
         polished = polish(predictor, bare, [p for _, p in mine], rounds=2)
         if polished is None:
             return state
@@ -217,44 +218,65 @@ class Search:
         camera = with_effects(bare, polished.effects)
         return state if camera is None else State.of(self.setting, camera, self.step)
 
-    def denied(self, state: State, predictor: Predictor) -> tuple[Named, str] | None:
+    def denied(self, state: State) -> tuple[Named, str] | None:
         """Return the effect that the recording denies most, and why; None: it denies none."""
-        found = [
-            (denial.share, named, denial.why)
-            for named in self.named
-            if (denial := contradicted(state, predictor, named.kind, self.without(state, named)))
-        ]
-        most = min(found, key=lambda one: one[0], default=None)
-        return None if most is None else most[1:]
+        return self._worst(state, state.predictor(), self._denial)
 
     def _pruned(self, state: State) -> State:
         """Drop effects that the others make needless, and those that leave what they touch."""
-        while True:
-            mine = [n for n in self.named if n.proposal is not None]
-            if not mine:
-                return state
+        while any(n.proposal is not None for n in self.named):
             predictor = state.predictor()
-            denied = self.denied(state, predictor)
-            if denied is not None:  # first: it may explain what is another's
-                state = self.drop(state, *denied)
-                continue
-            worst: tuple[float, Named, str] | None = None
-            for named in mine:
-                mean = predictor.mean(self.without(state, named))
-                # Both models answer for the numbers that both know.
-                whole = np.where(np.isfinite(mean), state.null.mean, np.nan)
-                gain = predictor.loglik(whole) - predictor.loglik(mean)
-                share = resolved(predictor, state, mean)
-                reason = ""
-                if gain < LEAST_GAIN:
-                    reason = "the others explain what it would explain"
-                elif share < _RESOLVED:
-                    reason = f"it would explain {max(share, 0):.0%} of what it changes"
-                if reason and (worst is None or share < worst[0]):
-                    worst = (share, named, reason)
+            # Denied ones first: they may explain what is another's.
+            worst = self._worst(state, predictor, self._denial)
+            worst = worst or self._worst(state, predictor, self._needless)
             if worst is None:
-                return state
-            state = self.drop(state, worst[1], worst[2])
+                break
+            state = self.drop(state, *worst)
+        return state
+
+    def _worst(
+        self,
+        state: State,
+        predictor: Predictor,
+        judged: Callable[[State, Predictor, Named], tuple[float, str] | None],
+    ) -> tuple[Named, str] | None:
+        """Return the effect that is judged worst, and why.
+
+        A few simulated recordings may show next to nothing of what one number a frame does: what
+        they judge badly is judged once more by as many as a null takes.
+        """
+        found = []
+        for named in self.named:
+            verdict = judged(state, predictor, named)
+            if verdict is not None and self.setting.drafts > predictor.replicates:
+                verdict = judged(state, state.predictor(self.setting.drafts), named)
+            if verdict is not None:
+                found.append((verdict[0], named, verdict[1]))
+        worst = min(found, key=lambda one: one[0], default=None)
+        return None if worst is None else worst[1:]
+
+    def _denial(self, state: State, predictor: Predictor, named: Named) -> tuple[float, str] | None:
+        denial = contradicted(state, predictor, named.kind, self.without(state, named))
+        return None if denial is None else (denial.share, denial.why)
+
+    def _needless(
+        self, state: State, predictor: Predictor, named: Named
+    ) -> tuple[float, str] | None:
+        """Return the share that an effect explains of what it changes, and why that is too little.
+
+        None: it is needed.
+        """
+        if named.proposal is None:
+            return None
+        mean = predictor.mean(self.without(state, named))
+        # Both models answer for the numbers that both know.
+        whole = np.where(np.isfinite(mean), state.null.mean, np.nan)
+        share = resolved(predictor, state, mean)
+        if predictor.loglik(whole) - predictor.loglik(mean) < LEAST_GAIN:
+            return share, "the others explain what it would explain"
+        if share < _RESOLVED:
+            return share, f"it would explain {max(share, 0):.0%} of what it changes"
+        return None
 
 
 def _alike(state: State, one: Ranked, other: Ranked) -> bool:

@@ -20,6 +20,7 @@ from dsis.camera import Camera
 
 Array = NDArray[np.float64]
 _NU = 6.0  # degrees of freedom of the likelihood's tails
+_FLOOR = 0.3  # of a cube root that is 1 in white noise: below it, chance
 _FORM = 0.08  # relative error of a predicted change
 _FORMS = {
     "spectral_peak": 0.3,
@@ -102,8 +103,12 @@ class Predictor:
             [k.statistic.endswith("variance") and k.statistic != "pixel_variance"
              for k in self.reference.vector.keys]
         )  # fmt: skip
-        ratio = np.where(grown & known, np.abs(mean) / np.maximum(np.abs(before), 0.3), 1.0)
-        sd = np.hypot(null.sd * np.maximum(ratio, 1.0), self.forms * change)
+        ratio = np.where(
+            grown & known,
+            np.maximum(np.abs(mean), _FLOOR) / np.maximum(np.abs(before), _FLOOR),
+            1.0,
+        )
+        sd = np.hypot(null.sd * ratio, self.forms * change)
         return np.where(known, self.reference.vector.values - mean, 0.0), sd, known
 
     def loglik(self, mean: Array) -> float:

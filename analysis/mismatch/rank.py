@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from analysis.mismatch.candidates import CANDIDATES, Proposal
 from analysis.mismatch.model import in_threads
 from analysis.mismatch.polish import Polished, polish, with_effects
-from analysis.mismatch.state import State
+from analysis.mismatch.state import Setting, State
 from dsis.effects import Effect
 
 Array = NDArray[np.float64]
@@ -17,6 +17,7 @@ _MOST = 4  # kinds that are fitted, after all were tried as proposed
 _FAR = 15.0  # of log-likelihood behind the best as proposed: fitting does not make up for it
 _SHARE = 0.03  # or that share of what the best gains
 _ALIKE = 0.05  # relative difference of parameters up to which a proposal is an earlier one
+_BY_FRAME = frozenset({"frame_variance"})
 _SHARED = 0.1  # share of an effect's change that may lie where the model moved since
 
 
@@ -48,6 +49,15 @@ class Memory:
         """Remember what an effect changed."""
         means = state.null.mean
         self.changes.append((effect, means, np.nan_to_num(mean - means)))
+
+
+def replicates_for(setting: Setting, effects: Iterable[Effect]) -> int:
+    """Return how many simulations tell what effects change.
+
+    Of one number a frame, few frames of few simulations may hold next to nothing.
+    """
+    sparse = any(effect.measures == _BY_FRAME for effect in effects)
+    return setting.drafts if sparse else setting.replicates
 
 
 def _near(one: Effect, other: Effect) -> bool:
@@ -84,7 +94,8 @@ def ranked(
     for value, kind, proposal in tried[:_MOST]:
         if value < best - far:
             continue
-        polished = polish(predictor, state.camera, [proposal], rounds=1 + len(proposal.free))
+        own = state.predictor(replicates_for(state.setting, [proposal.effect]))
+        polished = polish(own, state.camera, [proposal], rounds=1 + len(proposal.free))
         if polished is not None:
             gain = polished.loglik - before - len(proposal.free)
             found.append(Ranked(gain, kind, proposal, polished))
@@ -105,6 +116,7 @@ def _tried(
         for proposal in CANDIDATES[kind].propose(clues)
     ]
     predictor = state.predictor(state.setting.screening)
+    by_frame = state.predictor(state.setting.drafts)
 
     def mean(one: tuple[str, Proposal]) -> tuple[Array | None, bool]:
         known = memory.recalled(one[1].effect, state)
@@ -112,7 +124,8 @@ def _tried(
             return known, True
         built = with_effects(state.camera, [one[1].effect])
         step()
-        return (None if built is None else predictor.mean(built)), False
+        own = by_frame if one[1].effect.measures == _BY_FRAME else predictor
+        return (None if built is None else own.mean(built)), False
 
     # One simulation for each leaves the threads to them.
     side_by_side = state.setting.jobs if predictor.replicates == 1 else 1

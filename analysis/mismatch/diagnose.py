@@ -175,10 +175,16 @@ def _finding(
     elif errors:
         verdict = "parameters"
     tied = {one.kind: other.kind for pair in search.ties for one, other in (pair, pair[::-1])}
+    named = {one.kind for one in search.named}
     undecided = tuple(
-        Alternative(kind, None, search.refused[kind], would_settle(kind, other))
+        Alternative(
+            kind,
+            None,
+            f"explains the recording no better than {other}",
+            would_settle(kind, other),
+        )
         for kind, other in tied.items()
-        if kind in search.refused
+        if kind not in named
     )
     considered = tuple(
         f"Considered and not named: {kind}: {why}."

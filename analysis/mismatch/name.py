@@ -13,7 +13,7 @@ from analysis.mismatch.observe import Frames
 from analysis.mismatch.phase import keeps_phase
 from analysis.mismatch.polish import polish, with_effects
 from analysis.mismatch.predict import Predictor
-from analysis.mismatch.rank import Memory, Ranked, ranked, replicates_for
+from analysis.mismatch.rank import Memory, Ranked, alike, ranked, replicates_for
 from analysis.mismatch.recalibrate import calibrate
 from analysis.mismatch.segments import second_path
 from analysis.mismatch.state import Setting, State
@@ -25,7 +25,6 @@ Array = NDArray[np.float64]
 Step = Callable[[], None]
 LEAST_GAIN = 2.0  # of log-likelihood, for an effect to be taken in where something is located
 _TIE = 3.0  # of log-likelihood: odds below 20 do not tell two effects apart
-_ALIKE = 0.5  # cosine of what two effects change, from which they are rivals
 _MOST_EFFECTS = 8
 _CLEAR = 3.0  # departures below are chance
 _PHASES = {
@@ -89,6 +88,8 @@ class Search:
                 break
             self.named.append(added[0])
             state = State.of(self.setting, added[1], self.step, draft=True)
+        if not state.mismatches:
+            self.ties = []  # what was undecided on the way is explained
         return self._pruned(self._polished(state))
 
     def settle(self, state: State) -> State:
@@ -173,18 +174,25 @@ class Search:
         return Named(best.kind, effect, best.polished.errors[0], best.gain, rivals), camera
 
     def _decided(self, state: State, fitted: list[Ranked]) -> list[Ranked]:
-        """Put aside pairs that tie over the same numbers: neither is claimed."""
+        """Put aside pairs that tie over the same numbers: neither is claimed.
+
+        What is taken in besides may decide between them: they are tried again in the next round.
+        """
+        self.ties = []
         fitted = self._phased(fitted)
         while (
             len(fitted) > 1
             and fitted[1].gain > max(fitted[0].gain - _TIE, LEAST_GAIN)
-            and _alike(state, fitted[0], fitted[1])
+            and alike(state, fitted[0].polished.mean, fitted[1].polished.mean)
         ):
             first, second = fitted[:2]
             self.ties.append((first, second))
-            for one, other in ((first, second), (second, first)):
-                self.refused[one.kind] = f"explains the recording no better than {other.kind}"
-            fitted = fitted[2:]
+            # Nor is a third that explains the same, and worse.
+            fitted = [
+                one
+                for one in fitted[2:]
+                if not any(alike(state, one.polished.mean, r.polished.mean) for r in fitted[:2])
+            ]
         return fitted
 
     def _phased(self, fitted: list[Ranked]) -> list[Ranked]:
@@ -277,17 +285,6 @@ class Search:
         if share < _RESOLVED:
             return share, f"it would explain {max(share, 0):.0%} of what it changes"
         return None
-
-
-def _alike(state: State, one: Ranked, other: Ranked) -> bool:
-    """Return whether two effects change the same numbers in the same way."""
-    null = state.null
-    a, b = (
-        np.where(null.known, np.nan_to_num((r.polished.mean - null.mean) / null.sd), 0.0)
-        for r in (one, other)
-    )
-    size = float(np.linalg.norm(a) * np.linalg.norm(b))
-    return size > 0 and float(a @ b) / size > _ALIKE
 
 
 def _bent(base: State, final: State) -> Array:

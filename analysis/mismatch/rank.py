@@ -16,6 +16,7 @@ Array = NDArray[np.float64]
 _MOST = 4  # kinds that are fitted, after all were tried as proposed
 _FAR = 15.0  # of log-likelihood behind the best as proposed: fitting does not make up for it
 _SHARE = 0.03  # or that share of what the best gains
+_COSINE = 0.5  # of what two predictions change, from which they change the same
 _ALIKE = 0.05  # relative difference of parameters up to which a proposal is an earlier one
 _BY_FRAME = frozenset({"frame_variance"})
 _SHARED = 0.1  # share of an effect's change that may lie where the model moved since
@@ -90,9 +91,10 @@ def ranked(
     tried = _tried(state, kinds, memory, step)
     best = max((value for value, _, _ in tried), default=0.0)
     far = max(_FAR, _SHARE * (best - before))
-    found = []
-    for value, kind, proposal in tried[:_MOST]:
-        if value < best - far:
+    found: list[Ranked] = []
+    for value, kind, proposal in tried:
+        kinds_so_far = {one.kind for one in found}
+        if value < best - far or (len(kinds_so_far) >= _MOST and kind not in kinds_so_far):
             continue
         own = state.predictor(replicates_for(state.setting, [proposal.effect]))
         polished = polish(own, state.camera, [proposal], rounds=1 + len(proposal.free))
@@ -106,7 +108,7 @@ def ranked(
 def _tried(
     state: State, kinds: Iterable[str], memory: Memory, step: Callable[[], None]
 ) -> list[tuple[float, str, Proposal]]:
-    """Return the best proposal of each kind as it is proposed, the most likely first."""
+    """Return the best proposals of each kind as they are proposed, the most likely first."""
     off = {m.statistic for m in state.mismatches}
     clues = state.clues()
     proposed = [
@@ -129,14 +131,28 @@ def _tried(
 
     # One simulation for each leaves the threads to them.
     side_by_side = state.setting.jobs if predictor.replicates == 1 else 1
-    best: dict[str, tuple[float, str, Proposal]] = {}
     means = in_threads(mean, proposed, side_by_side)
-    for (kind, proposal), (found, old) in zip(proposed, means, strict=True):
-        if found is None:
+    found: list[tuple[float, str, Proposal, Array]] = []
+    for (kind, proposal), (own, old) in zip(proposed, means, strict=True):
+        if own is None:
             continue
         if not old:
-            memory.keep(proposal.effect, state, found)
-        value = predictor.loglik(found)
-        if kind not in best or value > best[kind][0]:
-            best[kind] = (value, kind, proposal)
-    return sorted(best.values(), key=lambda one: -one[0])
+            memory.keep(proposal.effect, state, own)
+        found.append((predictor.loglik(own), kind, proposal, own))
+    # Of one kind, each that changes other numbers: memory of one lag says nothing of another's.
+    best: list[tuple[float, str, Proposal, Array]] = []
+    for one in sorted(found, key=lambda one: -one[0]):
+        if not any(one[1] == other[1] and alike(state, one[3], other[3]) for other in best):
+            best.append(one)
+    return [(value, kind, proposal) for value, kind, proposal, _ in best]
+
+
+def alike(state: State, one: Array, other: Array) -> bool:
+    """Return whether two predictions change the state's numbers in the same way."""
+    null = state.null
+    a, b = (
+        np.where(null.known, np.nan_to_num((mean - null.mean) / null.sd), 0.0)
+        for mean in (one, other)
+    )
+    size = float(np.linalg.norm(a) * np.linalg.norm(b))
+    return size > 0 and float(a @ b) / size > _COSINE

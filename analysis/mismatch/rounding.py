@@ -69,7 +69,7 @@ def unrounded(
     recorded = np.array([mean_dn, variance_dn2])
 
     def miss(at: Array) -> Array:
-        return _recorded(float(at[0]), float(at[1]), white_dn) - recorded
+        return np.asarray(_recorded(float(at[0]), float(at[1]), white_dn) - recorded)
 
     usual = np.array([mean_dn, np.log(max(variance_dn2 - 1 / 12, 0.03))])
     found = least_squares(miss, usual, xtol=1e-13, ftol=1e-13, gtol=1e-13)
@@ -84,7 +84,7 @@ def unrounded(
         found = min(found, other, key=lambda one: float(one.cost))
     mean, log_variance = (float(value) for value in found.x)
     variance = float(np.exp(log_variance))
-    inverse = np.linalg.pinv(found.jac, rcond=1e-9)[1] * variance
+    inverse = np.linalg.pinv(np.asarray(found.jac), rcond=1e-9)[1] * variance
     codes, share = _codes(mean, variance**0.5, white_dn)
     second, third, fourth = (float((share * (codes - mean_dn) ** k).sum()) for k in (2, 3, 4))
     errors = np.array([[second, third], [third, fourth - second**2]])

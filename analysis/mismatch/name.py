@@ -148,8 +148,8 @@ class Search:
 
     def _best(self, state: State) -> tuple[Named, Camera] | None:
         """Return the effect that explains most, and the camera with it."""
-        left = self.vocabulary - {n.kind for n in self.named} - set(self.refused)
-        fitted = self._decided(state, ranked(state, left, self.memory, self.step))
+        fitted = self._decided(state)
+        left = self._left()
         off = {m.statistic for m in state.mismatches}
         path = second_path(state) if "dual_gain" in left and "pixel_variance" in off else None
         most = fitted[0].gain if fitted else 0.0
@@ -173,27 +173,30 @@ class Search:
         effect = Proposal(best.polished.effects[0], best.proposal.free, best.proposal.signed)
         return Named(best.kind, effect, best.polished.errors[0], best.gain, rivals), camera
 
-    def _decided(self, state: State, fitted: list[Ranked]) -> list[Ranked]:
-        """Put aside pairs that tie over the same numbers: neither is claimed.
+    def _left(self) -> frozenset[str]:
+        return self.vocabulary - {n.kind for n in self.named} - self.refused.keys()
 
-        What is taken in besides may decide between them: they are tried again in the next round.
+    def _decided(self, state: State) -> list[Ranked]:
+        """Return the effects that may be claimed; the best of pairs that tie are put aside.
+
+        Neither of two that tie over the same numbers is claimed, nor what explains the same, and
+        worse. What is taken in besides may decide: they are tried again in the next round.
         """
         self.ties = []
-        fitted = self._phased(fitted)
-        while (
-            len(fitted) > 1
-            and fitted[1].gain > max(fitted[0].gain - _TIE, LEAST_GAIN)
-            and alike(state, fitted[0].polished.mean, fitted[1].polished.mean)
-        ):
-            first, second = fitted[:2]
-            self.ties.append((first, second))
-            # Nor is a third that explains the same, and worse.
-            fitted = [
-                one
-                for one in fitted[2:]
-                if not any(alike(state, one.polished.mean, r.polished.mean) for r in fitted[:2])
-            ]
-        return fitted
+        while True:
+            apart = [one.polished.mean for pair in self.ties for one in pair]
+            fitted = ranked(state, self._left(), self.memory, self.step, apart)
+            refused = len(self.refused)
+            fitted = self._phased(fitted)
+            if len(self.refused) > refused:
+                continue  # others were too far behind what is refused now
+            if (
+                len(fitted) < 2
+                or fitted[1].gain <= max(fitted[0].gain - _TIE, LEAST_GAIN)
+                or not alike(state, fitted[0].polished.mean, fitted[1].polished.mean)
+            ):
+                return fitted
+            self.ties.append((fitted[0], fitted[1]))
 
     def _phased(self, fitted: list[Ranked]) -> list[Ranked]:
         """Keep interference or a bistable pattern, alike in power, as the phases say."""

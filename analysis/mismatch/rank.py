@@ -1,6 +1,6 @@
 """Effects that could explain what is off, each with fitted parameters, the best first."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -83,12 +83,19 @@ class Ranked:
 
 
 def ranked(
-    state: State, kinds: Iterable[str], memory: Memory, step: Callable[[], None]
+    state: State,
+    kinds: Iterable[str],
+    memory: Memory,
+    step: Callable[[], None],
+    apart: Sequence[Array] = (),
 ) -> list[Ranked]:
-    """Return the effects among `kinds` that mismatches call for, fitted one at a time."""
+    """Return the effects among `kinds` that mismatches call for, fitted one at a time.
+
+    What changes the same numbers as one of the predictions `apart` is not considered.
+    """
     predictor = state.predictor()
     before = predictor.loglik(state.null.mean)
-    tried = _tried(state, kinds, memory, step)
+    tried = _tried(state, kinds, memory, step, apart)
     best = max((value for value, _, _ in tried), default=0.0)
     far = max(_FAR, _SHARE * (best - before))
     found: list[Ranked] = []
@@ -106,7 +113,11 @@ def ranked(
 
 
 def _tried(
-    state: State, kinds: Iterable[str], memory: Memory, step: Callable[[], None]
+    state: State,
+    kinds: Iterable[str],
+    memory: Memory,
+    step: Callable[[], None],
+    apart: Sequence[Array],
 ) -> list[tuple[float, str, Proposal]]:
     """Return the best proposals of each kind as they are proposed, the most likely first."""
     off = {m.statistic for m in state.mismatches}
@@ -138,6 +149,8 @@ def _tried(
             continue
         if not old:
             memory.keep(proposal.effect, state, own)
+        if any(alike(state, own, other) for other in apart):
+            continue
         found.append((predictor.loglik(own), kind, proposal, own))
     # Of one kind, each that changes other numbers: memory of one lag says nothing of another's.
     best: list[tuple[float, str, Proposal, Array]] = []

@@ -11,7 +11,7 @@ from analysis.mismatch.words import statistic_words
 from dsis.camera import Camera
 
 _LEAST_SHARE = 0.5  # of what an effect predicts, that a recording must show
-_SURE = 3.0  # standard errors below it
+_SURE = 2.0  # standard errors below it: 3.5 below what the right effect shows
 _CLEAR = 3.0  # standard deviations: a predicted change that can be seen at all
 
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from analysis.mismatch.bending import bends
 from analysis.mismatch.candidates import Proposal
 from analysis.mismatch.contradicted import contradicted
+from analysis.mismatch.instance import LINES, Frequency, frequency_of, instance
 from analysis.mismatch.observe import Frames
 from analysis.mismatch.phase import keeps_phase
 from analysis.mismatch.polish import polish, with_effects
@@ -26,7 +27,7 @@ Step = Callable[[], None]
 LEAST_GAIN = 2.0  # of log-likelihood, for an effect to be taken in where something is located
 _TIE = 3.0  # of log-likelihood: odds below 20 do not tell two effects apart
 _ALIKE = 0.5  # cosine of what two effects change, from which they are rivals
-_MOST_EFFECTS = 8
+_MOST_EFFECTS = 10  # kinds: some may have to go again
 _CLEAR = 3.0  # departures below are chance
 _PHASES = {
     "periodic_noise": "the pattern's phase is the same in all frames but for its sign",
@@ -64,6 +65,11 @@ class Named:
     rivals: tuple[tuple[str, float], ...]
     switch_dn: float = float("nan")
 
+    @property
+    def name(self) -> str:
+        """Its kind, and of a line its frequency: a sensor may have several."""
+        return instance(self.kind, None if self.proposal is None else self.proposal.effect)
+
 
 @dataclass
 class Search:
@@ -77,19 +83,32 @@ class Search:
     named: list[Named] = field(default_factory=list)
     refused: dict[str, str] = field(default_factory=dict)
     ties: list[tuple[Ranked, Ranked]] = field(default_factory=list)
+    settled: list[tuple[str, Frequency]] = field(default_factory=list)
     frames_of: Frames | None = None
     memory: Memory = field(default_factory=Memory)
 
     def run(self) -> State:
         """Return the final state."""
         state = self.base
-        while state.mismatches and len(self.named) < _MOST_EFFECTS:
+        while state.mismatches and len({n.kind for n in self.named}) < _MOST_EFFECTS:
             added = self._best(state)
             if added is None:
                 break
-            self.named.append(added[0])
+            self._take(added[0])
             state = State.of(self.setting, added[1], self.step, draft=True)
         return self._pruned(self._polished(state))
+
+    def _take(self, named: Named) -> None:
+        self.named.append(named)
+        line = frequency_of(None if named.proposal is None else named.proposal.effect)
+        if line is not None:
+            self.settled += [(kind, line) for kind in sorted(LINES)]
+
+    def _refuse(self, kind: str, effect: Effect | None, why: str) -> None:
+        self.refused[instance(kind, effect)] = why
+        line = frequency_of(effect)
+        if line is not None:
+            self.settled.append((kind, line))
 
     def settle(self, state: State) -> State:
         """Return the state with final parameters; their errors go into the effects named."""
@@ -127,7 +146,7 @@ class Search:
 
     def drop(self, state: State, named: Named, why: str) -> State:
         """Return the state without an effect, which is refused from now on."""
-        self.refused[named.kind] = why
+        self._refuse(named.kind, None if named.proposal is None else named.proposal.effect, why)
         self.named.remove(named)
         return State.of(self.setting, self.without(state, named), self.step)
 
@@ -142,13 +161,16 @@ class Search:
             else:
                 change = final.null.mean - predictor.mean(self.without(final, named))
             known = null.known & np.isfinite(change)
-            found[named.kind] = np.where(known, change, 0.0) / null.sd
+            found[named.name] = np.where(known, change, 0.0) / null.sd
         return found
 
     def _best(self, state: State) -> tuple[Named, Camera] | None:
         """Return the effect that explains most, and the camera with it."""
-        left = self.vocabulary - {n.kind for n in self.named} - set(self.refused)
-        fitted = self._decided(state, ranked(state, left, self.memory, self.step))
+        left = self.vocabulary - {n.name for n in self.named} - set(self.refused)
+        settled = tuple(self.settled)
+        fitted = self._decided(state, ranked(state, left, self.memory, self.step, settled))
+        if len(self.settled) > len(settled):
+            return self._best(state)  # a line was refused: the next one may be an effect's
         off = {m.statistic for m in state.mismatches}
         path = second_path(state) if "dual_gain" in left and "pixel_variance" in off else None
         most = fitted[0].gain if fitted else 0.0
@@ -183,22 +205,26 @@ class Search:
             first, second = fitted[:2]
             self.ties.append((first, second))
             for one, other in ((first, second), (second, first)):
-                self.refused[one.kind] = f"explains the recording no better than {other.kind}"
+                why = f"explains the recording no better than {other.kind}"
+                self._refuse(one.kind, one.proposal.effect, why)
             fitted = fitted[2:]
         return fitted
 
     def _phased(self, fitted: list[Ranked]) -> list[Ranked]:
         """Keep interference or a bistable pattern, alike in power, as the phases say."""
-        patterns = [one for one in fitted if one.kind in _PHASES]
-        if not patterns or self.frames_of is None:
+        if self.frames_of is None:
             return fitted
-        frequency = patterns[0].polished.effects[0].frequency  # type: ignore[attr-defined] # both have one
-        kept = keeps_phase(self.setting.layout, self.frames_of, frequency)
-        if kept is None:
-            return fitted
-        wrong = "periodic_noise" if kept else "bistable_pattern"
-        self.refused[wrong] = _PHASES[wrong]
-        return [one for one in fitted if one.kind != wrong]
+        left = []
+        for one in fitted:
+            frequency = frequency_of(one.proposal.effect)
+            kept = None
+            if frequency is not None:
+                kept = keeps_phase(self.setting.layout, self.frames_of, frequency)
+            if kept is None or kept == (one.kind == "bistable_pattern"):
+                left.append(one)
+            else:
+                self._refuse(one.kind, one.proposal.effect, _PHASES[one.kind])
+        return left
 
     def _polished(self, state: State) -> State:
         """Fit the parameters of all effects together, and judge the result once more."""

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from analysis.mismatch.bank.key import Key
 from analysis.mismatch.basefit import BaseFit
+from analysis.mismatch.instance import Frequency
 from analysis.mismatch.layout import Layout, Place
 from analysis.mismatch.null import Null
 from analysis.mismatch.observe import Observation
@@ -38,6 +39,9 @@ class Clues:
         The current model's mean and spread of every number.
     camera
         The current model.
+    settled
+        Lines that an effect of a kind needs no trial for, (kind, frequency): they were named as one
+        or the other, or refused to this one.
     """
 
     layout: Layout
@@ -46,6 +50,7 @@ class Clues:
     fit: BaseFit
     null: Null
     camera: Camera
+    settled: tuple[tuple[str, Frequency], ...] = ()
 
     @property
     def places(self) -> tuple[Place, ...]:

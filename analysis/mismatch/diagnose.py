@@ -14,11 +14,11 @@ from analysis.mismatch.finding import (
     Finding,
     FittedParameter,
     Gain,
-    Mismatch,
     OmittedEffect,
     Proof,
     Verdict,
 )
+from analysis.mismatch.instance import kind_of
 from analysis.mismatch.name import Named, Search
 from analysis.mismatch.observe import observe
 from analysis.mismatch.parameters import parameter_errors
@@ -127,7 +127,8 @@ def _searched(search: Search, source: Source) -> State:
     if layout == whole.layout:
         return search.run()
     seen = observe(layout, lambda name: source.frames(name, numbers[name]), keep=True)
-    search.setting = replace(whole, layout=layout, seen=seen)
+    # All states here are on the way: what is found is judged on all frames.
+    search.setting = replace(whole, layout=layout, seen=seen, nulls=whole.drafts)
     search.base = State.of(search.setting, search.camera, search.step)
     found = search.run()
     search.setting, search.base = whole, base
@@ -141,13 +142,13 @@ def _proven(search: Search, final: State, trial: Trial) -> tuple[State, dict[str
         if denied is not None:
             final = search.drop(final, *denied)
             continue
-        without = {named.kind: search.fitted_without(final, named) for named in search.named}
+        without = {named.name: search.fitted_without(final, named) for named in search.named}
         gained = trial.gains(final, without)
-        weak = [named for named in search.named if not gained[named.kind].certain]
+        weak = [named for named in search.named if not gained[named.name].certain]
         if not weak:
-            return final, {kind: one.gain for kind, one in gained.items()}
-        worst = min(weak, key=lambda named: gained[named.kind].gain.nats_per_frame)
-        nats = gained[worst.kind].gain.nats_per_frame
+            return final, {name: one.gain for name, one in gained.items()}
+        worst = min(weak, key=lambda named: gained[named.name].gain.nats_per_frame)
+        nats = gained[worst.name].gain.nats_per_frame
         why = f"gains {nats:.3g} nats per locked frame, no more than chance"
         final = search.drop(final, worst, why)
 
@@ -163,10 +164,11 @@ def _finding(
     errors = parameter_errors(camera, final.calibrated, final.setting.layout, final.fits)
     explanations = explained(base, final, search.changes(base, final))
     mismatches = tuple(
-        replace(m, explained_by=explanations[m.statistic][0], z_after=explanations[m.statistic][1])
+        replace(m, explained_by=None if name is None else kind_of(name), z_after=after)
         for m in base.mismatches
+        for name, after in [explanations[m.statistic]]
     )
-    omitted = tuple(_omitted(n, mismatches, gains[n.kind]) for n in search.named)
+    omitted = tuple(_omitted(n, because(explanations, n.name), gains[n.name]) for n in search.named)
     verdict: Verdict = "match"
     if omitted:
         verdict = "omitted_physics"
@@ -174,22 +176,22 @@ def _finding(
         verdict = "unexplained"
     elif errors:
         verdict = "parameters"
-    tied = {one.kind: other.kind for pair in search.ties for one, other in (pair, pair[::-1])}
-    named = {one.kind for one in search.named}
+    tied = {one.name: other.kind for pair in search.ties for one, other in (pair, pair[::-1])}
+    named = {one.name for one in search.named}
     undecided = tuple(
         Alternative(
-            kind,
+            kind_of(name),
             None,
             f"explains the recording no better than {other}",
-            would_settle(kind, other),
+            would_settle(kind_of(name), other),
         )
-        for kind, other in tied.items()
-        if kind not in named
+        for name, other in tied.items()
+        if name not in named
     )
     considered = tuple(
-        f"Considered and not named: {kind}: {why}."
-        for kind, why in search.refused.items()
-        if kind not in tied
+        f"Considered and not named: {name}: {why}."
+        for name, why in search.refused.items()
+        if name not in tied
     )
     return Finding(
         verdict,
@@ -204,7 +206,7 @@ def _finding(
     )
 
 
-def _omitted(named: Named, mismatches: tuple[Mismatch, ...], gain: Gain) -> OmittedEffect:
+def _omitted(named: Named, why: tuple[str, ...], gain: Gain) -> OmittedEffect:
     parameters = {}
     if named.proposal is not None:
         effect = named.proposal.effect
@@ -225,4 +227,4 @@ def _omitted(named: Named, mismatches: tuple[Mismatch, ...], gain: Gain) -> Omit
         )
         for kind, worse in named.rivals
     )
-    return OmittedEffect(named.kind, parameters, because(mismatches, named.kind), gain, rivals)
+    return OmittedEffect(named.kind, parameters, why, gain, rivals)

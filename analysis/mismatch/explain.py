@@ -1,11 +1,10 @@
 """Which effect explains which mismatch: by what each changes in the numbers that are off."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.mismatch.finding import Mismatch
 from analysis.mismatch.locate import FAMILY
 from analysis.mismatch.state import State
 
@@ -23,7 +22,7 @@ def explained(
     base, final
         The re-calibrated base model and the final one.
     changes
-        By effect: what it changes in the numbers, in standard deviations of the base null.
+        By effect's name: what it changes in the numbers, in deviations of the base null.
     """
     found: dict[str, tuple[str | None, float]] = {}
     matrix = base.null.contrasts.matrix
@@ -52,6 +51,6 @@ def explained(
     return found
 
 
-def because(mismatches: Sequence[Mismatch], kind: str) -> tuple[str, ...]:
+def because(explanations: Mapping[str, tuple[str | None, float]], name: str) -> tuple[str, ...]:
     """Return the statistics that an effect explains."""
-    return tuple(m.statistic for m in mismatches if m.explained_by == kind)
+    return tuple(statistic for statistic, (own, _) in explanations.items() if own == name)

@@ -184,7 +184,7 @@ def _frequency(
         top = 0.25 if of_planes else 0.5
         return top * (name != "rows"), top * (name != "columns")
     kind = {
-        "spectral_peak": "spectrum",
+        "spectral_peak": f"spectrum, {key.detail}" if key.detail else "spectrum",
         "row_spectrum_peak": "rows of light" if key.detail == "light" else "rows",
     }.get(statistic)
     peak = seen.peaks.get((key.channel, kind or ""))

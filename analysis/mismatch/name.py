@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from analysis.mismatch.bending import bends
 from analysis.mismatch.candidates import Proposal
 from analysis.mismatch.contradicted import contradicted
+from analysis.mismatch.instance import LINES, Frequency, frequency_of, instance
 from analysis.mismatch.observe import Frames
 from analysis.mismatch.phase import keeps_phase
 from analysis.mismatch.polish import polish, with_effects
@@ -25,7 +26,7 @@ Array = NDArray[np.float64]
 Step = Callable[[], None]
 LEAST_GAIN = 2.0  # of log-likelihood, for an effect to be taken in where something is located
 _TIE = 3.0  # of log-likelihood: odds below 20 do not tell two effects apart
-_MOST_EFFECTS = 8
+_MOST_EFFECTS = 10  # kinds: some may have to go again
 _CLEAR = 3.0  # departures below are chance
 _PHASES = {
     "periodic_noise": "the pattern's phase is the same in all frames but for its sign",
@@ -63,6 +64,11 @@ class Named:
     rivals: tuple[tuple[str, float], ...]
     switch_dn: float = float("nan")
 
+    @property
+    def name(self) -> str:
+        """Its kind, and of a line its frequency: a sensor may have several."""
+        return instance(self.kind, None if self.proposal is None else self.proposal.effect)
+
 
 @dataclass
 class Search:
@@ -76,21 +82,34 @@ class Search:
     named: list[Named] = field(default_factory=list)
     refused: dict[str, str] = field(default_factory=dict)
     ties: list[tuple[Ranked, Ranked]] = field(default_factory=list)
+    settled: list[tuple[str, Frequency]] = field(default_factory=list)
     frames_of: Frames | None = None
     memory: Memory = field(default_factory=Memory)
 
     def run(self) -> State:
         """Return the final state."""
         state = self.base
-        while state.mismatches and len(self.named) < _MOST_EFFECTS:
+        while state.mismatches and len({n.kind for n in self.named}) < _MOST_EFFECTS:
             added = self._best(state)
             if added is None:
                 break
-            self.named.append(added[0])
+            self._take(added[0])
             state = State.of(self.setting, added[1], self.step, draft=True)
         if not state.mismatches:
             self.ties = []  # what was undecided on the way is explained
         return self._pruned(self._polished(state))
+
+    def _take(self, named: Named) -> None:
+        self.named.append(named)
+        line = frequency_of(None if named.proposal is None else named.proposal.effect)
+        if line is not None:
+            self.settled += [(kind, line) for kind in sorted(LINES)]
+
+    def _refuse(self, kind: str, effect: Effect | None, why: str) -> None:
+        self.refused[instance(kind, effect)] = why
+        line = frequency_of(effect)
+        if line is not None:
+            self.settled.append((kind, line))
 
     def settle(self, state: State) -> State:
         """Return the state with final parameters; their errors go into the effects named."""
@@ -128,7 +147,7 @@ class Search:
 
     def drop(self, state: State, named: Named, why: str) -> State:
         """Return the state without an effect, which is refused from now on."""
-        self.refused[named.kind] = why
+        self._refuse(named.kind, None if named.proposal is None else named.proposal.effect, why)
         self.named.remove(named)
         return State.of(self.setting, self.without(state, named), self.step)
 
@@ -143,7 +162,7 @@ class Search:
             else:
                 change = final.null.mean - predictor.mean(self.without(final, named))
             known = null.known & np.isfinite(change)
-            found[named.kind] = np.where(known, change, 0.0) / null.sd
+            found[named.name] = np.where(known, change, 0.0) / null.sd
         return found
 
     def _best(self, state: State) -> tuple[Named, Camera] | None:
@@ -174,7 +193,7 @@ class Search:
         return Named(best.kind, effect, best.polished.errors[0], best.gain, rivals), camera
 
     def _left(self) -> frozenset[str]:
-        return self.vocabulary - {n.kind for n in self.named} - self.refused.keys()
+        return self.vocabulary - {n.name for n in self.named} - self.refused.keys()
 
     def _decided(self, state: State) -> list[Ranked]:
         """Return the effects that may be claimed; the best of pairs that tie are put aside.
@@ -185,11 +204,11 @@ class Search:
         self.ties = []
         while True:
             apart = [one.polished.mean for pair in self.ties for one in pair]
-            fitted = ranked(state, self._left(), self.memory, self.step, apart)
-            refused = len(self.refused)
-            fitted = self._phased(fitted)
-            if len(self.refused) > refused:
-                continue  # others were too far behind what is refused now
+            settled = tuple(self.settled)
+            left = self._left()
+            fitted = self._phased(ranked(state, left, self.memory, self.step, settled, apart))
+            if len(self.settled) > len(settled):
+                continue  # a line was refused: others were too far behind it
             if (
                 len(fitted) < 2
                 or fitted[1].gain <= max(fitted[0].gain - _TIE, LEAST_GAIN)
@@ -200,16 +219,19 @@ class Search:
 
     def _phased(self, fitted: list[Ranked]) -> list[Ranked]:
         """Keep interference or a bistable pattern, alike in power, as the phases say."""
-        patterns = [one for one in fitted if one.kind in _PHASES]
-        if not patterns or self.frames_of is None:
+        if self.frames_of is None:
             return fitted
-        frequency = patterns[0].polished.effects[0].frequency  # type: ignore[attr-defined] # both have one
-        kept = keeps_phase(self.setting.layout, self.frames_of, frequency)
-        if kept is None:
-            return fitted
-        wrong = "periodic_noise" if kept else "bistable_pattern"
-        self.refused[wrong] = _PHASES[wrong]
-        return [one for one in fitted if one.kind != wrong]
+        left = []
+        for one in fitted:
+            frequency = frequency_of(one.proposal.effect)
+            kept = None
+            if frequency is not None:
+                kept = keeps_phase(self.setting.layout, self.frames_of, frequency)
+            if kept is None or kept == (one.kind == "bistable_pattern"):
+                left.append(one)
+            else:
+                self._refuse(one.kind, one.proposal.effect, _PHASES[one.kind])
+        return left
 
     def _polished(self, state: State) -> State:
         """Fit the parameters of all effects together, and judge the result once more."""

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.candidates import CANDIDATES, Proposal
+from analysis.mismatch.instance import Frequency, instance
 from analysis.mismatch.model import in_threads
 from analysis.mismatch.polish import Polished, polish, with_effects
 from analysis.mismatch.state import Setting, State
@@ -81,21 +82,28 @@ class Ranked:
     proposal: Proposal
     polished: Polished
 
+    @property
+    def name(self) -> str:
+        """Its kind, and of a line its frequency."""
+        return instance(self.kind, self.proposal.effect)
+
 
 def ranked(
     state: State,
     kinds: Iterable[str],
     memory: Memory,
     step: Callable[[], None],
+    settled: tuple[tuple[str, Frequency], ...] = (),
     apart: Sequence[Array] = (),
 ) -> list[Ranked]:
     """Return the effects among `kinds` that mismatches call for, fitted one at a time.
 
-    What changes the same numbers as one of the predictions `apart` is not considered.
+    `settled` are lines that need no trial; see `Clues`. What changes the same numbers as one of the
+    predictions `apart` is not considered.
     """
     predictor = state.predictor()
     before = predictor.loglik(state.null.mean)
-    tried = _tried(state, kinds, memory, step, apart)
+    tried = _tried(state, kinds, memory, step, settled, apart)
     best = max((value for value, _, _ in tried), default=0.0)
     far = max(_FAR, _SHARE * (best - before))
     found: list[Ranked] = []
@@ -117,11 +125,12 @@ def _tried(
     kinds: Iterable[str],
     memory: Memory,
     step: Callable[[], None],
+    settled: tuple[tuple[str, Frequency], ...],
     apart: Sequence[Array],
 ) -> list[tuple[float, str, Proposal]]:
     """Return the best proposals of each kind as they are proposed, the most likely first."""
     off = {m.statistic for m in state.mismatches}
-    clues = state.clues()
+    clues = state.clues(settled)
     proposed = [
         (kind, proposal)
         for kind in sorted(kinds)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from analysis.mismatch.basefit import BaseFit
 from analysis.mismatch.clues import Clues
 from analysis.mismatch.finding import Mismatch
+from analysis.mismatch.instance import Frequency
 from analysis.mismatch.layout import Layout
 from analysis.mismatch.locate import located, tested
 from analysis.mismatch.model import simulate
@@ -143,10 +144,10 @@ class State:
         """The base numbers."""
         return self.calibrated.fit
 
-    def clues(self) -> Clues:
-        """Return what proposals start from."""
+    def clues(self, settled: tuple[tuple[str, Frequency], ...] = ()) -> Clues:
+        """Return what proposals start from; `settled` are lines that need no trial."""
         s = self.setting
-        return Clues(s.layout, s.seen, self.vector, self.fit, self.null, self.camera)
+        return Clues(s.layout, s.seen, self.vector, self.fit, self.null, self.camera, settled)
 
     def predictor(self, replicates: int | None = None) -> Predictor:
         """Return predictions of other cameras beside this one."""

@@ -82,7 +82,7 @@ class BistablePattern(Effect):
         )
 
 
-@lru_cache(maxsize=1)
+@lru_cache(maxsize=4)
 def _cosine(grid: PixelGrid, frequency: tuple[float, float]) -> NDArray[np.float32]:
     """Return cos(2 pi (u x + w y)): the same in all frames, and most of the effect's time."""
     u, w = frequency

@@ -17,7 +17,7 @@ from dsis.measures import kernels
 from dsis.measures.assembly import measured
 from dsis.measures.codes import CodeCounts
 from dsis.measures.first_pass import Passed, first_pass
-from dsis.measures.kernels import Sums
+from dsis.measures.kernels import FiveSums, Sums
 from dsis.measures.lag_products import half_plane, lag_products
 from dsis.measures.measured import Measured
 from dsis.measures.plane import Region, planes, sheets
@@ -28,8 +28,8 @@ LAGS = 4
 class Accumulator:
     """Measures one exposure from its frames, given one at a time.
 
-    Memory: five float64 and six float32 arrays of the size of a frame, two sums per row and
-    column of each frame, one code histogram.
+    Memory: five float64 (with three frames and more) and six float32 arrays of the size of a
+    frame, two sums per row and column of each frame, one code histogram.
 
     Parameters
     ----------
@@ -76,8 +76,7 @@ class Accumulator:
             raise ValueError(message)
         self.reach = lags
         self.frames = 0
-        s1, s2, s3, s4, s11 = (np.zeros(self.shape) for _ in range(5))
-        self.moments = (s1, s2, s3, s4, s11)
+        self.moments: FiveSums | None = None  # of two frames the second's residual says it all
         self.first: NDArray[np.float32]  # set by the first frame, as are the next four
         self.difference: NDArray[np.float32]
         self.before: NDArray[np.float32]
@@ -143,15 +142,19 @@ class Accumulator:
 
     def _take_noise(self, row_offset: Sums, column_offset: Sums) -> None:
         self.centred, self.centred_before = self.centred_before, self.centred
-        kernels.add_moments(
-            self.difference,
-            row_offset,
-            column_offset,
-            self.centred_before,
-            self.centred,
-            self.moments,
-            self.threads,
-        )
+        if self.frames == 1:
+            kernels.centre(self.difference, row_offset, column_offset, self.centred, self.threads)
+        else:
+            self.moments = self.moments or kernels.started(self.centred_before)
+            kernels.add_moments(
+                self.difference,
+                row_offset,
+                column_offset,
+                self.centred_before,
+                self.centred,
+                self.moments,
+                self.threads,
+            )
         self.lag_sums += lag_products(self.centred, self.reach, self.threads)
 
 

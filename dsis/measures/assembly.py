@@ -17,7 +17,7 @@ from dsis.measures.lag_products import lag_products
 from dsis.measures.measured import Channel, Measured
 from dsis.measures.moments import PixelMoments, kept
 from dsis.measures.pairs import pair_variance
-from dsis.measures.pixels import pixel_moments
+from dsis.measures.pixels import pair_moments, pixel_moments
 from dsis.measures.plane import Plane, Sheets
 from dsis.measures.spectra import line_peak, spectral_peak
 from dsis.measures.variance_components import Components, components, line_power
@@ -92,10 +92,11 @@ def _noise(sums: Accumulator, sheet: Sheets) -> list[_Noise]:
     row_power, column_power = line_power(rows, means), line_power(columns, means)
     surfaces = np.array(sheet.surfaces)
     mean_frames, changes = np.empty((count, n, m)), np.empty((count, n, m))
+    total = sums.centred.astype(np.float64) if sums.moments is None else sums.moments[0]
     first = [
         kernels.mean_frame(
             sums.first,
-            sums.moments[0],
+            total,
             frames,
             plane.place,
             rows[k],
@@ -110,15 +111,14 @@ def _noise(sums: Accumulator, sheet: Sheets) -> list[_Noise]:
     transform = scipy.fft.rfft2(changes.astype(np.float32), workers=sums.threads, overwrite_x=True)
     noise = []
     for k, plane in enumerate(sheet.planes):
-        variance, neighbour, scatter = pixel_moments(
-            sums.moments,
-            sums.centred,
-            frames,
-            plane.place,
-            plane.shape,
-            kept(frames, n, m, 2),
-            sums.threads,
-        )
+        share = kept(frames, n, m, 2)
+        if sums.moments is None:
+            found = pair_moments(sums.centred, plane.place, plane.shape, share, sums.threads)
+        else:
+            found = pixel_moments(
+                sums.moments, sums.centred, frames, plane.place, plane.shape, share, sums.threads
+            )
+        variance, neighbour, scatter = found
         noise.append(
             _Noise(
                 plane,
@@ -139,7 +139,9 @@ def _noise(sums: Accumulator, sheet: Sheets) -> list[_Noise]:
 
 def _temporal_correlations(sums: Accumulator, noise: list[_Noise]) -> list[Autocorrelation]:
     """Return the correlations of the residual: sums of u u' less those of its mean over time."""
-    if sums.frames == 2:  # the first is zero: the mean is half the second, products are quarters
+    if (
+        sums.moments is None
+    ):  # the first is zero: the mean is half the second, products are quarters
         left = sums.lag_sums / 4
     else:
         mean = (sums.moments[0] / sums.frames).astype(np.float32)

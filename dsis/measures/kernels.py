@@ -41,6 +41,24 @@ def add_moments(
     over_rows(block, difference.shape[0], threads)
 
 
+def centre(
+    difference: Frame, row_offset: Sums, column_offset: Sums, centred: Frame, threads: int
+) -> None:
+    """Write u = difference - offsets to `centred`, as `add_moments` does."""
+
+    def block(first: int, last: int) -> None:
+        _centre(difference, row_offset, column_offset, centred, first, last)
+
+    over_rows(block, difference.shape[0], threads)
+
+
+def started(centred: Frame) -> FiveSums:
+    """Return the sums of u, u^2, u^3, u^4 and u previous over a zero and one frame u."""
+    u = centred.astype(np.float64)
+    square = u * u
+    return u, square, square * u, square * square, np.zeros_like(u)
+
+
 def offsets(by_row: Sums, by_column: Sums, single: bool) -> tuple[Sums, Sums, Sums]:
     """Return what to subtract from each pixel, and the mean of each phase (2, 2).
 
@@ -109,6 +127,18 @@ def _add_moments(
             a3[x] += square * u
             a4[x] += square * square
             a11[x] += u * before[x]
+
+
+@kernel
+def _centre(
+    difference: Frame, row_offset: Sums, column_offset: Sums, centred: Frame, first: int, last: int
+) -> None:
+    columns = difference.shape[1]
+    for y in range(first, last):
+        line, out, offset = difference[y], centred[y], column_offset[y & 1]
+        even, odd = row_offset[y, 0], row_offset[y, 1]
+        for x in range(columns):
+            out[x] = np.float32(line[x] - offset[x] - (odd if x & 1 else even))
 
 
 @kernel

@@ -13,6 +13,7 @@ from dsis.measures.kernels import FiveSums, Frame, Sums
 
 _BLOCK = ROWS_PER_BLOCK
 _FIRST, _SECOND = 4, 10  # sums of powers, and of products of two
+_OF_PAIRS = 7  # sums of powers and products where there are two frames
 Place = tuple[int, int, int]
 """First row, first column and step of a channel."""
 
@@ -103,6 +104,52 @@ def pixel_moments(
     p = summed((square, cube, fourth, pairs, a, b, k4))[_FIRST:].tolist()
     some = of_squares > 0
     return variance, neighbour, Scatter(some, square, cube, fourth, pairs, k4, *p)
+
+
+def pair_moments(
+    last: Frame, place: Place, shape: tuple[int, int], kept: float, threads: int
+) -> tuple[Sums, Sums, Scatter]:
+    """Return the same as `pixel_moments` for two frames, from the second one's u alone.
+
+    Residuals are u / 2 and -u / 2: u^2 / 4 is the mean square s, 0 the mean cube, s^2 the mean
+    fourth power, -s the mean product.
+    """
+    n, m = shape
+    variance = np.empty(shape)
+    by_block = np.empty((-(-n // _BLOCK), _OF_PAIRS))
+
+    def summed(centre: tuple[float, float]) -> Sums:
+        def block(start: int, stop: int) -> None:
+            lines = np.empty((1 + _OF_PAIRS, m))
+            _add_pairs(
+                last, *place, np.array([kept, *centre]), variance, start, stop, lines, by_block
+            )
+
+        over_rows(block, n, threads)
+        whole: Sums = by_block.sum(0) / (n * m)
+        return whole
+
+    square, fourth = summed((0.0, 0.0))[:2].tolist()
+    squares, squares_3, squares_4, fourths, both = summed((square, fourth))[2:].tolist()
+    scatter = Scatter(
+        fourth > 0,
+        square,
+        0.0,
+        fourth,
+        -square,
+        0.0,
+        squares,
+        squares_3,
+        squares_4,
+        0.0,
+        0.0,
+        fourths,
+        both,
+        squares,
+        -squares,
+        0.0,
+    )
+    return variance, variance * -kept, scatter
 
 
 @inlined
@@ -197,6 +244,55 @@ def _add_powers(
         else:
             _sum_products(square, cube, fourth, pairs, numbers, total)
         if (y + 1) % _BLOCK == 0 or y + 1 == last:
+            for part in range(total.shape[0]):
+                whole = 0.0
+                for x in range(m):
+                    whole += total[part, x]
+                out[y // _BLOCK, part] = whole
+
+
+@kernel
+def _add_pairs(
+    last: Frame,
+    y0: int,
+    x0: int,
+    step: int,
+    numbers: Sums,
+    variance: Sums,
+    first: int,
+    stop: int,
+    lines: Sums,
+    out: Sums,
+) -> None:
+    """Write sums over blocks of rows (block, `_OF_PAIRS`) to `out`, and the variance map.
+
+    Of the mean square s and its square, then about their means of d^2, d^3, d^4, f^2 and f d.
+    `numbers`: kept, means of s and s^2.
+    """
+    kept, mean2, mean4 = numbers[0], numbers[1], numbers[2]
+    square, total = lines[0], lines[1:]
+    m = variance.shape[1]
+    for y in range(first, stop):
+        line = last[y0 + y * step]
+        if y % _BLOCK == 0:
+            total[:] = 0
+        for x in range(m):
+            u = np.float64(line[x0 + x * step])
+            square[x] = u * u / 4
+        for x in range(m):
+            s = square[x]
+            variance[y, x] = s / kept
+            total[0, x] += s
+            total[1, x] += s * s
+        for x in range(m):
+            d = square[x] - mean2
+            f = square[x] * square[x] - mean4
+            total[2, x] += d * d
+            total[3, x] += d * d * d
+            total[4, x] += d * d * (d * d)
+            total[5, x] += f * f
+            total[6, x] += f * d
+        if (y + 1) % _BLOCK == 0 or y + 1 == stop:
             for part in range(total.shape[0]):
                 whole = 0.0
                 for x in range(m):

@@ -2,13 +2,16 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import islice
 from math import sqrt
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import gammaincc, gammaincinv
+from scipy.special import gammaincinv
 
-from analysis.mismatch.bank.scalars import UNKNOWN, Number, normal_score, ratio_root
+from analysis.mismatch.bank.lines import log_chance, separate, without_lines
+from analysis.mismatch.bank.scalars import UNKNOWN, Number, ratio_root, score_of_log
 from dsis.measures import Channel
 
 Array = NDArray[np.float64]
@@ -19,6 +22,7 @@ _LEAST_BINS = 8
 _ALTERNATES = 0.1  # bins from half a cycle per pixel: phases of a line drift by less than a tenth
 _ALONE = 2.0  # times as high a bin elsewhere is the peak, whatever a block sums up to
 LAGS = 16  # along a line, pixels of the plane
+RANKS = (2, 3, 4)  # of lines beside the strongest
 
 
 class VarianceSums:
@@ -145,6 +149,7 @@ class SpectrumSums:
             edge = self.power[1 : (n + 1) // 2, m // 2 :] if m % 2 == 0 else None
             inner = self.power[1:, 1 : (m + 1) // 2]
             found["spectral_peak"] = _largest(inner, degrees, edge)
+            found |= self._further(degrees)
             found["column_spectrum_peak"] = _largest(_line(self.columns), degrees)
             found |= self._lags()
             found |= self._corners(degrees)
@@ -158,7 +163,6 @@ class SpectrumSums:
         """Return where the spectrum off the axes is largest, between bins; None without noise."""
         if not self.weight[""][0]:
             return None
-        n, m = self.shape
         power = self.power / self.weight[""][0]
         inner = power[1:, 1:]
         sums = _summed(inner, (2, 2))
@@ -169,19 +173,45 @@ class SpectrumSums:
         else:
             down, across = np.unravel_index(int(block.argmax()), block.shape)
             y, x = y + down, x + across
-        fx = _frequency(x + 1 + _within_bin(inner[y], int(x)), m)
-        fy = _frequency(y + 1 + _within_bin(inner[:, x], int(y)), n)
+        return self._at(power, int(y) + 1, int(x) + 1)
+
+    def _at(self, power: Array, y: int, x: int) -> Peak:
+        """Return the line about a bin off the axes, between bins."""
+        n, m = self.shape
+        inner = power[1:, 1:]
+        fx = _frequency(x + _within_bin(inner[y - 1], x - 1), m)
+        fy = _frequency(y + _within_bin(inner[:, x - 1], y - 1), n)
         fy -= float(fy > 1 / 2)
-        return Peak(float(fx), float(fy), float(inner[y, x]))
+        return Peak(float(fx), float(fy), float(power[y, x]))
 
     def peaks(self) -> list[tuple[str, Peak]]:
-        """Return where the spectra are largest."""
+        """Return where the spectra are largest, and separate lines by their rank."""
         found = (
             ("spectrum", self.peak()),
             ("rows", self.row_peak("")),
             ("rows of light", self.row_peak("signal")),
+            *((line_name(rank), peak) for rank, peak in enumerate(self.lines(), 1)),
         )
         return [(kind, peak) for kind, peak in found if peak is not None]
+
+    def lines(self) -> list[Peak]:
+        """Return the highest separate lines off the axes, checkerboards too."""
+        power = self.power / (self.weight[""][0] or 1.0)
+        return [self._at(power, y, x) for y, x, _ in self._separate]
+
+    @cached_property
+    def _separate(self) -> list[tuple[int, int, float]]:
+        """Places and heights of the highest separate lines, when all exposures are in."""
+        white = self._white()
+        if not white > 0:
+            return []
+        return list(islice(separate(self.power, self.shape[1], white), RANKS[-1] + 1))
+
+    def _white(self) -> float:
+        """Return the power of a bin of white noise: from the median, that lines do not raise."""
+        degrees = max(round(self.degrees("")), 1)
+        middle = float(gammaincinv(degrees, 0.5)) / degrees
+        return float(np.median(self.power[1:, 1:])) / middle
 
     def row_peak(self, key: str) -> Peak | None:
         """Return where the spectrum of row means is largest."""
@@ -189,6 +219,21 @@ class SpectrumSums:
             return None
         cycles, off, power = line_top(self.fine[key] / self.weight[key][0])
         return Peak(0.0, cycles / self.shape[0], power, off)
+
+    def _further(self, degrees: int) -> dict[str, Number]:
+        """Return the normal scores of the lines beside the highest, corners left out."""
+        n, m = self.shape
+        bins = (n - 1) * (m // 2)
+        # What alternates along both axes is real: it has a number of its own.
+        heights = [h for y, x, h in self._separate if (2 * y, 2 * x) != (n, m)]
+        found: dict[str, Number] = {}
+        for rank in RANKS:
+            label = f"spectral_peak of {_rank(rank)}"
+            found[label] = UNKNOWN
+            if rank <= len(heights) and bins >= _LEAST_BINS:
+                chance = log_chance(heights[rank - 1], rank, bins, degrees)
+                found[label] = (score_of_log(chance), 1.0)
+        return found
 
     def _corners(self, degrees: int) -> dict[str, Number]:
         """Return the power of what alternates from pixel to pixel: real, one square a frame."""
@@ -206,15 +251,27 @@ class SpectrumSums:
         return found
 
     def _lags(self) -> dict[str, Number]:
-        """Return correlations along lines: of a memory, alike at all signals."""
+        """Return correlations along lines: of a memory, alike at all signals.
+
+        A memory's spectrum is smooth: sinusoids, which correlate at their period, are taken out.
+        """
         n, m = self.shape
-        covariance = np.fft.irfft2(self.relative, s=(n, m))
+        covariance = np.fft.irfft2(without_lines(self.relative, self.seen), s=(n, m))
         sd = 1 / sqrt(n * m * self.seen)
         found: dict[str, Number] = {}
         for axis, line in (("rows", covariance[0]), ("columns", covariance[:, 0])):
             for lag in range(1, min(LAGS, line.size // 2 - 1) + 1):
                 found[f"line_correlation along {axis} {lag}"] = (float(line[lag] / line[0]), sd)
         return found
+
+
+def line_name(rank: int) -> str:
+    """Return under which name the place of a line is kept."""
+    return f"spectrum, {_rank(rank)}"
+
+
+def _rank(rank: int) -> str:
+    return f"rank {rank}"
 
 
 def _line(power: Array) -> Array:
@@ -274,11 +331,11 @@ def _largest(
     parts = [(b, _summed(inner, b)) for b in blocks if b[0] <= shape[0] and b[1] <= shape[1]]
     if edge is not None and edge.size:
         parts.append(((1, 1), edge))
-    least = 1.0
-    for (high, wide), power in parts:
-        single = float(gammaincc(degrees * high * wide, degrees * float(power.max()) / white))
-        least = min(least, -float(np.expm1(power.size * np.log1p(-min(single, 0.5)))))
-    return normal_score(least), 1.0
+    least = min(
+        log_chance(float(power.max()) / white / (high * wide), 1, power.size, degrees * high * wide)
+        for (high, wide), power in parts
+    )
+    return score_of_log(least), 1.0
 
 
 def _summed(power: Array, block: tuple[int, int]) -> Array:

@@ -156,13 +156,20 @@ def _peak(found: Estimate) -> Number:
 
 def gumbel_score(scaled: float) -> float:
     """Return the normal score of a standard Gumbel variate."""
-    chance = exp(-min(scaled, 700.0)) if scaled > 30 else -np.expm1(-exp(-scaled))
-    return normal_score(float(chance))
+    return score_of_log(-scaled if scaled > 30 else log(-np.expm1(-exp(-scaled))))
 
 
 def normal_score(chance: float) -> float:
     """Return the normal deviate that is exceeded with this probability."""
     return -float(scipy.special.ndtri(max(chance, 1e-300)))
+
+
+def score_of_log(log_chance: float) -> float:
+    """Return the normal deviate exceeded with a probability of which the logarithm is given.
+
+    So a strong line has no highest score, from which on its amplitude could not be told.
+    """
+    return -float(scipy.special.ndtri_exp(min(log_chance, -1e-12)))
 
 
 def _largest(channel: Channel, frames: int) -> Number:

@@ -1,11 +1,14 @@
 """Lines and frames that move together: row and column noise, drift, flicker, bands, patterns."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from math import sqrt
 
-from analysis.mismatch.bank.coherent import Peak
+from analysis.mismatch.bank.coherent import RANKS, Peak, line_name
 from analysis.mismatch.candidates.candidate import Candidate, Proposal, proposals
 from analysis.mismatch.clues import Clues, alike
+from analysis.mismatch.instance import same_line
+
+_LEAST_POWER = 1.2  # of a line worth a trial, white noise at 1
 
 
 def _lines(kind: str, statistic: str) -> Candidate:
@@ -73,7 +76,7 @@ def _pink(clues: Clues) -> Sequence[Proposal]:
 def _patterns(kind: str) -> Candidate:
     def propose(clues: Clues) -> Sequence[Proposal]:
         found: list[Proposal] = []
-        for fx, fy, amplitude in frequencies(clues):
+        for fx, fy, amplitude in frequencies(clues, kind):
             corner = abs(fx) in (0.0, 0.5) and abs(fy) in (0.0, 0.5)
             size = amplitude / 2 if corner and kind == "bistable_pattern" else amplitude
             found += proposals(kind, ["amplitude_dn"], amplitude_dn=size, frequency=(fx, fy))
@@ -87,7 +90,7 @@ def _patterns(kind: str) -> Candidate:
     )  # fmt: skip
 
 
-def frequencies(clues: Clues) -> list[tuple[float, float, float]]:
+def frequencies(clues: Clues, kind: str) -> list[tuple[float, float, float]]:
     """Return candidates (fx, fy) in cycles per pixel of the mosaic, with amplitudes in DN.
 
     Planes of a mosaic see frequencies modulo half a cycle per pixel: each alias is one.
@@ -95,11 +98,7 @@ def frequencies(clues: Clues) -> list[tuple[float, float, float]]:
     place = min(clues.places, key=lambda p: clues.seen.levels[p].variance_dn2)
     v = clues.seen.levels[place].variance_dn2
     found = []
-    for kind in ("spectrum", "rows", "columns"):
-        clear = clearest(clues, kind)
-        if clear is None or clear[1].power < 1.2:
-            continue
-        channel, peak = clear
+    for channel, peak in _strongest(clues, kind):
         n, m = clues.shape(channel)
         amplitude = 2 * sqrt(max(peak.power - 1, 0.05) * v / (n * m))
         if channel == "MONO":
@@ -117,6 +116,26 @@ def frequencies(clues: Clues) -> list[tuple[float, float, float]]:
             found += [(0.5, 0.0, 2 * sqrt(frame)), (0.0, 0.5, 2 * sqrt(frame)),
                       (0.5, 0.5, 2 * sqrt(frame))]  # fmt: skip
     return found
+
+
+def _strongest(clues: Clues, kind: str) -> Iterator[tuple[str, Peak]]:
+    """Yield the strongest line of the plane, of rows and of columns that is not settled yet."""
+
+    def settled(channel: str, peak: Peak) -> bool:
+        step = 1 if channel == "MONO" else 2
+        at = (peak.fx / step, peak.fy / step)
+        return any(
+            one == kind and same_line(known, at, *clues.shape(channel), step)
+            for one, known in clues.settled
+        )
+
+    ranks = [line_name(rank) for rank in range(1, RANKS[-1] + 2)]
+    for names in (["spectrum", *ranks], ["rows"], ["columns"]):
+        lines = (clearest(clues, name) for name in names)
+        left = (line for line in lines if line is not None and not settled(*line))
+        line = next(left, None)
+        if line is not None and line[1].power >= _LEAST_POWER:
+            yield line
 
 
 def clearest(clues: Clues, kind: str) -> tuple[str, Peak] | None:

@@ -81,6 +81,15 @@ def fitted(name: str, parameter: FittedParameter) -> str:
     return " ".join(part for part in (parameter_words(name), text, unit(name)) if part)
 
 
+def effect_label(effect: OmittedEffect) -> str:
+    """Return the usual name of an effect, of a line with its frequency: there may be several."""
+    frequency = effect.parameters.get("frequency")
+    words = effect_words(effect.effect)
+    if frequency is None:
+        return words
+    return f"{words} at ({', '.join(plain(float(v)) for v in np.ravel(frequency.value))})"
+
+
 def _effect_in_short(effect: OmittedEffect) -> str:
     numbers = "; ".join(fitted(name, p) for name, p in effect.parameters.items())
     return f"{effect_words(effect.effect)} ({numbers})" if numbers else effect_words(effect.effect)
@@ -101,9 +110,9 @@ def unproven(finding: Finding) -> list[str]:
     for effect in finding.omitted_physics:
         low, high = effect.heldout_gain.ci95
         if not (isfinite(low) and isfinite(high)):
-            unknown.append(effect_words(effect.effect))
+            unknown.append(effect_label(effect))
         elif low <= 0:
-            weak.append(effect_words(effect.effect))
+            weak.append(effect_label(effect))
     said = []
     if unknown:
         said.append(f"Not proven, for lack of locked frames that tell: {joined(unknown)}.")

@@ -11,6 +11,7 @@ from matplotlib.ticker import MaxNLocator, SymmetricalLogLocator
 from analysis.figures import COLOURS, GREY, INK
 from analysis.mismatch.finding import Finding, Gain
 from analysis.mismatch.report.figures.ticks import plain_numbers
+from analysis.mismatch.report.sentences import effect_label
 from analysis.mismatch.words import effect_words
 
 _LINEAR = 1.0  # nats per frame: within, the scale is linear
@@ -37,7 +38,7 @@ def rungs(finding: Finding) -> list[Rung]:
     """
     found = []
     for effect in finding.omitted_physics:
-        found.append(Rung(effect_words(effect.effect), effect.heldout_gain, "named"))
+        found.append(Rung(effect_label(effect), effect.heldout_gain, "named"))
         found += [
             Rung(f"instead: {effect_words(a.effect)}", a.heldout_gain, "considered")
             for a in effect.alternatives

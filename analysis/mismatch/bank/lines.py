@@ -1,0 +1,113 @@
+"""Lines of a 2-D power spectrum: sinusoids, each in one bin, whatever the spectrum around it.
+
+What makes neighbouring pixels alike (crosstalk, a memory, pink noise) bends a spectrum smoothly; a
+sinusoid is a single bin, or leaks into few where its frequency lies between bins.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import betainc, gammaincc, gammainccinv, gammaincinv, gammaln
+
+Array = NDArray[np.float64]
+_AROUND = 9  # bins along each axis whose median says what is around
+_LOOKED_AT = 1024  # highest bins: lines are among them
+_ALONE = -40.0  # ln of a chance, of which two bins in a spectrum are none
+_HELD = 1e-290  # chances that a float holds
+_CHANCE = 0.01  # that any bin of a spectrum without lines is taken for one
+
+
+def without_lines(power: Array, degrees: int) -> Array:
+    """Return a spectrum with its lines cut down to what is around them.
+
+    A line exceeds, by more than chance, the median of its neighbours along either axis: what rows
+    or columns of bins have in common is no line.
+
+    Parameters
+    ----------
+    power
+        Half plane of a real transform (row, columns // 2 + 1), of any unit.
+    degrees
+        Independent frames in it.
+    """
+    rows, half = power.shape
+    y, x = _highest(power)
+    near = np.arange(-(_AROUND // 2), _AROUND // 2 + 1)
+    u = np.abs(x[:, np.newaxis] + near)
+    u = np.minimum(u, 2 * (half - 1) - u) % half  # beyond its ends a half plane is mirrored
+    down = np.median(power[(y[:, np.newaxis] + near) % rows, x[:, np.newaxis]], 1)
+    level = np.maximum(down, np.median(power[y[:, np.newaxis], u], 1))
+    level /= float(gammaincinv(degrees, 0.5)) / degrees
+    limit = float(gammainccinv(degrees, _CHANCE / power.size)) / degrees
+    found = power.copy()
+    found[y, x] = np.where(power[y, x] > limit * level, level, power[y, x])
+    return found
+
+
+def separate(power: Array, columns: int, white: float) -> Iterator[tuple[int, int, float]]:
+    """Yield row and column of the bins of separate lines, and their height, the highest first.
+
+    Height is the power relative to white noise and to the most that higher lines leak into the bin:
+    of a line between bins, bin k + d has up to (sin(pi / 2N) / sin(pi (d - 1/2) / N))^2 of what its
+    larger bin k has, along each axis. The axes of the spectrum are left out: they hold what rows,
+    columns and frames have in common.
+
+    Parameters
+    ----------
+    power
+        Half plane of a real transform (row, columns // 2 + 1).
+    columns
+        Columns of the image.
+    white
+        Power of a bin without lines.
+    """
+    rows = power.shape[0]
+    y, x = _highest(power)
+    # The last column of an even number holds each line twice, in conjugate bins.
+    once = (y > 0) & (x > 0) & ~((2 * x == columns) & (2 * y > rows))
+    y, x = y[once], x[once]
+    height = power[y, x] / white
+    level = np.ones(height.size)
+    for _ in range(height.size):
+        top = int((height / level).argmax())
+        yield int(y[top]), int(x[top]), float(height[top] / level[top])
+        leaked = _leak(y - y[top], rows) * _leak(x - x[top], columns)
+        leaked += _leak(y + y[top], rows) * _leak(x + x[top], columns)  # of its conjugate
+        level += max(height[top] - 1, 0.0) * leaked**2
+        level[top] = np.inf
+
+
+def log_chance(power: float, rank: int, bins: int, degrees: float) -> float:
+    """Return the logarithm of the chance that so many of the bins are so high in white noise.
+
+    Each is Gamma(degrees) / degrees, their number binomial.
+    """
+    single = _log_above(degrees, degrees * power)
+    if single > _ALONE:
+        return float(np.log(betainc(rank, bins - rank + 1, np.exp(single))))
+    # The first term of the binomial sum: the next is as rare as one bin more.
+    return float(rank * single + gammaln(bins + 1) - gammaln(rank + 1) - gammaln(bins - rank + 1))
+
+
+def _log_above(shape: float, x: float) -> float:
+    """Return ln of the chance of Gamma(shape) above x; far out by Laplace's approximation."""
+    chance = float(gammaincc(shape, x))
+    if chance > _HELD:
+        return float(np.log(chance))
+    return float((shape - 1) * np.log(x) - x - gammaln(shape) - np.log1p(-max(shape - 1, 0.0) / x))
+
+
+def _highest(power: Array) -> tuple[NDArray[np.int_], NDArray[np.int_]]:
+    """Return rows and columns of the highest bins, in the order of the spectrum."""
+    count = min(_LOOKED_AT, power.size)
+    found = np.sort(np.argpartition(power, -count, axis=None)[-count:])
+    y, x = np.unravel_index(found, power.shape)
+    return y, x
+
+
+def _leak(distance: NDArray[np.int_], size: int) -> Array:
+    """Return the largest amplitude that leaks so many bins away, relative to the larger bin."""
+    around = np.abs((distance + size // 2) % size - size // 2)
+    farther = np.sin(np.pi / (2 * size)) / np.sin(np.pi * (np.maximum(around, 1) - 0.5) / size)
+    return np.where(around > 0, farther, 1.0)

@@ -1,0 +1,40 @@
+"""Which of its kind an effect is: a sensor may have several lines, each at its own frequency."""
+
+from dsis.effects import Effect
+
+LINES = frozenset({"periodic_noise", "bistable_pattern"})
+Frequency = tuple[float, float]
+_SAME = 1.5  # bins: a frequency is known no better than where it stands between two
+
+
+def frequency_of(effect: Effect | None) -> Frequency | None:
+    """Return the frequency of a line, cycles per pixel (x, y); None: the effect is no line."""
+    if effect is None or effect.kind not in LINES:
+        return None
+    found: Frequency = effect.frequency  # type: ignore[attr-defined] # both lines have one
+    return found
+
+
+def instance(kind: str, effect: Effect | None) -> str:
+    """Return the identity of an effect: its kind, and of a line its frequency."""
+    frequency = frequency_of(effect)
+    return kind if frequency is None else f"{kind} ({frequency[0]:.5g}, {frequency[1]:.5g})"
+
+
+def kind_of(name: str) -> str:
+    """Return the kind of an identity."""
+    return name.partition(" ")[0]
+
+
+def same_line(one: Frequency, other: Frequency, rows: int, columns: int, step: int = 1) -> bool:
+    """Return whether two frequencies are one line of a plane of rows and columns.
+
+    A plane that takes every `step`-th pixel sees frequencies modulo 1 / step; a real wave has the
+    frequency -f as well.
+    """
+
+    def apart(sign: int, axis: int, size: int) -> float:
+        turns = (sign * one[axis] - other[axis]) * step
+        return abs(turns - round(turns)) * size
+
+    return any(apart(s, 0, columns) < _SAME and apart(s, 1, rows) < _SAME for s in (1, -1))

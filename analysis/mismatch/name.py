@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from analysis.mismatch.bending import bends
 from analysis.mismatch.candidates import Proposal
 from analysis.mismatch.contradicted import contradicted
-from analysis.mismatch.instance import LINES, Frequency, frequency_of, instance
+from analysis.mismatch.instance import LINES, Frequency, frequency_of, instance, same_line
 from analysis.mismatch.observe import Frames
-from analysis.mismatch.phase import keeps_phase
+from analysis.mismatch.phase import aliases, keeps_phase, strongest
 from analysis.mismatch.polish import polish, with_effects
 from analysis.mismatch.predict import Predictor
 from analysis.mismatch.rank import Memory, Ranked, alike, ranked, replicates_for
@@ -85,6 +85,7 @@ class Search:
     settled: list[tuple[str, Frequency]] = field(default_factory=list)
     frames_of: Frames | None = None
     memory: Memory = field(default_factory=Memory)
+    seen_alias: dict[Frequency, bool] = field(default_factory=dict)
 
     def run(self) -> State:
         """Return the final state."""
@@ -206,7 +207,9 @@ class Search:
             apart = [one.polished.mean for pair in self.ties for one in pair]
             settled = tuple(self.settled)
             left = self._left()
-            fitted = self._phased(ranked(state, left, self.memory, self.step, settled, apart))
+            fitted = self._phased(
+                ranked(state, left, self.memory, self.step, settled, apart, self._possible)
+            )
             if len(self.settled) > len(settled):
                 continue  # a line was refused: others were too far behind it
             if (
@@ -216,6 +219,19 @@ class Search:
             ):
                 return fitted
             self.ties.append((fitted[0], fitted[1]))
+
+    def _possible(self, effect: Effect) -> bool:
+        """Return whether an effect may be tried: of a line, the alias that whole frames show."""
+        frequency = frequency_of(effect)
+        layout = self.setting.layout
+        if frequency is None or self.frames_of is None or len(layout.channels) == 1:
+            return True
+        if frequency not in self.seen_alias:
+            alike = aliases(frequency)
+            shown = strongest(layout, self.frames_of, alike)
+            for one in alike:
+                self.seen_alias[one] = same_line(one, shown, layout.rows, layout.columns)
+        return self.seen_alias.get(frequency, True)
 
     def _phased(self, fitted: list[Ranked]) -> list[Ranked]:
         """Keep interference or a bistable pattern, alike in power, as the phases say."""

@@ -1,25 +1,23 @@
-"""Whether a pattern keeps its phase from frame to frame: a bistable pattern, or interference.
+"""What whole frames say of a line: its phase from frame to frame, and which alias it is.
 
 The frames are projected on the pattern. A pattern whose sign alone changes gives numbers on one
 line through zero of the complex plane, free phases give a circle: |sum c^2| / sum |c|^2 is 1 or 0.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.mismatch.instance import Frequency
 from analysis.mismatch.layout import Layout
 
+FramesOf = Callable[[str], Iterable[NDArray[np.generic]]]
 _ONE_LINE, _CIRCLE = 0.75, 0.45
 _LEAST = 8  # frames, to tell
 
 
-def keeps_phase(
-    layout: Layout,
-    frames_of: Callable[[str], Iterable[NDArray[np.generic]]],
-    frequency: tuple[float, float],
-) -> bool | None:
+def keeps_phase(layout: Layout, frames_of: FramesOf, frequency: Frequency) -> bool | None:
     """Return whether the phase is kept; None where the frames cannot tell.
 
     Parameters
@@ -29,23 +27,52 @@ def keeps_phase(
     frequency
         Cycles per pixel along x and y.
     """
-    y, x = np.arange(layout.rows)[:, None], np.arange(layout.columns)
-    along_x = np.exp(-2j * np.pi * frequency[0] * x)
-    along_y = np.exp(-2j * np.pi * frequency[1] * y[:, 0])
     total, size, count = 0j, 0.0, 0
-    for exposure in layout.uniform:
-        variance = float(np.mean([layout.variance_dn2[exposure.name, c] for c in layout.channels]))
-        found = np.array(
-            [
-                along_y @ (image - image.mean()) @ along_x
-                for image in (np.asarray(f, np.float64) for f in frames_of(exposure.name))
-            ]
-        )
-        found = found - found.mean()  # what is fixed is no pattern that changes
-        total += complex((found**2).sum()) / variance**2
-        size += float((np.abs(found) ** 2).sum()) / variance**2
+    for found in _projections(layout, frames_of, [frequency]):
+        total += complex((found**2).sum())
+        size += float((np.abs(found) ** 2).sum())
         count += len(found)
     if count < _LEAST or size == 0:
         return None
     share = abs(total) / size
     return True if share > _ONE_LINE else (False if share < _CIRCLE else None)
+
+
+def strongest(layout: Layout, frames_of: FramesOf, frequencies: Sequence[Frequency]) -> Frequency:
+    """Return the frequency at which frames vary most: one plane of a mosaic cannot tell aliases."""
+    power = np.zeros(len(frequencies))
+    for found in _projections(layout, frames_of, frequencies):
+        power += (np.abs(found) ** 2).sum(0)
+    return frequencies[int(power.argmax())]
+
+
+def aliases(frequency: Frequency) -> list[Frequency]:
+    """Return the frequencies that planes of every second pixel see as this one; not the mean's."""
+    found = []
+    for ax in (0.0, 0.5):
+        for ay in (0.0, 0.5):
+            fx, fy = ((f + a + 0.5) % 1 - 0.5 for f, a in zip(frequency, (ax, ay), strict=True))
+            if abs(fx) + abs(fy) > 0:
+                found.append((fx, fy))
+    return found
+
+
+def _projections(
+    layout: Layout, frames_of: FramesOf, frequencies: Sequence[Frequency]
+) -> Iterator[NDArray[np.complex128]]:
+    """Yield of each exposure how its frames vary at each frequency: (frame, frequency).
+
+    In units of the noise's standard deviation at one frequency.
+    """
+    y, x = np.arange(layout.rows), np.arange(layout.columns)
+    waves = [(np.exp(-2j * np.pi * fy * y), np.exp(-2j * np.pi * fx * x)) for fx, fy in frequencies]
+    for exposure in layout.uniform:
+        variance = float(np.mean([layout.variance_dn2[exposure.name, c] for c in layout.channels]))
+        found = []
+        for frame in frames_of(exposure.name):
+            image = np.asarray(frame, np.float64)
+            image = image - image.mean()
+            found.append([down @ image @ across for down, across in waves])
+        made = np.array(found)
+        # What is fixed is no pattern that changes.
+        yield (made - made.mean(0)) / np.sqrt(variance * y.size * x.size)

@@ -95,15 +95,16 @@ def ranked(
     step: Callable[[], None],
     settled: tuple[tuple[str, Frequency], ...] = (),
     apart: Sequence[Array] = (),
+    possible: Callable[[Effect], bool] = lambda _: True,
 ) -> list[Ranked]:
     """Return the effects among `kinds` that mismatches call for, fitted one at a time.
 
     `settled` are lines that need no trial; see `Clues`. What changes the same numbers as one of the
-    predictions `apart` is not considered.
+    predictions `apart` is not considered, nor what is not `possible`.
     """
     predictor = state.predictor()
     before = predictor.loglik(state.null.mean)
-    tried = _tried(state, kinds, memory, step, settled, apart)
+    tried = _tried(state, kinds, memory, step, settled, apart, possible)
     best = max((value for value, _, _ in tried), default=0.0)
     far = max(_FAR, _SHARE * (best - before))
     found: list[Ranked] = []
@@ -127,6 +128,7 @@ def _tried(
     step: Callable[[], None],
     settled: tuple[tuple[str, Frequency], ...],
     apart: Sequence[Array],
+    possible: Callable[[Effect], bool],
 ) -> list[tuple[float, str, Proposal]]:
     """Return the best proposals of each kind as they are proposed, the most likely first."""
     off = {m.statistic for m in state.mismatches}
@@ -136,6 +138,7 @@ def _tried(
         for kind in sorted(kinds)
         if kind in CANDIDATES and off & set(CANDIDATES[kind].calls)
         for proposal in CANDIDATES[kind].propose(clues)
+        if possible(proposal.effect)
     ]
     predictor = state.predictor(state.setting.screening)
     by_frame = state.predictor(state.setting.drafts)

@@ -1,0 +1,127 @@
+"""The search among effects: what ties is not claimed, nor what is worse; few simulations mislead."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from analysis.mismatch import name
+from analysis.mismatch.name import Named, Search
+from analysis.mismatch.rank import alike
+from analysis.mismatch.recalibrate import _moved
+
+NUMBERS = 12
+STATE: Any = SimpleNamespace(
+    null=SimpleNamespace(known=np.ones(NUMBERS, bool), mean=np.zeros(NUMBERS), sd=np.ones(NUMBERS))
+)
+
+
+def _ranked(kind: str, gain: float, *changed: int) -> Any:
+    mean = np.zeros(NUMBERS)
+    mean[list(changed)] = 3.0
+    return SimpleNamespace(
+        kind=kind,
+        name=kind,
+        gain=gain,
+        polished=SimpleNamespace(mean=mean),
+        proposal=SimpleNamespace(effect=None),
+    )
+
+
+def _search(**values: Any) -> Search:
+    vocabulary = frozenset({"crosstalk", "spatial_filtering", "readout_memory", "row_noise"})
+    bare: dict[str, Any] = {
+        "setting": SimpleNamespace(drafts=16, layout=None),
+        "camera": None,
+        "base": None,
+        "vocabulary": vocabulary,
+        "step": lambda: None,
+    }
+    return Search(**{**bare, **values})
+
+
+def test_predictions_of_the_same_numbers_are_alike() -> None:
+    one, same, other = (_ranked("", 1, *which).polished.mean for which in ((0, 1), (1, 0), (2, 3)))
+    assert alike(STATE, one, 0.3 * same)
+    assert not alike(STATE, one, other)
+    assert not alike(STATE, one, -same)
+
+
+def test_nothing_worse_is_claimed_where_two_tie(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Crosstalk and filtering tie; memory explains the same numbers worse; row noise others."""
+    offered = [
+        _ranked("spatial_filtering", 15.0, 0, 1, 2),
+        _ranked("crosstalk", 13.5, 0, 1, 2),
+        _ranked("readout_memory", 7.2, 0, 1, 2),
+        _ranked("row_noise", 5.0, 8, 9),
+    ]
+
+    def ranked(*of: Any) -> list[Any]:
+        state, kinds, apart = of[0], of[1], of[5]
+        return [
+            one
+            for one in offered
+            if one.kind in kinds and not any(alike(state, one.polished.mean, a) for a in apart)
+        ]
+
+    monkeypatch.setattr(name, "ranked", ranked)
+    search = _search()
+    assert [one.kind for one in search._decided(STATE)] == ["row_noise"]
+    assert [{one.kind for one in pair} for pair in search.ties] == [
+        {"spatial_filtering", "crosstalk"}
+    ]
+    # What is named besides may decide: in the next round all are tried again.
+    offered[1] = _ranked("crosstalk", 9.0, 0, 1, 2)
+    assert search._decided(STATE)[0].kind == "spatial_filtering"
+    assert search.ties == []
+
+
+def test_an_effect_is_dropped_only_where_many_simulations_say_so() -> None:
+    """Two recordings may hold next to nothing of one number a frame; sixteen do."""
+    effect = Named("flicker", None, {}, 10.0, ())
+    state: Any = SimpleNamespace(predictor=lambda count: SimpleNamespace(replicates=count))
+    search = _search(named=[effect])
+    few: Any = SimpleNamespace(replicates=2)
+
+    def needless(*of: Any) -> tuple[float, str] | None:
+        predictor = of[1]
+        return (0.0, "needless") if predictor.replicates < 16 else None
+
+    assert search._worst(state, few, needless) is None
+    assert search._worst(state, few, lambda *_: (0.0, "needless")) == (effect, "needless")
+
+
+def test_a_switch_may_part_the_colours_of_one_exposure() -> None:
+    """Blue at 2598 DN is below, red at 2642 DN above: 1.7 % apart, and another gain."""
+
+    def variance(signal: float, switch: float) -> float:
+        return 104 + 2.6 * signal if signal < switch else 126 + 5.34 * signal
+
+    signals = {
+        ("flat-0", "R"): 953.0, ("flat-0", "Gr"): 1588.0, ("flat-0", "Gb"): 1589.0,
+        ("flat-0", "B"): 934.0, ("flat-1", "R"): 2642.0, ("flat-1", "Gr"): 4400.0,
+        ("flat-1", "Gb"): 4401.0, ("flat-1", "B"): 2598.0,
+    }  # fmt: skip
+    levels: Any = {
+        place: SimpleNamespace(variance_dn2=variance(s, 2630.0), dof=18_000)
+        for place, s in signals.items()
+    }
+
+    def fitted(at: tuple[float, ...]) -> Any:
+        expected = {place: variance(s, at[0]) for place, s in signals.items()}
+        return SimpleNamespace(signal_dn=signals, expected_dn2=expected)
+
+    (switch,) = _moved(levels, frozenset(), (2649.0,), fitted((2649.0,)), fitted)
+    assert 2598 < switch < 2642
+    assert _moved(levels, frozenset(), (2620.0,), fitted((2620.0,)), fitted) == (2620.0,)
+
+
+def test_what_is_named_or_refused_is_not_tried_again() -> None:
+    search = _search(named=[Named("row_noise", None, {}, 3.0, ())])
+    assert "row_noise" not in search._left()
+    assert "crosstalk" in search._left()
+    assert replace(search, refused={"crosstalk": "denied"})._left() == frozenset(
+        {"spatial_filtering", "readout_memory"}
+    )

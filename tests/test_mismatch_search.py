@@ -1,4 +1,4 @@
-"""The search among effects: what ties is not claimed, nor what is worse; few simulations mislead."""
+"""The search: what ties is not claimed, nor what is worse; few simulations mislead."""
 
 from dataclasses import replace
 from types import SimpleNamespace

@@ -58,7 +58,12 @@ def sentence(statistic: str, key: Key, z: float, where: Where) -> str:
     how = _SCOPES.get(key.scope, "")
     if key.scope == "contrast" and key.detail not in ("", "at all levels"):
         how = f" ({key.detail})"
-    if key.detail and key.scope not in ("contrast", "exposure", SCENE):
+    if statistic == "line_correlation":
+        axis, lag = key.detail.split(" ")
+        pixels = "pixel" if lag == "1" else "pixels"
+        colour = "" if key.channel == "MONO" else " of one colour"
+        how += f" ({lag} {pixels}{colour} apart along {axis})"
+    elif key.detail and key.scope not in ("contrast", "exposure", SCENE):
         how += f" ({key.detail})"
     if key.detail and key.scope == SCENE and where.signal_dn is not None:
         how += " (between {:.3g} and {:.3g} DN)".format(*where.signal_dn)

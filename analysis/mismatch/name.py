@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from analysis.mismatch.bending import bends
 from analysis.mismatch.candidates import Proposal
 from analysis.mismatch.contradicted import contradicted
+from analysis.mismatch.feigned import feigned
 from analysis.mismatch.instance import LINES, Frequency, frequency_of, instance, same_line
 from analysis.mismatch.observe import Frames
 from analysis.mismatch.phase import aliases, keeps_phase, strongest
@@ -305,7 +306,9 @@ class Search:
         return None if worst is None else worst[1:]
 
     def _denial(self, state: State, predictor: Predictor, named: Named) -> tuple[float, str] | None:
-        denial = contradicted(state, predictor, named.kind, self.without(state, named))
+        without = self.without(state, named)
+        denial = contradicted(state, predictor, named.kind, without)
+        denial = denial or feigned(state, named.kind, predictor.mean(without))
         return None if denial is None else (denial.share, denial.why)
 
     def _needless(

@@ -114,7 +114,7 @@ def ranked(
             continue
         own = state.predictor(replicates_for(state.setting, [proposal.effect]))
         polished = polish(own, state.camera, [proposal], rounds=1 + len(proposal.free))
-        if polished is not None:
+        if polished is not None and not any(alike(state, polished.mean, one) for one in apart):
             gain = polished.loglik - before - len(proposal.free)
             found.append(Ranked(gain, kind, proposal, polished))
         step()

@@ -77,11 +77,10 @@ def _step(clues: Clues, regions: str) -> float:
     steps = []
     if len(clues.layout.channels) > 1 and regions.startswith("even_odd"):
         ratio, _ = clues.amplitude("channel_ratio", alike)
-        green = clues.layout.cfa.value.index("G")
-        first_is_odd = green == 1
-        if regions == "even_odd_rows":
-            first_is_odd = "R" not in clues.layout.cfa.value[:2]
-        return ratio if first_is_odd else -ratio
+        rows = clues.layout.cfa.value[:2], clues.layout.cfa.value[2:]
+        row = int("R" in rows[1])  # of the green beside red
+        odd = row if regions == "even_odd_rows" else rows[row].index("G")
+        return ratio if odd else -ratio
     for channel, (image, _) in clues.image("gain").items():
         along = image.mean(0) if regions in ("left_right", "even_odd_columns") else image.mean(1)
         size = along.size

@@ -1,0 +1,57 @@
+"""A mean of frames that are alike varies more: that is no fixed pattern."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from analysis.mismatch.bank.key import Key
+from analysis.mismatch.feigned import feigned
+
+NUMBERS = (0, 1, 2, 4, 5, 6)  # of eight frames two are locked
+FRAMES, PIXELS = 6, 200_000
+
+
+def _state(rho: float, pattern: float, located: bool = True) -> Any:
+    """Return a state whose numbers are those of drawn frames, correlated with the one before."""
+    rng = np.random.default_rng(6)
+    frames = [rng.standard_normal(PIXELS)]
+    for _ in range(NUMBERS[-1]):
+        frames.append(rho * frames[-1] + (1 - rho**2) ** 0.5 * rng.standard_normal(PIXELS))
+    kept = np.array(frames)[list(NUMBERS)]
+    mean = kept.mean(0) + pattern * rng.standard_normal(PIXELS)
+    ratio = mean.var() * FRAMES  # 1 for frames that know nothing of one another
+    keys = tuple(
+        Key(statistic=s, scope="exposure", exposure="flat", channel="MONO", detail="")
+        for s in ("frame_correlation", "fixed_pixel_variance")
+    )
+    return SimpleNamespace(
+        setting=SimpleNamespace(
+            layout=SimpleNamespace(exposures=[SimpleNamespace(name="flat", numbers=NUMBERS)])
+        ),
+        vector=SimpleNamespace(keys=keys, values=np.array([rho, np.cbrt(ratio)])),
+        null=SimpleNamespace(mean=np.array([0.0, 1.0]), sd=np.ones(2), known=np.ones(2, bool)),
+        mismatches=[SimpleNamespace(statistic="frame_correlation")] if located else [],
+    )
+
+
+WITHOUT = np.array([0.0, 1.0])
+
+
+@pytest.mark.parametrize("kind", ["dsnu", "prnu"])
+@pytest.mark.parametrize("rho", [0.03, 0.1])
+def test_frames_that_are_alike_are_no_pattern(kind: str, rho: float) -> None:
+    """Their mean varies by 1 + 2 rho 4 / 6: four of six frames follow another one."""
+    said = feigned(_state(rho, 0.0), kind, WITHOUT)
+    assert said is not None
+    assert abs(said.share) < 0.3
+
+
+def test_a_pattern_beside_them_is_believed() -> None:
+    assert feigned(_state(0.03, 0.5), "prnu", WITHOUT) is None
+
+
+def test_what_is_explained_or_another_effect_feigns_nothing() -> None:
+    assert feigned(_state(0.1, 0.0, located=False), "prnu", WITHOUT) is None
+    assert feigned(_state(0.1, 0.0), "row_fpn", WITHOUT) is None

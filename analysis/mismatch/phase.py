@@ -64,15 +64,17 @@ def _projections(
 
     In units of the noise's standard deviation at one frequency.
     """
-    y, x = np.arange(layout.rows), np.arange(layout.columns)
-    waves = [(np.exp(-2j * np.pi * fy * y), np.exp(-2j * np.pi * fx * x)) for fx, fy in frequencies]
+    fx, fy = np.array(frequencies).T
+    y, x = np.arange(layout.rows)[:, np.newaxis], np.arange(layout.columns)[:, np.newaxis]
+    down, turns = np.exp(-2j * np.pi * fy * y), 2 * np.pi * fx * x
+    across = np.concatenate([np.cos(turns), -np.sin(turns)], 1)  # real: frames are
     for exposure in layout.uniform:
         variance = float(np.mean([layout.variance_dn2[exposure.name, c] for c in layout.channels]))
         found = []
         for frame in frames_of(exposure.name):
             image = np.asarray(frame, np.float64)
-            image = image - image.mean()
-            found.append([down @ image @ across for down, across in waves])
+            real, imaginary = np.split((image - image.mean()) @ across, 2, axis=1)
+            found.append((down * (real + 1j * imaginary)).sum(0))
         made = np.array(found)
         # What is fixed is no pattern that changes.
         yield (made - made.mean(0)) / np.sqrt(variance * y.size * x.size)

@@ -19,6 +19,7 @@ _FAR = 15.0  # of log-likelihood behind the best as proposed: fitting does not m
 _SHARE = 0.03  # or that share of what the best gains
 _COSINE = 0.5  # of what two predictions change, from which they change the same
 _ALIKE = 0.05  # relative difference of parameters up to which a proposal is an earlier one
+_SPARSE = 4  # times as many simulations
 _BY_FRAME = frozenset({"frame_variance"})
 _SHARED = 0.1  # share of an effect's change that may lie where the model moved since
 
@@ -59,7 +60,7 @@ def replicates_for(setting: Setting, effects: Iterable[Effect]) -> int:
     Of one number a frame, few frames of few simulations may hold next to nothing.
     """
     sparse = any(effect.measures == _BY_FRAME for effect in effects)
-    return setting.drafts if sparse else setting.replicates
+    return min(_SPARSE * setting.replicates, setting.drafts) if sparse else setting.replicates
 
 
 def _near(one: Effect, other: Effect) -> bool:
@@ -141,7 +142,7 @@ def _tried(
         if possible(proposal.effect)
     ]
     predictor = state.predictor(state.setting.screening)
-    by_frame = state.predictor(state.setting.drafts)
+    by_frame = state.predictor(min(_SPARSE * state.setting.replicates, state.setting.drafts))
 
     def mean(one: tuple[str, Proposal]) -> tuple[Array | None, bool]:
         known = memory.recalled(one[1].effect, state)

@@ -18,8 +18,8 @@ ROWS, COLUMNS = 64, 96
 TAPS = registry()["tap_mismatch"](gain_percent=GAIN_PERCENT, regions="top_bottom")
 
 
-def fixed(gains: Array) -> Denial | None:
-    """Return what is said of tap mismatch in a sensor whose rows have gains: (row,)."""
+def with_taps(gains: Array) -> State:
+    """Return the state of a camera of two taps beside a sensor whose rows have gains: (row,)."""
     recording = recorded(camera(), 5, rows=ROWS, columns=COLUMNS, levels=LEVELS)
     assert recording.stacks is not None
     for i, level in enumerate(LEVELS):
@@ -30,7 +30,12 @@ def fixed(gains: Array) -> Denial | None:
     numbers = {e.name: e.numbers for e in layout.exposures}
     seen = observe(layout, lambda name: source.frames(name, numbers[name]))
     setting = Setting(layout, seen, None, 1, 1, 8, 8, 2, 2, 2)
-    state = State.of(setting, camera(TAPS), lambda: None)
+    return State.of(setting, camera(TAPS), lambda: None)
+
+
+def fixed(gains: Array) -> Denial | None:
+    """Return what is said of tap mismatch in a sensor whose rows have gains: (row,)."""
+    state = with_taps(gains)
     without = state.camera.model_copy(update={"effect": ()})
     return contradicted(state, state.predictor(), "tap_mismatch", without)
 
@@ -50,3 +55,16 @@ def test_a_tilt_is_no_step_between_halves(direction: int) -> None:
     assert said.share < 0.5
     # The wrong way round all else denies it too.
     assert direction < 0 or "step between two halves" in said.why
+
+
+@pytest.mark.parametrize(("share", "needed"), [(1.0, True), (0.85, True), (0.0, False)])
+def test_what_is_clearly_there_is_needed_though_not_quite_as_fitted(
+    share: float, needed: bool
+) -> None:
+    """The error of its form is the effect's: what lies far from none is worth more than none."""
+    step = np.where(np.arange(ROWS) < ROWS / 2, -0.5, 0.5)
+    state = with_taps(1 + share * GAIN_PERCENT / 100 * step)
+    predictor = state.predictor()
+    without = predictor.mean(state.camera.model_copy(update={"effect": ()}))
+    assert (predictor.worth(without) > 10) == needed
+    assert needed or predictor.worth(without) < 0

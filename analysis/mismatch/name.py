@@ -321,10 +321,8 @@ class Search:
         if named.proposal is None:
             return None
         mean = predictor.mean(self.without(state, named))
-        # Both models answer for the numbers that both know.
-        whole = np.where(np.isfinite(mean), state.null.mean, np.nan)
         share = resolved(predictor, state, mean)
-        if predictor.loglik(whole) - predictor.loglik(mean) < LEAST_GAIN:
+        if predictor.worth(mean) < LEAST_GAIN:
             return share, "the others explain what it would explain"
         if share < _RESOLVED:
             return share, f"it would explain {max(share, 0):.0%} of what it changes"

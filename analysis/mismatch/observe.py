@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.bank.bands import Bands
-from analysis.mismatch.bank.coherent import Peak, SpectrumSums, VarianceSums
+from analysis.mismatch.bank.coherent import Peak, SpectrumSums
 from analysis.mismatch.bank.common import common
 from analysis.mismatch.bank.local import local_scalars, variances, widened
 from analysis.mismatch.bank.maps import PatternSums, Regressors
 from analysis.mismatch.bank.parts import Parts, parts
+from analysis.mismatch.bank.persistent import VarianceSums
 from analysis.mismatch.bank.scalars import NAMES, UNKNOWN, Number, scalars
 from analysis.mismatch.bank.together import together
 from analysis.mismatch.layout import Layout, Place

@@ -114,6 +114,23 @@ class Predictor:
     def loglik(self, mean: Array) -> float:
         """Return the log-likelihood of the recorded numbers, relative to any constant."""
         rest, sd, known = self.weights(mean)
+        return self._likely(rest, sd, known)
+
+    def worth(self, without: Array) -> float:
+        """Return the log-likelihood that the reference gains over a prediction without an effect.
+
+        It is the effect's change whose form is not exact, so that the allowance is the reference's.
+        """
+        null = self.reference.null
+        rest, sd, known = self.weights(without)
+        form = np.where(known, self.forms * (without - null.mean), 0.0)
+        left = np.where(known, self.reference.vector.values - null.mean, 0.0)
+        scatter = np.sqrt(np.maximum(sd**2 - form**2, 0.0))
+        return self._likely(left, np.hypot(null.sd, form), known) - self._likely(
+            rest, scatter, known
+        )
+
+    def _likely(self, rest: Array, sd: Array, known: NDArray[np.bool_]) -> float:
         own = rest[known] / sd[known]
         spread = np.log(sd[known] / self.reference.null.sd[known])
         return float(-((_NU + 1) / 2 * np.log1p(own**2 / _NU) + spread).sum())

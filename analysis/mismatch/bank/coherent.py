@@ -1,4 +1,4 @@
-"""What a channel shows over all exposures: persistent pixels, spectra and lags along lines."""
+"""What a channel shows over all exposures: spectra, lines of them, and lags along lines."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -15,7 +15,6 @@ from analysis.mismatch.bank.scalars import UNKNOWN, Number, ratio_root, score_of
 from dsis.measures import Channel
 
 Array = NDArray[np.float64]
-OUTSTANDING = (4, 7, 12)  # standard deviations of a pixel's summed variance
 _SINGLE = ((1, 1),)
 _BLOCKS = (*_SINGLE, (1, 2), (2, 1), (2, 2))
 _LEAST_BINS = 8
@@ -23,49 +22,6 @@ _ALTERNATES = 0.1  # bins from half a cycle per pixel: phases of a line drift by
 _ALONE = 2.0  # times as high a bin elsewhere is the peak, whatever a block sums up to
 LAGS = 16  # along a line, pixels of the plane
 RANKS = (2, 3, 4)  # of lines beside the strongest
-
-
-class VarianceSums:
-    """Which pixels are noisy in every exposure.
-
-    Products of the pixel variances of different exposures: what they have in common is a property
-    of the pixel (its read noise, a trap); heavy tails and spikes leave it at zero.
-    """
-
-    def __init__(self, shape: tuple[int, int]) -> None:
-        self.total = np.zeros(shape)
-        self.squares, self.fourths = 0.0, 0.0
-
-    def add(self, variance_map: Array, weight: float) -> None:
-        """Take the variance of each pixel (row, column) of one exposure."""
-        mean = float(variance_map.mean())
-        if not mean > 0:
-            return
-        part = weight * (variance_map / mean - 1)
-        self.total += part
-        square = float((part**2).mean())
-        self.squares += square
-        self.fourths += square**2
-
-    def numbers(self) -> dict[str, Number]:
-        """Return the persistence, and how many pixels stand out by so many standard deviations.
-
-        Counts enter as twice their root (Anscombe 1948), of standard deviation 1.
-        """
-        found = {"variance_persistence": self._persistence()}
-        sd = sqrt(self.squares)
-        for limit in OUTSTANDING:
-            count = int((self.total > limit * sd).sum()) if sd > 0 else 0
-            found[f"noisy_pixels of {limit}"] = (2 * sqrt(count + 3 / 8), 1.0)
-        return found
-
-    def _persistence(self) -> Number:
-        """Return the mean product of different exposures in units of its null error."""
-        excess = float((self.total**2).mean()) - self.squares
-        null = 2 * (self.squares**2 - self.fourths) / self.total.size
-        if null <= 1e-12 * self.squares**2:
-            return UNKNOWN
-        return excess / sqrt(null), 1.0
 
 
 @dataclass(frozen=True)

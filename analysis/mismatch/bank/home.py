@@ -6,10 +6,10 @@ one side. What may have either sign (a step, a ratio of gains, a memory) is look
 
 from collections.abc import Mapping, Sequence
 
-from analysis.mismatch.bank.coherent import OUTSTANDING
 from analysis.mismatch.bank.common import SIGNS
 from analysis.mismatch.bank.key import MOSAIC, Key
 from analysis.mismatch.bank.parts import STANDING_OUT
+from analysis.mismatch.bank.persistent import OUTSTANDING
 from analysis.mismatch.bank.seams import WHOLE
 from analysis.mismatch.bank.surfaces import LOW
 from analysis.mismatch.bank.together import TOGETHER

@@ -6,7 +6,7 @@ from math import sqrt
 from analysis.mismatch.bank.coherent import RANKS, Peak, line_name
 from analysis.mismatch.candidates.candidate import Candidate, Proposal, proposals
 from analysis.mismatch.clues import Clues, alike
-from analysis.mismatch.instance import same_line
+from analysis.mismatch.instance import Frequency, same_line
 
 _LEAST_POWER = 1.2  # of a line worth a trial, white noise at 1
 
@@ -108,14 +108,17 @@ def frequencies(clues: Clues, kind: str) -> list[tuple[float, float, float]]:
             for ay in (0.0, 0.5):
                 fx, fy = peak.fx / 2 + ax, peak.fy / 2 + ay
                 found.append(((fx + 0.5) % 1 - 0.5, (fy + 0.5) % 1 - 0.5, amplitude))
-    if (
-        len(clues.layout.channels) > 1
-    ):  # what is constant in each plane: stripes and checkerboards of the mosaic
+    if len(clues.layout.channels) > 1:  # constant in each plane: stripes and checkerboards
         frame, _ = clues.amplitude("frame_variance", alike)
-        if frame > 0:
-            found += [(0.5, 0.0, 2 * sqrt(frame)), (0.0, 0.5, 2 * sqrt(frame)),
-                      (0.5, 0.5, 2 * sqrt(frame))]  # fmt: skip
+        stripes = ((0.5, 0.0), (0.0, 0.5), (0.5, 0.5)) if frame > 0 else ()
+        found += [(*own, 2 * sqrt(frame)) for own in stripes if not _settled(clues, kind, own, 1)]
     return found
+
+
+def _settled(clues: Clues, kind: str, at: Frequency, step: int) -> bool:
+    """Return whether a line needs no trial; `step`: of the plane that sees it."""
+    size = clues.layout.rows // step, clues.layout.columns // step
+    return any(one == kind and same_line(known, at, *size, step) for one, known in clues.settled)
 
 
 def _strongest(clues: Clues, kind: str) -> Iterator[tuple[str, Peak]]:
@@ -123,11 +126,7 @@ def _strongest(clues: Clues, kind: str) -> Iterator[tuple[str, Peak]]:
 
     def settled(channel: str, peak: Peak) -> bool:
         step = 1 if channel == "MONO" else 2
-        at = (peak.fx / step, peak.fy / step)
-        return any(
-            one == kind and same_line(known, at, *clues.shape(channel), step)
-            for one, known in clues.settled
-        )
+        return _settled(clues, kind, (peak.fx / step, peak.fy / step), step)
 
     ranks = [line_name(rank) for rank in range(1, RANKS[-1] + 2)]
     for names in (["spectrum", *ranks], ["rows"], ["columns"]):

@@ -18,7 +18,8 @@ from analysis.mismatch.observe import Level
 Array = NDArray[np.float64]
 CLIPPED_SHARE = 1e-3
 _ROUNDS = 8
-_MOST_STRETCH = 30.0  # a variance that rounding has all but hidden
+_MOST_STRETCH = 30.0  # below, a variance is known well enough for any number of samples
+_MOST_ERROR = 0.5  # of a variance before rounding
 _HUBER = 4.0  # standard deviations from which a level counts less
 
 
@@ -113,7 +114,7 @@ def fit_base(
         for place in levels
         if place[0] not in left_out
         and _sound(levels[place])
-        and offsets.stretch.get(place, 1.0) < _MOST_STRETCH
+        and not _hidden(levels[place], offsets, place)
     ]
     x = np.array([signal[place] for place in used])
     v = np.array(
@@ -138,6 +139,15 @@ def fit_base(
         for place, value in zip(levels, line, strict=True)
     }
     return BaseFit(black, black_error, light, tuple(pieces), signal, expected)
+
+
+def _hidden(level: Level, offsets: Offsets, place: Place) -> bool:
+    """Return whether rounding has all but hidden a variance: it is known to half of itself."""
+    stretch = offsets.stretch.get(place, 1.0)
+    if stretch < _MOST_STRETCH:
+        return False
+    before = level.variance_dn2 - offsets.variance_dn2.get(place, 0.0)
+    return stretch * sqrt(2 / level.dof) * level.variance_dn2 > _MOST_ERROR * before
 
 
 def _sound(level: Level) -> bool:

@@ -26,11 +26,11 @@ class Denial:
 def contradicted(state: State, predictor: Predictor, kind: str, without: Camera) -> Denial | None:
     """Return how an effect of the state's camera is denied by the recording; None: it is not.
 
-    Of each statistic that calls for the effect, over all exposures and channels, what the model
-    without it leaves open is projected on what the effect changes: sum(c d) / sum(c^2) is 1 for the
-    right effect, c and d in standard deviations that allow for its form. One statistic that shows
-    less than half of it denies the effect: a tilt, say, is nearly a difference of the halves, but
-    has no step where they meet.
+    Of each statistic that calls for the effect, over all channels and over all exposures with light
+    or all without, what the model without it leaves open is projected on what the effect changes:
+    sum(c d) / sum(c^2) is 1 for the right effect, c and d in standard deviations that allow for its
+    form. One statistic that shows less than half of it denies the effect: a tilt, say, is nearly a
+    difference of the halves, but has no step where they meet; an amplifier glows in the dark too.
     """
     if kind not in CANDIDATES:
         return None
@@ -40,12 +40,14 @@ def contradicted(state: State, predictor: Predictor, kind: str, without: Camera)
     form = np.sqrt(1 + (predictor.forms * change) ** 2)
     clear = np.abs(change) > _CLEAR
     left = null.departures(state.vector)[: change.size]
-    groups: dict[tuple[str, str, str], list[int]] = {}
+    darks = {e.name for e in state.setting.layout.exposures if e.kind == "dark"}
+    groups: dict[tuple[str, str, str, bool], list[int]] = {}
     for i, key in enumerate(state.vector.keys):
         if clear[i] and key.statistic in CANDIDATES[kind].calls:
-            groups.setdefault((key.statistic, key.scope, key.detail), []).append(i)
+            dark = key.exposure in darks
+            groups.setdefault((key.statistic, key.scope, key.detail, dark), []).append(i)
     found = []
-    for (statistic, _, _), which in groups.items():
+    for (statistic, *_), which in groups.items():
         own, rest = change[which] / form[which], left[which] / form[which]
         square = float(own @ own)
         share = 1 + float(own @ rest) / square

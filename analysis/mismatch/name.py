@@ -27,7 +27,8 @@ Array = NDArray[np.float64]
 Step = Callable[[], None]
 LEAST_GAIN = 2.0  # of log-likelihood, for an effect to be taken in where something is located
 _TIE = 3.0  # of log-likelihood: odds below 20 do not tell two effects apart
-_MOST_EFFECTS = 10  # kinds: some may have to go again
+_MOST_EFFECTS = 10  # some may have to go again
+_MOST_LINES = 3  # further ones stay unexplained, located
 _CLEAR = 3.0  # departures below are chance
 _PHASES = {
     "periodic_noise": "the pattern's phase is the same in all frames but for its sign",
@@ -91,7 +92,7 @@ class Search:
     def run(self) -> State:
         """Return the final state."""
         state = self.base
-        while state.mismatches and len({n.kind for n in self.named}) < _MOST_EFFECTS:
+        while state.mismatches and len(self.named) < _MOST_EFFECTS:
             added = self._best(state)
             if added is None:
                 break
@@ -195,7 +196,9 @@ class Search:
         return Named(best.kind, effect, best.polished.errors[0], best.gain, rivals), camera
 
     def _left(self) -> frozenset[str]:
-        return self.vocabulary - {n.name for n in self.named} - self.refused.keys()
+        lines = sum(n.kind in LINES for n in self.named)
+        full = LINES if lines >= _MOST_LINES else frozenset()
+        return self.vocabulary - {n.name for n in self.named} - self.refused.keys() - full
 
     def _decided(self, state: State) -> list[Ranked]:
         """Return the effects that may be claimed; the best of pairs that tie are put aside.

@@ -1,8 +1,12 @@
 """An effect is not named where the statistic that calls for it denies it."""
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
+from analysis.mismatch.bank.key import Key
 from analysis.mismatch.contradicted import Denial, contradicted
 from analysis.mismatch.observe import observe
 from analysis.mismatch.source import Source
@@ -68,3 +72,27 @@ def test_what_is_clearly_there_is_needed_though_not_quite_as_fitted(
     without = predictor.mean(state.camera.model_copy(update={"effect": ()}))
     assert (predictor.worth(without) > 10) == needed
     assert needed or predictor.worth(without) < 0
+
+
+@pytest.mark.parametrize(("in_darks", "denied"), [(1.0, False), (0.0, True)])
+def test_flats_do_not_outvote_darks(in_darks: float, denied: bool) -> None:
+    """An amplifier glows in the dark too: a tilt of the light alone, however clear, is no glow."""
+    places = [("flat", 20.0), ("flat", 25.0), ("dark", 8.0), ("dark", 9.0)]
+    keys = tuple(
+        Key("fixed_smooth_tilt", "exposure", f"{kind}-{i}", "MONO", "rows")
+        for i, (kind, _) in enumerate(places)
+    )
+    change = np.array([z for _, z in places])
+    shown = np.array([z * (1 if kind == "flat" else in_darks) for kind, z in places])
+    exposures = [SimpleNamespace(name=k.exposure, kind=k.exposure[:4]) for k in keys]
+    null = SimpleNamespace(
+        mean=change, sd=np.ones(4), known=np.ones(4, bool), departures=lambda _: shown - change
+    )
+    state: Any = SimpleNamespace(
+        null=null,
+        vector=SimpleNamespace(keys=keys, values=shown),
+        setting=SimpleNamespace(layout=SimpleNamespace(exposures=exposures)),
+    )
+    predictor: Any = SimpleNamespace(mean=lambda _: np.zeros(4), forms=np.full(4, 0.08))
+    found = contradicted(state, predictor, "amp_glow", camera())
+    assert (found is not None) is denied

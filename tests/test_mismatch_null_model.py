@@ -61,6 +61,15 @@ def test_errors_of_few_codes_are_those_of_repeated_samples(mean: float, sigma: f
     assert np.std(own, ddof=1) / normal == pytest.approx(stretch, rel=0.2)
 
 
+@given(mean=st.floats(0, 4000), variance=st.floats(0, 4))
+def test_any_mean_and_variance_can_be_asked(mean: float, variance: float) -> None:
+    """Fixed offsets beside narrow noise leave pairs that no rounded normal noise has."""
+    before, noise, stretch = unrounded(mean, variance, 4095)
+    assert np.isfinite(before)
+    assert np.isfinite(noise)
+    assert stretch > 0
+
+
 def test_a_single_code_says_nothing_of_the_noise() -> None:
     assert unrounded(48.0, 0.0, 4095)[2] == np.inf
     assert unrounded(48.15, 0.1270, 4095)[2] == np.inf  # less than two codes can have

@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from analysis.mismatch.bank.key import Key
 from analysis.mismatch.evidence import Curve, Evidence, Histogram, Map, Series, Shown
 from analysis.mismatch.files import write_finding
 from analysis.mismatch.finding import Finding, FittedParameter, Gain, Where
@@ -19,6 +20,7 @@ from analysis.mismatch.report.figures import MOST, curves, pictures, series
 from analysis.mismatch.report.figures.spectra import folded
 from analysis.mismatch.report.numbers import measured
 from analysis.mismatch.report.sentences import numbers_in_short
+from analysis.mismatch.says import sentence
 from analysis.mismatch.words import effect_says, effect_words
 from dsis.effects import registry
 from mismatch_findings import FOUND, LINE, NAMED, NAN, NOTHING, ROWS, evidence
@@ -258,3 +260,19 @@ def test_frames_are_listed_in_runs(frames: set[int]) -> None:
 def test_every_effect_has_words(kind: str) -> None:
     assert effect_says(kind).endswith(".")
     assert "_" not in effect_words(kind)
+
+
+@pytest.mark.parametrize(
+    ("key", "said"),
+    [
+        (Key("line_correlation", "pooled", "", "MONO", "rows 8"), "(8 pixels apart along rows)"),
+        (Key("line_correlation", "pooled", "", "Gr", "columns 1"), "(1 pixel of one colour apart"),
+        (
+            Key("line_correlation", "contrast", "", "", "all rows 4"),
+            "of one colour apart along rows",
+        ),
+    ],
+)
+def test_correlations_along_lines_say_what_is_apart(key: Key, said: str) -> None:
+    """Sums over channels put a word before axis and lag."""
+    assert said in sentence(key.statistic, key, 5.0, Where(("flat-0",)))

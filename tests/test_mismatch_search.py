@@ -31,7 +31,9 @@ def _ranked(kind: str, gain: float, *changed: int) -> Any:
 
 
 def _search(**values: Any) -> Search:
-    vocabulary = frozenset({"crosstalk", "spatial_filtering", "readout_memory", "row_noise"})
+    vocabulary = frozenset(
+        {"crosstalk", "spatial_filtering", "readout_memory", "row_noise", "adc_dnl"}
+    )
     bare: dict[str, Any] = {
         "setting": SimpleNamespace(drafts=16, layout=None),
         "camera": None,
@@ -53,6 +55,7 @@ def test_nothing_worse_is_claimed_where_two_tie(monkeypatch: pytest.MonkeyPatch)
     """Crosstalk and filtering tie; memory explains the same numbers worse; row noise others."""
     offered = [
         _ranked("spatial_filtering", 15.0, 0, 1, 2),
+        _ranked("adc_dnl", 14.0, 5),
         _ranked("crosstalk", 13.5, 0, 1, 2),
         _ranked("readout_memory", 7.2, 0, 1, 2),
         _ranked("row_noise", 5.0, 8, 9),
@@ -68,12 +71,12 @@ def test_nothing_worse_is_claimed_where_two_tie(monkeypatch: pytest.MonkeyPatch)
 
     monkeypatch.setattr(name, "ranked", ranked)
     search = _search()
-    assert [one.kind for one in search._decided(STATE)] == ["row_noise"]
+    assert [one.kind for one in search._decided(STATE)] == ["adc_dnl", "row_noise"]
     assert [{one.kind for one in pair} for pair in search.ties] == [
         {"spatial_filtering", "crosstalk"}
     ]
     # What is named besides may decide: in the next round all are tried again.
-    offered[1] = _ranked("crosstalk", 9.0, 0, 1, 2)
+    offered[2] = _ranked("crosstalk", 9.0, 0, 1, 2)
     assert search._decided(STATE)[0].kind == "spatial_filtering"
     assert search.ties == []
 
@@ -123,5 +126,5 @@ def test_what_is_named_or_refused_is_not_tried_again() -> None:
     assert "row_noise" not in search._left()
     assert "crosstalk" in search._left()
     assert replace(search, refused={"crosstalk": "denied"})._left() == frozenset(
-        {"spatial_filtering", "readout_memory"}
+        {"spatial_filtering", "readout_memory", "adc_dnl"}
     )

@@ -18,7 +18,7 @@ from analysis.mismatch.observe import Level
 Array = NDArray[np.float64]
 CLIPPED_SHARE = 1e-3
 _ROUNDS = 8
-_MOST_STRETCH = 30.0  # below, a variance is known well enough for any number of samples
+_PLAIN = 2.0  # growth of an error below which rounding hides nothing
 _MOST_ERROR = 0.5  # of a variance before rounding
 _HUBER = 4.0  # standard deviations from which a level counts less
 
@@ -144,7 +144,7 @@ def fit_base(
 def _hidden(level: Level, offsets: Offsets, place: Place) -> bool:
     """Return whether rounding has all but hidden a variance: it is known to half of itself."""
     stretch = offsets.stretch.get(place, 1.0)
-    if stretch < _MOST_STRETCH:
+    if stretch < _PLAIN:
         return False
     before = level.variance_dn2 - offsets.variance_dn2.get(place, 0.0)
     return stretch * sqrt(2 / level.dof) * level.variance_dn2 > _MOST_ERROR * before

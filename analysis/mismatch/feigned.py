@@ -14,10 +14,9 @@ _MOST = 0.5  # of a pattern's variance, that correlation may feign
 def feigned(state: State, kind: str, without: Array) -> Denial | None:
     """Return how a pattern of single pixels is denied by what successive frames share; None: not.
 
-    Frames of variance v with correlation rho between successive ones have a mean frame of variance
-    v / n (1 + 2 rho a / n), a being how many of the n frames follow another one. Where that
-    correlation is left unexplained, and feigns half of what the pattern would explain, there may be
-    no pattern.
+    n frames of variance v, of correlation rho between neighbours (a mean over all, gaps included),
+    have a mean frame of variance v / n (1 + 2 rho (n - 1) / n). Where that correlation is left
+    unexplained, and feigns half of what the pattern would explain, there may be no pattern.
 
     Parameters
     ----------
@@ -39,18 +38,16 @@ def feigned(state: State, kind: str, without: Array) -> Denial | None:
     seen, fake = 0.0, 0.0
     for i, key in enumerate(state.vector.keys):
         place = (key.exposure, key.channel)
-        if (
-            key.statistic != "fixed_pixel_variance"
-            or place not in left
-            or not np.isfinite(without[i])
-        ):
+        if key.statistic != "fixed_pixel_variance" or place not in left:
             continue
-        frames = np.array(numbers[key.exposure])
-        follow = int((np.diff(frames) == 1).sum())
+        change = state.null.mean[i] - without[i]
+        if not (state.null.known[i] and change > state.null.sd[i]):
+            continue  # the pattern explains nothing here, or nothing is known
+        frames = len(numbers[key.exposure])
         weight = 1 / state.null.sd[i] ** 2
         # Numbers are cube roots of variances relative to the noise of the mean frame.
         seen += weight * (state.vector.values[i] ** 3 - without[i] ** 3)
-        fake += weight * 2 * left[place] * follow / len(frames)
+        fake += weight * 2 * left[place] * (frames - 1) / frames
     if fake <= _MOST * seen:
         return None
     share = 1 - fake / seen if seen > 0 else 0.0

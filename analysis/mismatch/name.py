@@ -6,7 +6,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.mismatch.bending import bends
 from analysis.mismatch.candidates import Proposal
 from analysis.mismatch.contradicted import contradicted
 from analysis.mismatch.feigned import feigned
@@ -140,7 +139,8 @@ class Search:
         No physics is credited with what better numbers give.
         """
         camera = self.without(state, named)
-        if named.proposal is not None and not bends([named.proposal.effect]):
+        effect = None if named.proposal is None else named.proposal.effect
+        if effect is not None and not effect.measures & {"level", "pixel_variance"}:
             return camera  # levels and variances know nothing of it
         own = self.setting
         model = calibrate(
@@ -178,7 +178,8 @@ class Search:
         spiky = {m.statistic for m in state.mismatches if abs(m.z) > _SPIKY} & _TAILS
         if path is not None and fitted and spiky:
             path = None  # variances of spiky noise say nothing yet
-        if path is not None and path.gain > max(LEAST_GAIN, most):
+        tied = max((one.gain for pair in self.ties for one in pair), default=0.0)
+        if path is not None and path.gain > max(LEAST_GAIN, most, tied):
             rivals = tuple((one.kind, path.gain - one.gain) for one in fitted[:3])
             error = {"switch_dn": path.error_dn}
             return (
@@ -216,13 +217,10 @@ class Search:
             )
             if len(self.settled) > len(settled):
                 continue  # a line was refused: others were too far behind it
-            if (
-                len(fitted) < 2
-                or fitted[1].gain <= max(fitted[0].gain - _TIE, LEAST_GAIN)
-                or not alike(state, fitted[0].polished.mean, fitted[1].polished.mean)
-            ):
+            rival = next((one for one in fitted[1:] if _ties(state, fitted[0], one)), None)
+            if rival is None:
                 return fitted
-            self.ties.append((fitted[0], fitted[1]))
+            self.ties.append((fitted[0], rival))
 
     def _possible(self, effect: Effect) -> bool:
         """Return whether an effect may be tried: of a line, the alias that whole frames show."""
@@ -230,12 +228,13 @@ class Search:
         layout = self.setting.layout
         if frequency is None or self.frames_of is None or len(layout.channels) == 1:
             return True
-        if frequency not in self.seen_alias:
-            alike = aliases(frequency)
+        wrapped = ((frequency[0] + 0.5) % 1 - 0.5, (frequency[1] + 0.5) % 1 - 0.5)
+        if wrapped not in self.seen_alias:
+            alike = aliases(wrapped)
             shown = strongest(layout, self.frames_of, alike)
             for one in alike:
                 self.seen_alias[one] = same_line(one, shown, layout.rows, layout.columns)
-        return self.seen_alias.get(frequency, True)
+        return self.seen_alias[wrapped]
 
     def _phased(self, fitted: list[Ranked]) -> list[Ranked]:
         """Keep interference or a bistable pattern, alike in power, as the phases say."""
@@ -330,6 +329,14 @@ class Search:
         if share < _RESOLVED:
             return share, f"it would explain {max(share, 0):.0%} of what it changes"
         return None
+
+
+def _ties(state: State, best: Ranked, other: Ranked) -> bool:
+    """Return whether another effect explains the same numbers nearly as well as the best."""
+    near = other.gain > max(best.gain - _TIE, LEAST_GAIN)
+    return (
+        near and other.kind != best.kind and alike(state, best.polished.mean, other.polished.mean)
+    )
 
 
 def _bent(base: State, final: State) -> Array:

@@ -15,10 +15,14 @@ from analysis.mismatch.layout import Layout
 FramesOf = Callable[[str], Iterable[NDArray[np.generic]]]
 _ONE_LINE, _CIRCLE = 0.75, 0.45
 _LEAST = 8  # frames, to tell
+_CLEAR = 8.0  # standard errors of the noise's power from which a line's phase is seen
+_ASIDE = 3  # bins to the neighbours that say what is around
 
 
 def keeps_phase(layout: Layout, frames_of: FramesOf, frequency: Frequency) -> bool | None:
     """Return whether the phase is kept; None where the frames cannot tell.
+
+    Of stripes and checkerboards of single pixels, all of whose samples are real, it always is.
 
     Parameters
     ----------
@@ -30,20 +34,29 @@ def keeps_phase(layout: Layout, frames_of: FramesOf, frequency: Frequency) -> bo
     total, size, count = 0j, 0.0, 0
     for found in _projections(layout, frames_of, [frequency]):
         total += complex((found**2).sum())
-        size += float((np.abs(found) ** 2).sum())
-        count += len(found)
-    if count < _LEAST or size == 0:
+        free = len(found) - 1
+        size += float((np.abs(found) ** 2).sum()) - free  # noise has no phase to keep
+        count += free
+    if count < _LEAST or size < _CLEAR * np.sqrt(count):
         return None
     share = abs(total) / size
     return True if share > _ONE_LINE else (False if share < _CIRCLE else None)
 
 
 def strongest(layout: Layout, frames_of: FramesOf, frequencies: Sequence[Frequency]) -> Frequency:
-    """Return the frequency at which frames vary most: one plane of a mosaic cannot tell aliases."""
-    power = np.zeros(len(frequencies))
-    for found in _projections(layout, frames_of, frequencies):
+    """Return the frequency at which frames vary most: one plane of a mosaic cannot tell aliases.
+
+    What rows or columns of bins have in common, as row noise has, is no line.
+    """
+    across, down = _ASIDE / layout.columns, _ASIDE / layout.rows
+    steps = ((0.0, 0.0), (-across, 0.0), (across, 0.0), (0.0, -down), (0.0, down))
+    looked_at = [(fx + u, fy + w) for fx, fy in frequencies for u, w in steps]
+    power = np.zeros(len(looked_at))
+    for found in _projections(layout, frames_of, looked_at):
         power += (np.abs(found) ** 2).sum(0)
-    return frequencies[int(power.argmax())]
+    own, left, right, below, above = power.reshape(-1, len(steps)).T
+    around = np.maximum(left + right, below + above) / 2
+    return frequencies[int((own - around).argmax())]
 
 
 def aliases(frequency: Frequency) -> list[Frequency]:

@@ -8,6 +8,7 @@ from scipy.special import ndtr
 Array = NDArray[np.float64]
 _WIDE = 1.0  # DN; above, and away from the ends, rounding adds 1/12 to 1e-8
 _REACH = 8.0
+_LEAST_LOG = -14.0  # of a variance, codes^2: less is none
 _SOLVED = 1e-8  # codes and squared codes
 _NARROW = (0.08, 0.12, 0.17, 0.24, 0.34, 0.48)  # standard deviations, codes
 
@@ -72,7 +73,9 @@ def unrounded(
         return np.asarray(_recorded(float(at[0]), float(at[1]), white_dn) - recorded)
 
     usual = np.array([mean_dn, np.log(max(variance_dn2 - 1 / 12, 0.03))])
-    found = least_squares(miss, usual, xtol=1e-13, ftol=1e-13, gtol=1e-13)
+    most = max(np.log(variance_dn2 + 1), usual[1] + 1e-3)
+    inside = ([mean_dn - 1, _LEAST_LOG], [mean_dn + 1, most])
+    found = least_squares(miss, usual, bounds=inside, xtol=1e-13, ftol=1e-13, gtol=1e-13)
     if np.abs(found.fun).max() > _SOLVED:  # narrow noise: far from the start, past flat stretches
         starts = [
             np.array([mean_dn + offset, 2 * np.log(sigma)])
@@ -80,7 +83,7 @@ def unrounded(
             for sigma in _NARROW
         ]
         start = min(starts, key=lambda at: float(np.abs(miss(at)).max()))
-        other = least_squares(miss, start, xtol=1e-13, ftol=1e-13, gtol=1e-13)
+        other = least_squares(miss, start, bounds=inside, xtol=1e-13, ftol=1e-13, gtol=1e-13)
         found = min(found, other, key=lambda one: float(one.cost))
     mean, log_variance = (float(value) for value in found.x)
     variance = float(np.exp(log_variance))

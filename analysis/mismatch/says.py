@@ -59,7 +59,7 @@ def sentence(statistic: str, key: Key, z: float, where: Where) -> str:
     if key.scope == "contrast" and key.detail not in ("", "at all levels"):
         how = f" ({key.detail})"
     if statistic == "line_correlation":
-        axis, lag = key.detail.split(" ")
+        *_, axis, lag = key.detail.split(" ")  # of all channels together, "all" comes first
         pixels = "pixel" if lag == "1" else "pixels"
         colour = "" if key.channel == "MONO" else " of one colour"
         how += f" ({lag} {pixels}{colour} apart along {axis})"

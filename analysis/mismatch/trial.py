@@ -27,7 +27,7 @@ from dsis.recording import Recording
 
 Array = NDArray[np.float64]
 _REPLICATES = 8
-_TOTAL = 3.0  # nats: chance gains as much in 5 % of recordings at most, whatever the frames
+_TOTAL = 4.6  # nats: chance gains as much in 1 % of recordings at most, whatever the frames
 _NORMAL = 1.96
 _ERRORS = 2.2  # standard errors from a gain to the end of its interval, of few frames
 
@@ -44,9 +44,8 @@ def _of_pixels(gain: Gain, frames: int) -> Gained:
     """Return the gain of the locked frames' pixels.
 
     Chance is ruled out where the gain exceeds its own uncertainty, and either its interval is above
-    zero or the ratio of likelihoods is above 20: of a model fixed before, chance exceeds that in
-    5 % of recordings at most (Markov's inequality). That anything differs at all is known at 1 %
-    before, on other frames.
+    zero or the ratio of likelihoods is above 100: of a model fixed before, chance exceeds that in
+    1 % of recordings at most (Markov's inequality).
     """
     own = gain.nats_per_frame
     above = own > (own - gain.ci95[0]) / _ERRORS

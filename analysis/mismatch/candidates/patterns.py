@@ -13,6 +13,7 @@ from analysis.mismatch.clues import Clues, alike
 from analysis.mismatch.layout import Place
 
 Array = NDArray[np.float64]
+_JUMP = 0.15  # z of the step where halves meet, of that of their means: some 0.4 of two amplifiers
 _SMOOTH = ("fixed_smooth_variance", "fixed_smooth_tilt", "fixed_smooth_falloff")
 
 
@@ -55,13 +56,17 @@ def _taps(clues: Clues) -> Sequence[Proposal]:
         ("even_odd_columns", "parity", "columns"),
         ("even_odd_rows", "parity", "rows"),
     ):
-        clear = max(
-            abs(clues.number(statistic, scope, f"{axis}{part}{joint}"))
-            for scope in ("gain", "gain alone")
+        jump, whole = (
+            max(
+                abs(clues.number(statistic, scope, f"{axis}{part}{joint}"))
+                for scope in ("gain", "gain alone")
+                for joint in ("", f", {TOGETHER}")
+            )
             for part in ("", f", {WHOLE}")
-            for joint in ("", f", {TOGETHER}")
         )
-        if clear < 3 and not (statistic == "parity" and len(clues.layout.channels) > 1):
+        if statistic == "half_seam" and jump < _JUMP * whole:
+            continue  # halves that differ without a step where they meet: a tilt
+        if max(jump, whole) < 3 and not (statistic == "parity" and len(clues.layout.channels) > 1):
             continue
         gain = 100 * _step(clues, regions)
         if gain:

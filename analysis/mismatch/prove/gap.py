@@ -2,10 +2,11 @@
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import t
 
 Array = NDArray[np.float64]
 _LEAST = 4
-_OPEN = 3.0  # standard errors by which the gap must be open before it can be closed
+_CHANCE = 0.01  # that no gap is called open: only an open one can be closed
 
 
 def gap_closed(x_locked: Array, before_sims: Array, after_sims: Array, sd: Array) -> float | None:
@@ -22,8 +23,8 @@ def gap_closed(x_locked: Array, before_sims: Array, after_sims: Array, sd: Array
 
     D is the mean squared difference from one simulation, standardised and averaged over
     simulations; Df that of two simulations of the final model. How far D scatters by chance, its
-    simulations tell, each in the recording's place: numbers hang together. Where D0 - Df is below
-    three standard errors, nothing was open: None.
+    simulations tell, each in the recording's place: numbers hang together. Where D0 - Df is what
+    chance makes of it in one of a hundred recordings, nothing was open: None.
     """
     simulations = len(after_sims)
     if simulations < _LEAST:
@@ -38,7 +39,9 @@ def gap_closed(x_locked: Array, before_sims: Array, after_sims: Array, sd: Array
     rest = np.array([((one - after) ** 2).mean() for one in after]) * simulations
     by_chance = rest / (simulations - 1)  # each is no distance from itself
     df = float(by_chance.mean())
-    error = float(by_chance.std(ddof=1)) * np.sqrt(1 + 1 / simulations)
-    if d0 - df < _OPEN * error:
+    of_before = np.array([((x - one) ** 2).mean() for one in before])
+    scatter = float(by_chance.var(ddof=1)) * (1 + 1 / simulations)
+    error = np.sqrt(scatter + float(of_before.var(ddof=1)) / len(before))
+    if d0 - df < t.isf(_CHANCE, simulations - 1) * error:
         return None
     return (d0 - d1) / (d0 - df)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.mismatch.candidates import Proposal
+from analysis.mismatch.candidates import CANDIDATES, Proposal
 from analysis.mismatch.contradicted import contradicted
 from analysis.mismatch.feigned import feigned
 from analysis.mismatch.instance import LINES, Frequency, frequency_of, instance, same_line
@@ -178,7 +178,9 @@ class Search:
         spiky = {m.statistic for m in state.mismatches if abs(m.z) > _SPIKY} & _TAILS
         if path is not None and fitted and spiky:
             path = None  # variances of spiky noise say nothing yet
-        tied = max((one.gain for pair in self.ties for one in pair), default=0.0)
+        undecided = [one for pair in self.ties for one in pair]
+        bent = [one for one in undecided if "pixel_variance" in CANDIDATES[one.kind].calls]
+        tied = max((one.gain for one in bent), default=0.0)
         if path is not None and path.gain > max(LEAST_GAIN, most, tied):
             rivals = tuple((one.kind, path.gain - one.gain) for one in fitted[:3])
             error = {"switch_dn": path.error_dn}

@@ -244,11 +244,17 @@ def _add_powers(
         else:
             _sum_products(square, cube, fourth, pairs, numbers, total)
         if (y + 1) % _BLOCK == 0 or y + 1 == last:
-            for part in range(total.shape[0]):
-                whole = 0.0
-                for x in range(m):
-                    whole += total[part, x]
-                out[y // _BLOCK, part] = whole
+            _write_sums(total, out[y // _BLOCK])
+
+
+@kernel
+def _write_sums(total: Sums, out: Sums) -> None:
+    """Write the sum of each row of `total` (part, column)."""
+    for part in range(total.shape[0]):
+        whole = 0.0
+        for x in range(total.shape[1]):
+            whole += total[part, x]
+        out[part] = whole
 
 
 @kernel
@@ -293,8 +299,4 @@ def _add_pairs(
             total[5, x] += f * f
             total[6, x] += f * d
         if (y + 1) % _BLOCK == 0 or y + 1 == stop:
-            for part in range(total.shape[0]):
-                whole = 0.0
-                for x in range(m):
-                    whole += total[part, x]
-                out[y // _BLOCK, part] = whole
+            _write_sums(total, out[y // _BLOCK])

@@ -7,7 +7,7 @@ from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.state import State
 
 Array = NDArray[np.float64]
-_PATTERNS = frozenset({"dsnu", "prnu"})
+PATTERNS = frozenset({"dsnu", "prnu"})
 _MOST = 0.5  # of a pattern's variance, that correlation may feign
 
 
@@ -27,7 +27,7 @@ def feigned(state: State, kind: str, without: Array) -> Denial | None:
     without
         The numbers predicted without it.
     """
-    if kind not in _PATTERNS or all(m.statistic != "frame_correlation" for m in state.mismatches):
+    if kind not in PATTERNS or all(m.statistic != "frame_correlation" for m in state.mismatches):
         return None
     numbers = {e.name: e.numbers for e in state.setting.layout.exposures}
     left = {

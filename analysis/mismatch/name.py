@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from analysis.mismatch.candidates import CANDIDATES, Proposal
 from analysis.mismatch.contradicted import contradicted
-from analysis.mismatch.feigned import feigned
+from analysis.mismatch.feigned import PATTERNS, feigned
 from analysis.mismatch.instance import LINES, Frequency, frequency_of, instance, same_line
 from analysis.mismatch.observe import Frames
 from analysis.mismatch.phase import aliases, keeps_phase, strongest
@@ -312,7 +312,8 @@ class Search:
     def _denial(self, state: State, predictor: Predictor, named: Named) -> tuple[float, str] | None:
         without = self.without(state, named)
         denial = contradicted(state, predictor, named.kind, without)
-        denial = denial or feigned(state, named.kind, predictor.mean(without))
+        if denial is None and named.kind in PATTERNS:
+            denial = feigned(state, named.kind, predictor.mean(without))
         return None if denial is None else (denial.share, denial.why)
 
     def _needless(

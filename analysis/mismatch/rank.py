@@ -59,8 +59,13 @@ def replicates_for(setting: Setting, effects: Iterable[Effect]) -> int:
 
     Of one number a frame, few frames of few simulations may hold next to nothing.
     """
-    sparse = any(effect.measures == _BY_FRAME for effect in effects)
-    return min(_SPARSE * setting.replicates, setting.drafts) if sparse else setting.replicates
+    if any(_sparse(effect) for effect in effects):
+        return min(_SPARSE * setting.replicates, setting.drafts)
+    return setting.replicates
+
+
+def _sparse(effect: Effect) -> bool:
+    return effect.measures == _BY_FRAME
 
 
 def _near(one: Effect, other: Effect) -> bool:
@@ -142,7 +147,8 @@ def _tried(
         if possible(proposal.effect)
     ]
     predictor = state.predictor(state.setting.screening)
-    by_frame = state.predictor(min(_SPARSE * state.setting.replicates, state.setting.drafts))
+    effects = [proposal.effect for _, proposal in proposed]
+    by_frame = state.predictor(replicates_for(state.setting, effects))
 
     def mean(one: tuple[str, Proposal]) -> tuple[Array | None, bool]:
         known = memory.recalled(one[1].effect, state)
@@ -150,7 +156,7 @@ def _tried(
             return known, True
         built = with_effects(state.camera, [one[1].effect])
         step()
-        own = by_frame if one[1].effect.measures == _BY_FRAME else predictor
+        own = by_frame if _sparse(one[1].effect) else predictor
         return (None if built is None else own.mean(built)), False
 
     # One simulation for each leaves the threads to them.

@@ -6,12 +6,13 @@ and variance is handed in as `Offsets`, found by simulation.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.mismatch.bank.bulk import LOSS
 from analysis.mismatch.layout import Layout, Place
 from analysis.mismatch.observe import Level
 
@@ -27,12 +28,25 @@ _HUBER = 4.0  # standard deviations from which a level counts less
 class Offsets:
     """What the simulated camera adds to level (DN) and pixel variance (DN^2), by place.
 
-    `stretch` is by how much an error of the recorded variance grows on the way back.
+    `stretch` is by how much an error of the recorded variance grows on the way back. Where spikes
+    dominate the variances, `bulk_dn2` is what is added to the variance of the many, and that is
+    fitted: the base numbers are theirs.
     """
 
     level_dn: Mapping[Place, float] = field(default_factory=dict)
     variance_dn2: Mapping[Place, float] = field(default_factory=dict)
     stretch: Mapping[Place, float] = field(default_factory=dict)
+    bulk_dn2: Mapping[Place, float] = field(default_factory=dict)
+
+    def fitted(self, levels: Mapping[Place, Level]) -> tuple[Mapping[Place, Level], "Offsets"]:
+        """Return levels and offsets that the base numbers are fitted to."""
+        if not self.bulk_dn2:
+            return levels, self
+        own = {
+            place: replace(level, variance_dn2=level.bulk_dn2, dof=level.dof / LOSS)
+            for place, level in levels.items()
+        }
+        return own, replace(self, variance_dn2=self.bulk_dn2)
 
 
 @dataclass(frozen=True)
@@ -106,6 +120,8 @@ def fit_base(
     slopes
         Of each segment, for segments whose levels cannot tell it.
     """
+    added_in_all = offsets.variance_dn2
+    levels, offsets = offsets.fitted(levels)
     black, black_error = _black(layout, levels, offsets, black_dn)
     signal = _signals(layout, levels, offsets, black)
     light = _light(layout, levels, signal, left_out)
@@ -135,7 +151,7 @@ def fit_base(
     at = np.array([signal[place] for place in levels])
     line = fit.line_dn2(at)
     expected = {
-        place: float(value) + offsets.variance_dn2.get(place, 1 / 12)
+        place: float(value) + added_in_all.get(place, 1 / 12)
         for place, value in zip(levels, line, strict=True)
     }
     return BaseFit(black, black_error, light, tuple(pieces), signal, expected)

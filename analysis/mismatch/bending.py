@@ -6,6 +6,7 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.mismatch.bank.bulk import Bulk
 from analysis.mismatch.basefit import Offsets
 from analysis.mismatch.layout import Layout, Place
 from analysis.mismatch.model import Model, in_threads
@@ -20,6 +21,8 @@ _REPLICATES = 3
 _FRAMES = 8  # of an exposure: more show neither better
 Pair = tuple[float, float]
 """Level and variance."""
+Three = tuple[float, float, float]
+"""Level, variance, and the variance of the bulk."""
 
 
 def bends(effects: Iterable[Effect]) -> bool:
@@ -41,36 +44,31 @@ def bending_offsets(model: Model, layout: Layout, seed: int, jobs: int) -> Offse
     samples *= layout.rows * layout.columns
     replicates = min(_REPLICATES, 1 + int(_SAMPLES // samples))
 
-    def one(work: tuple[Camera, int]) -> Mapping[Place, Pair]:
+    def one(work: tuple[Camera, int]) -> Mapping[Place, Three]:
         camera, replicate = work
         frames_of = model.with_camera(camera).frames(layout, replicate, seed)
-        found: dict[Place, Pair] = {}
+        found: dict[Place, Three] = {}
         for e in layout.uniform:
-            for channel, pair in _pairs(layout, islice(frames_of(e.name), _FRAMES)).items():
-                found[e.name, channel] = pair
+            many = Bulk.of(layout, e.name)
+            pairs = _pairs(layout, many.watching(islice(frames_of(e.name), _FRAMES)))
+            for channel, pair in pairs.items():
+                found[e.name, channel] = (*pair, many.variance_dn2(channel))
         return found
 
     work = [(camera, replicate) for replicate in range(replicates) for camera in cameras]
     made = in_threads(one, work, jobs)
-    with_them, without = made[::2], made[1::2]
+    pairs = list(zip(made[::2], made[1::2], strict=True))
 
     def change(which: int) -> dict[Place, float]:
         return {
-            place: float(
-                np.mean(
-                    [
-                        a[place][which] - b[place][which]
-                        for a, b in zip(with_them, without, strict=True)
-                    ]
-                )
-            )
-            for place in with_them[0]
+            place: float(np.mean([a[place][which] - b[place][which] for a, b in pairs]))
+            for place in made[0]
         }
 
-    return Offsets(change(0), change(1))
+    return Offsets(change(0), change(1), bulk_dn2=change(2))
 
 
-def _pairs(layout: Layout, frames: Iterable[NDArray[np.float32]]) -> dict[str, Pair]:
+def _pairs(layout: Layout, frames: Iterable[NDArray[np.generic]]) -> dict[str, Pair]:
     """Return level and pixel variance (means of lines taken off) of each channel."""
     stack = list(frames)
     step = 1 if len(layout.sites) == 1 else 2

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from math import nan
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.bank.bands import Bands
+from analysis.mismatch.bank.bulk import Bulk
 from analysis.mismatch.bank.coherent import Peak, SpectrumSums
 from analysis.mismatch.bank.common import common
 from analysis.mismatch.bank.local import local_scalars, variances, widened
@@ -41,6 +43,10 @@ class Level:
         Share of samples at the ends of the converter.
     pixels
         Pixels of the channel.
+    bulk_dn2
+        Its variance with single spikes left out; nan where unknown.
+    far
+        Share of differences of successive frames that were left out.
     """
 
     level_dn: float
@@ -50,6 +56,8 @@ class Level:
     clipped_low: float
     clipped_high: float
     pixels: int
+    bulk_dn2: float = nan
+    far: float = nan
 
 
 @dataclass(frozen=True)
@@ -146,7 +154,8 @@ def observe(
     shared: dict[str, Mapping[str, Number]] = {}
     bands = Bands(layout.rows, layout.sites)
     for exposure in layout.uniform:
-        measured = measure(layout, frames_of(exposure.name))
+        many = Bulk.of(layout, exposure.name)
+        measured = measure(layout, many.watching(frames_of(exposure.name)))
         if watch is not None:
             watch(exposure.name, measured)
         frames = len(exposure.numbers)
@@ -158,7 +167,8 @@ def observe(
             bands.add(measured.channels, expected, signals, frames)
         for name, channel in measured.channels.items():
             place = (exposure.name, name)
-            levels[place] = _level(channel, frames)
+            bulk, far = many.variance_dn2(name), many.far(name)
+            levels[place] = replace(_level(channel, frames), bulk_dn2=bulk, far=far)
             if name not in sums:
                 n, m = channel.mean_frame.shape
                 sums[name] = _Channel(layout.regressors(name), (n, m))

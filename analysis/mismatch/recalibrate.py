@@ -21,6 +21,7 @@ from dsis.effects.quantisation import Quantisation
 _ROUNDS = 3
 _SAME = 0.05  # of an error: the fit has settled
 _SWITCH_DEVIANCE = 12.0  # by which another gap must fit better before the switch is moved
+_SPIKED = 1.5  # times the variance of the many: no law of read noise has such tails
 _APART = 1.005  # ratio of signals from which they are two levels
 
 
@@ -77,7 +78,8 @@ def calibrate(
     left_out = frozenset([interpolated] if interpolated else [])
     start = camera.black_level - layout.black_dn
     slopes = [s.slope for s in camera.noise.segment]
-    undone = _undone(layout, seen.levels, code_step(camera))
+    spiky = _spiky(seen.levels)
+    undone = _undone(layout, seen.levels, code_step(camera), spiky=spiky)
     effects = Offsets()
 
     def fitted(offsets: Offsets, at: tuple[float, ...]) -> BaseFit:
@@ -92,14 +94,14 @@ def calibrate(
         if before is not None and _same(before, fit):
             break
         before = fit
-        if len(switches) == 1:
+        if len(switches) == 1 and not spiky:
             switches = _moved(seen.levels, left_out, switches, fit, partial(fitted, recorded))
             fit = fitted(recorded, switches)
         model = Model(with_numbers(camera, fit, switches, layout.black_dn), signals_of(layout, fit))
         effects = bending_offsets(model, layout, seed + 1, jobs)
     if layout.scenes:
         model = with_pictures(model, layout, fit, effects, seed=seed + 1, jobs=jobs)
-    offsets = _sum(_rounding(model, layout, fit), effects)
+    offsets = _sum(_rounding(model, layout, fit, spiky=spiky), effects)
     return Calibrated(model, fit, fitted(offsets, switches), offsets, switches, left_out)
 
 
@@ -165,18 +167,30 @@ def code_step(camera: Camera) -> float:
     return max((e.step_dn for e in camera.effect if isinstance(e, Quantisation)), default=1.0)
 
 
-def _undone(layout: Layout, levels: Mapping[Place, Level], step_dn: float) -> Offsets:
+def _spiky(levels: Mapping[Place, Level]) -> bool:
+    """Return whether spikes dominate variances: the base numbers are then those of the many."""
+    return any(level.variance_dn2 > _SPIKED * level.bulk_dn2 > 0 for level in levels.values())
+
+
+def _undone(
+    layout: Layout, levels: Mapping[Place, Level], step_dn: float, *, spiky: bool
+) -> Offsets:
     """Return what rounding added to the recorded levels and variances, by undoing it."""
-    shift, added, stretch = {}, {}, {}
+    shift, added, stretch, bulk = {}, {}, {}, {}
     for place, level in levels.items():
         mean = level.level_dn + layout.black_dn
         before, variance, slope = unrounded(mean, level.variance_dn2, layout.white_dn, step_dn)
         shift[place], added[place] = mean - before, level.variance_dn2 - variance
         stretch[place] = slope
-    return Offsets(shift, added, stretch)
+        if spiky:
+            many = unrounded(mean, level.bulk_dn2, layout.white_dn, step_dn)
+            shift[place], bulk[place], stretch[place] = (
+                mean - many[0], level.bulk_dn2 - many[1], many[2]
+            )  # fmt: skip
+    return Offsets(shift, added, stretch, bulk)
 
 
-def _rounding(model: Model, layout: Layout, fit: BaseFit) -> Offsets:
+def _rounding(model: Model, layout: Layout, fit: BaseFit, *, spiky: bool) -> Offsets:
     """Return what rounding and clipping add under a model, exactly."""
     level, variance = {}, {}
     for e in layout.uniform:
@@ -187,7 +201,7 @@ def _rounding(model: Model, layout: Layout, fit: BaseFit) -> Offsets:
             level[e.name, channel], variance[e.name, channel] = rounded(
                 mean, line, layout.white_dn, code_step(model.camera)
             )
-    return Offsets(level, variance)
+    return Offsets(level, variance, bulk_dn2=variance if spiky else {})
 
 
 def _sum(first: Offsets, second: Offsets) -> Offsets:
@@ -198,6 +212,7 @@ def _sum(first: Offsets, second: Offsets) -> Offsets:
         added(first.level_dn, second.level_dn),
         added(first.variance_dn2, second.variance_dn2),
         first.stretch,
+        added(first.bulk_dn2, second.bulk_dn2),
     )
 
 

@@ -9,7 +9,7 @@ from analysis.mismatch.candidates.candidate import Candidate, Proposal, proposal
 from analysis.mismatch.clues import Clues
 
 _SWITCHING = (0.35, 0.1)  # a frame: seen in the noise, and in maps of few frames too
-_SPIKED = 1.1  # times the variance without impulses, from which their share of it is known
+_QUIET = 4.0  # times the least variance: there spikes stand out
 
 
 def _poisson(clues: Clues) -> Sequence[Proposal]:
@@ -61,25 +61,36 @@ def _impulse(clues: Clues) -> Sequence[Proposal]:
     if k <= 0:
         return []
     place = min(clues.places, key=lambda p: clues.layout.variance_dn2[p])
-    # Between the 16th and the 84th percentile there are no impulses.
     v, without = clues.seen.levels[place].variance_dn2, clues.layout.variance_dn2[place]
-    means = [height * sqrt(without) for height in (20.0, 100.0, 500.0)]
-    if v > _SPIKED * without:
-        # E[h^2] = 2 mean^2 and E[h^4] = 24 mean^4 say both numbers.
-        means.append(sqrt(k * v**2 / (12 * (v - without))))
     most = clues.layout.white_dn - clues.layout.black_dn
+    # E[h^4] = 24 mean^4: kurtosis p 24 mean^4 / V^2.
+    heights = (min(height * sqrt(without), most) for height in (20.0, 100.0, 500.0))
+    starts = [(k * v**2 / (24 * mean**4), mean) for mean in heights]
+    starts += _counted(clues, most)
     found: list[Proposal] = []
-    for mean in (min(mean, most) for mean in means):
-        # E[h^4] = 24 mean^4: kurtosis p 24 mean^4 / V^2.
-        rate = k * v**2 / (24 * mean**4) * 1e6
-        if rate > 0.01:
+    for share, mean in starts:
+        if share > 1e-8:
             found += proposals(
                 "impulse",
                 ["per_megapixel_frame", "mean_dn"],
-                per_megapixel_frame=min(rate, 9e4),
+                per_megapixel_frame=min(share * 1e6, 9e4),
                 mean_dn=mean,
             )
     return found
+
+
+def _counted(clues: Clues, most_dn: float) -> list[tuple[float, float]]:
+    """Return share and mean height of spikes, as those far outside of the noise say."""
+    levels = clues.seen.levels
+    dark = _QUIET * min(levels[place].bulk_dn2 for place in clues.places)
+    own = [levels[p] for p in clues.places if levels[p].bulk_dn2 <= dark]
+    if not own:
+        return []
+    share = float(np.mean([level.far for level in own])) / 2  # both differences of a frame see it
+    excess = float(np.mean([level.variance_dn2 - level.bulk_dn2 for level in own]))
+    if not share > 0 or not excess > 0:
+        return []
+    return [(share, min(sqrt(excess / (2 * share)), most_dn))]  # E[h^2] = 2 mean^2
 
 
 def _quantisation(clues: Clues) -> Sequence[Proposal]:

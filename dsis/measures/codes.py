@@ -24,6 +24,8 @@ LEAST_SIGMA_STEPS = 2.0  # below, noise does not smooth the density: no code wid
 _LEAK = 1e-7  # of the smooth density's power is let into the band
 _REMEMBERED = 4096  # transforms up to this size keep their bands: 17 MB at most
 _LEAST_DOF, _NODES = 4.0, 20
+_SPIKED = 1.5  # times the variance of the middle: no law of read noise has such tails
+_QUARTILES = 1.3489795  # of the normal law, apart
 
 
 class CodeCounts:
@@ -127,13 +129,16 @@ class Codes:
     def imbalance(self, variance_dn2: float) -> Estimate:
         """Return the rms relative deviation of code widths, sign of its square kept.
 
-        Unknown where the pixel noise `variance_dn2` is below 2 steps, or codes are clipped.
+        Unknown where the pixel noise `variance_dn2` is below 2 steps, or codes are clipped. Where a
+        few spikes make most of that variance, the middle of the histogram says how wide noise is.
 
         Notes
         -----
         With D(w) the transform of counts h, mean |D|^2 over the band = sum h + rms^2 sum h^2.
         """
         step = self.spacing().value
+        if variance_dn2 > _SPIKED * self._middle_dn2:
+            variance_dn2 = self._middle_dn2
         sigma = variance_dn2**0.5 / step if variance_dn2 >= 0 else nan
         if not sigma >= LEAST_SIGMA_STEPS or self._clipped:
             return unknown(0.0)
@@ -154,6 +159,13 @@ class Codes:
             mean * null**0.25,
             variance * null**0.5,
         )
+
+    @cached_property
+    def _middle_dn2(self) -> float:
+        """The variance of a normal law with the quartiles of the histogram."""
+        below = (np.cumsum(self.counts) - self.counts / 2) / self.total
+        low, high = np.interp((0.25, 0.75), below, np.arange(self.counts.size))
+        return float(high - low) ** 2 / _QUARTILES**2
 
     @cached_property
     def _clipped(self) -> bool:

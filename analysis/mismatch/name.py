@@ -19,6 +19,7 @@ from analysis.mismatch.recalibrate import calibrate
 from analysis.mismatch.segments import second_path
 from analysis.mismatch.state import Setting, State
 from analysis.mismatch.uncertainty import settled
+from analysis.mismatch.uneven import uneven
 from dsis.camera import Camera
 from dsis.effects import Effect
 
@@ -314,6 +315,8 @@ class Search:
         denial = contradicted(state, predictor, named.kind, without)
         if denial is None and named.kind in PATTERNS:
             denial = feigned(state, named.kind, predictor.mean(without))
+        if denial is None and named.proposal is not None:
+            denial = uneven(state, named.proposal.effect)
         return None if denial is None else (denial.share, denial.why)
 
     def _needless(
@@ -336,10 +339,8 @@ class Search:
 
 def _ties(state: State, best: Ranked, other: Ranked) -> bool:
     """Return whether another effect explains the same numbers nearly as well as the best."""
-    near = other.gain > max(best.gain - _TIE, LEAST_GAIN)
-    return (
-        near and other.kind != best.kind and alike(state, best.polished.mean, other.polished.mean)
-    )
+    near = other.gain > best.gain - _TIE and other.kind != best.kind
+    return near and alike(state, best.polished.mean, other.polished.mean)
 
 
 def _bent(base: State, final: State) -> Array:

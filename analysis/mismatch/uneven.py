@@ -1,0 +1,49 @@
+"""Dark current that parts of a sensor do not have: something else grows with exposure time."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.mismatch.contradicted import Denial
+from analysis.mismatch.state import State
+from dsis.effects import Effect
+from dsis.effects.dark_current import DarkCurrent
+
+Array = NDArray[np.float64]
+_PARTS = 4  # along each side
+_LEAST_SHARE = 0.5  # of a dark current, that every part of the sensor must show
+_SURE = 2.0  # standard errors below it
+_SMOOTH = "fixed_smooth"
+
+
+def uneven(state: State, effect: Effect | None) -> Denial | None:
+    """Return how an even dark current is denied by where levels grow with time; None: it is not.
+
+    Where a smooth surface is left unexplained, and the part of the sensor that grows least has not
+    half of the dark current, the mean that grows may be the surface's: a glow, say.
+    """
+    if not isinstance(effect, DarkCurrent) or not effect.dn_per_s:
+        return None
+    if not any(m.statistic.startswith(_SMOOTH) for m in state.mismatches):
+        return None
+    shares, errors = [], []
+    for (channel, name), (image, noise) in state.setting.seen.images.items():
+        if name != "time":
+            continue
+        growth = effect.dn_per_s * state.setting.layout.regressors(channel).scales["time"]
+        means = _parts(image)
+        shares.append(1 + means / growth)
+        errors.append(noise / growth * (means.size / image.size) ** 0.5)
+    if not shares:
+        return None
+    share = float(np.mean(shares, axis=0).min())
+    error = float(np.sqrt(np.mean(np.square(errors)) / len(errors)))
+    if share + _SURE * error >= _LEAST_SHARE:
+        return None
+    least = f"{max(share, 0):.0%}"
+    return Denial(share, f"a part of the sensor grows with exposure time by {least} of it")
+
+
+def _parts(image: Array) -> Array:
+    """Return the means of sixteen parts of an image, (part,)."""
+    rows = np.array_split(image, _PARTS, axis=0)
+    return np.array([part.mean() for row in rows for part in np.array_split(row, _PARTS, axis=1)])

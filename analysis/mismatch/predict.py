@@ -111,10 +111,10 @@ class Predictor:
         sd = np.hypot(null.sd * ratio, self.forms * change)
         return np.where(known, self.reference.vector.values - mean, 0.0), sd, known
 
-    def loglik(self, mean: Array) -> float:
-        """Return the log-likelihood of the recorded numbers, relative to any constant."""
+    def loglik(self, mean: Array, of: NDArray[np.bool_] | None = None) -> float:
+        """Return the log-likelihood of the recorded numbers, or some, relative to any constant."""
         rest, sd, known = self.weights(mean)
-        return self._likely(rest, sd, known)
+        return self._likely(rest, sd, known if of is None else known & of)
 
     def worth(self, without: Array) -> float:
         """Return the log-likelihood that the reference gains over a prediction without an effect.

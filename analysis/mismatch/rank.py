@@ -21,6 +21,7 @@ _COSINE = 0.5  # of what two predictions change, from which they change the same
 _ALIKE = 0.05  # relative difference of parameters up to which a proposal is an earlier one
 _SPARSE = 4  # times as many simulations
 _BY_FRAME = frozenset({"frame_variance"})
+_FAR_OFF, _LITTLE = 8.0, 0.3  # departures, and the share of one that is little
 _SHARED = 0.1  # share of an effect's change that may lie where the model moved since
 
 
@@ -113,18 +114,37 @@ def ranked(
     tried = _tried(state, kinds, memory, step, settled, apart, possible)
     best = max((value for value, _, _ in tried), default=0.0)
     far = max(_FAR, _SHARE * (best - before))
-    found: list[Ranked] = []
+    found: list[tuple[str, Proposal, Polished]] = []
     for value, kind, proposal in tried:
-        kinds_so_far = {one.kind for one in found}
+        kinds_so_far = {one[0] for one in found}
         if value < best - far or (len(kinds_so_far) >= _MOST and kind not in kinds_so_far):
             continue
         own = state.predictor(replicates_for(state.setting, [proposal.effect]))
         polished = polish(own, state.camera, [proposal], rounds=1 + len(proposal.free))
         if polished is not None and not any(alike(state, polished.mean, one) for one in apart):
-            gain = polished.loglik - before - len(proposal.free)
-            found.append(Ranked(gain, kind, proposal, polished))
+            found.append((kind, proposal, polished))
         step()
-    return sorted(found, key=lambda one: -one.gain)
+    judged = ~_others(state, [polished.mean for _, _, polished in found])
+    before = predictor.loglik(state.null.mean, judged)
+    fitted = [
+        Ranked(predictor.loglik(own.mean, judged) - before - len(start.free), kind, start, own)
+        for kind, start, own in found
+    ]
+    return sorted(fitted, key=lambda one: -one.gain)
+
+
+def _others(state: State, means: Sequence[Array]) -> NDArray[np.bool_]:
+    """Return which numbers are far off, and hardly explained by any of the predictions.
+
+    That is another's: a little of much would otherwise outweigh what an effect is known by.
+    """
+    null = state.null
+    seen = null.departures(state.vector)[: null.mean.size]
+    far: NDArray[np.bool_] = np.abs(seen) > _FAR_OFF
+    for mean in means:
+        change = np.where(null.known, np.nan_to_num(mean - null.mean), 0.0) / null.sd
+        far &= change * seen < _LITTLE * seen**2
+    return far
 
 
 def _tried(

@@ -1,4 +1,4 @@
-"""Shading: light falls off from the centre of the sensor to its corners."""
+"""Shading: light falls off from the centre of the sensor to its corners, or to one side."""
 
 from collections.abc import Mapping
 from typing import Annotated, ClassVar, Literal
@@ -10,14 +10,18 @@ from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, Stage
 
 
 class Shading(Effect):
-    """A fixed smooth fall-off of light, quadratic in the distance from the sensor's centre.
+    """A fixed smooth fall-off of light: to the corners, and to one side where light is uneven.
 
-    S'(y, x) = S(y, x) (1 - f r^2 / R^2), r the distance from the centre and R the corner's. On a
-    whole sensor the mean falls by f S / 3, for the mean of r^2 / R^2 is 1/3.
+    S'(y, x) = S(y, x) max(1 - f r^2 / R^2 + a y / Y + b x / X, 0), from the sensor's centre: r the
+    distance and R the corner's, Y and X the last row and column. On a whole sensor the mean falls
+    by f S / 3, for the mean of r^2 / R^2 is 1/3; tilts a, down, and b, to the right, leave it. A
+    lamp beside the axis gives both, and so does a part of a sensor: its centre is another.
     """
 
     kind: Literal["shading"] = "shading"
     falloff_percent: Annotated[float, Field(ge=0, le=100, examples=[4.0])]
+    tilt_down_percent: Annotated[float, Field(ge=-100, le=100)] = 0.0
+    tilt_right_percent: Annotated[float, Field(ge=-100, le=100)] = 0.0
 
     stage: ClassVar[Stage] = Stage.LIGHT
     reference: ClassVar[str] = "EMVA Standard 1288, release 3.1 (homogeneity of the light)"
@@ -41,15 +45,21 @@ class Shading(Effect):
         y = exposure.grid.row_numbers() - (rows - 1) / 2
         x = exposure.grid.column_numbers() - (columns - 1) / 2
         share = (y**2 + x**2) / ((rows / 2) ** 2 + (columns / 2) ** 2)
-        return image * (1 - self.falloff_percent / 100 * share).astype(np.float32)
+        tilt = self.tilt_down_percent * y / (rows / 2)
+        tilt = tilt + self.tilt_right_percent * x / (columns / 2)
+        light = 1 - self.falloff_percent / 100 * share + tilt / 100
+        return image * np.maximum(light, 0.0).astype(np.float32)
 
     def contributions(self, point: OperatingPoint) -> Mapping[str, float]:
-        """Return what mean and shot noise lose, and the variance of r^2 over the whole sensor."""
+        """Return what mean and shot noise lose, and the variance of the whole sensor's light."""
         f, h2, w2 = self.falloff_percent / 100, point.rows**2, point.columns**2
         lost = f * (h2 + w2 - 2) / (3 * (h2 + w2))
         surface = ((h2 - 1) * (h2 - 4) + (w2 - 1) * (w2 - 4)) / 180 / ((h2 + w2) / 4) ** 2
+        tilts = ((self.tilt_down_percent / 100) ** 2 * (h2 - 1) / h2 / 3) + (
+            (self.tilt_right_percent / 100) ** 2 * (w2 - 1) / w2 / 3
+        )
         return {
             "level": -lost * point.signal_dn,
             "pixel_variance": -lost * point.shot_variance_dn2,
-            "fixed_smooth_variance": surface * (f * point.signal_dn) ** 2,
+            "fixed_smooth_variance": (surface * f**2 + tilts) * point.signal_dn**2,
         }

@@ -1,6 +1,6 @@
 """What mean frames show: fixed patterns, shading, taps, hot pixels, glow."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from math import sqrt
 
 import numpy as np
@@ -13,6 +13,8 @@ from analysis.mismatch.clues import Clues, alike
 from analysis.mismatch.layout import Place
 
 Array = NDArray[np.float64]
+_SURFACES = ("falloff_percent", "tilt_down_percent", "tilt_right_percent")
+_CLEAR = 3.0  # standard errors from which a tilt is worth a trial
 _JUMP = 0.15  # z of the step where halves meet, of that of their means: some 0.4 of two amplifiers
 _SMOOTH = ("fixed_smooth_variance", "fixed_smooth_tilt", "fixed_smooth_falloff")
 
@@ -37,15 +39,43 @@ def _prnu(clues: Clues) -> Sequence[Proposal]:
 
 
 def _shading(clues: Clues) -> Sequence[Proposal]:
-    variance, _ = clues.amplitude("fixed_smooth_variance", _squared(clues))
-    if variance <= 0:
+    """Start from the surface that fits the gain: a fall to the corners, a tilt, or both."""
+    images = clues.image("gain")
+    if not images:
         return []
-    n, m = clues.layout.rows, clues.layout.columns
-    y, x = np.linspace(-1, 1, n) * n, np.linspace(-1, 1, m) * m
-    r2 = (y[:, None] ** 2 + x**2) / (n**2 + m**2)
-    return proposals(
-        "shading", ["falloff_percent"], falloff_percent=min(100 * sqrt(variance / r2.var()), 90.0)
-    )
+    values, errors = np.zeros(3), np.zeros(3)
+    for channel, (image, noise) in images.items():
+        surfaces = _surfaces(image.shape)
+        inverse = np.linalg.inv(surfaces @ surfaces.T)
+        scale = 100 / clues.scale("gain", channel) / len(images)
+        values += scale * (inverse @ surfaces @ (image - image.mean()).ravel())
+        errors = np.hypot(errors, scale * noise * np.sqrt(np.diag(inverse)))
+    own = dict(zip(_SURFACES, values.tolist(), strict=True))
+    clear = {name for name, error in zip(_SURFACES, errors, strict=True)
+             if abs(own[name]) > _CLEAR * error}  # fmt: skip
+    fall, *tilts = _SURFACES
+    found: list[Proposal] = []
+    for names in ([fall], [name for name in tilts if name in clear]):
+        found += _of_light(own, names)
+    return [*found, *_of_light(own, [fall, *(n for n in tilts if n in clear)])]
+
+
+def _of_light(own: Mapping[str, float], names: Sequence[str]) -> list[Proposal]:
+    """Return the proposal with some of the surfaces, none where a fall is a rise."""
+    fall, *tilts = _SURFACES
+    if not names or (fall in names and own[fall] <= 0):
+        return []
+    start = {fall: 0.0, **{name: float(np.clip(own[name], -90, 90)) for name in names}}
+    return proposals("shading", names, [n for n in names if n in tilts], **start)
+
+
+def _surfaces(shape: tuple[int, ...]) -> Array:
+    """Return what shading does to a unit of light for 1 of each number: (surface, pixel)."""
+    n, m = shape
+    y, x = np.linspace(-1, 1, n)[:, None], np.linspace(-1, 1, m)
+    fall = -((n * y) ** 2 + (m * x) ** 2) / (n**2 + m**2)
+    made = np.stack([np.broadcast_to(one, shape).ravel() for one in (fall, y, x)])
+    return np.asarray(made - made.mean(1, keepdims=True))
 
 
 def _taps(clues: Clues) -> Sequence[Proposal]:

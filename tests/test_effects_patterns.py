@@ -103,6 +103,24 @@ def test_shading_falls_off_towards_the_corners() -> None:
     np.testing.assert_allclose(image, image[::-1, ::-1], atol=1e-6)
 
 
+def test_uneven_light_tilts_about_the_centre_and_moves_it() -> None:
+    tilts = {"tilt_down_percent": -6.0, "tilt_right_percent": 4.0}
+    image = apply(effect("shading", falloff_percent=0.0, **tilts), np.ones((301, 401)))
+    assert image[150, 200] == 1
+    np.testing.assert_allclose(image[[0, -1], 200], [1.06, 0.94], atol=2e-3)
+    np.testing.assert_allclose(image[150, [0, -1]], [0.96, 1.04], atol=2e-3)
+    np.testing.assert_allclose(image.mean(), 1, atol=1e-6)
+    # A part of a sensor that falls off about its centre: about another centre, with a tilt.
+    whole = apply(effect("shading", falloff_percent=20.0), np.ones((600, 800)))
+    part = whole[:300, :400]
+    own = apply(
+        effect("shading", falloff_percent=5 / 0.95, tilt_down_percent=20 * 0.18 / 0.95,
+               tilt_right_percent=20 * 0.32 / 0.95),
+        np.ones((300, 400)),
+    )  # fmt: skip
+    np.testing.assert_allclose(part / part[150, 200], own, atol=1e-3)
+
+
 @pytest.mark.parametrize("place", ["top", "bottom", "left", "right", "top_left", "bottom_right"])
 def test_glow_falls_off_exponentially_from_its_place(place: str) -> None:
     one = effect("amp_glow", dn_per_s=100.0, place=place, extent=0.2)

@@ -47,7 +47,10 @@ STRONG: dict[str, tuple[dict[str, object], ...]] = {
     "quantisation": ({"step_dn": 2.5}, {"step_dn": 30.0}, {"step_dn": 100.0}),
     "readout_memory": ({"fraction": 0.8}, {"fraction": 0.8, "lag_pixels": 1, "along": "columns"}),
     "rts": ({"amplitude_dn": 60.0, "pixel_fraction": 0.5, "switch_probability": 0.02},),
-    "shading": ({"falloff_percent": 90.0},),
+    "shading": (
+        {"falloff_percent": 90.0},
+        {"falloff_percent": 20.0, "tilt_down_percent": 30.0, "tilt_right_percent": -20.0},
+    ),
     "spatial_filtering": ({"fraction": 0.2}, {"fraction": 0.04}),
     "tap_mismatch": (
         {"gain_percent": 40.0, "regions": "even_odd_columns"},

@@ -1,14 +1,16 @@
-"""Fixed patterns that correlated frames feign: a mean of frames that are alike varies more."""
+"""Fixed patterns that something else feigns: frames that are alike, halves that differ."""
 
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.mismatch.bank.seams import beyond_smooth, seam_shapes
 from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.state import State
 
 Array = NDArray[np.float64]
 PATTERNS = frozenset({"dsnu", "prnu"})
-_MOST = 0.5  # of a pattern's variance, that correlation may feign
+LINES = {"row_fpn": "rows", "column_fpn": "columns"}
+_MOST = 0.5  # of a pattern's variance, that something else may feign
 
 
 def feigned(state: State, kind: str, without: Array) -> Denial | None:
@@ -54,3 +56,29 @@ def feigned(state: State, kind: str, without: Array) -> Denial | None:
     return Denial(
         share, "successive frames are alike for another reason, and feign a fixed pattern"
     )
+
+
+def stepped(state: State, kind: str) -> Denial | None:
+    """Return how white line deviations are denied by a step or a comb of lines; None: not.
+
+    Two amplifiers, left and right or line by line, make lines differ too. Where their step or comb
+    is left unexplained, and makes half of what the lines differ by beyond smooth surfaces, lines
+    may be alike but for that.
+    """
+    axis = LINES.get(kind)
+    if axis is None or not any(m.statistic in ("half_seam", "parity") for m in state.mismatches):
+        return None
+    whole, rest = 0.0, 0.0
+    for (_, name), (image, noise) in state.setting.seen.images.items():
+        if name != "offset alone":
+            continue
+        means = (image - image.mean()).mean(1 if axis == "rows" else 0) / noise
+        own = beyond_smooth(means)
+        shapes = np.stack(seam_shapes(means.size))
+        without = own - shapes.T @ (shapes @ own)
+        across = image.size / means.size
+        whole += float(own @ own) * across - means.size
+        rest += float(without @ without) * across - means.size
+    if whole <= 0 or rest >= _MOST * whole:
+        return None
+    return Denial(rest / whole, "halves, or even and odd lines, differ as a whole and feign it")

@@ -15,6 +15,7 @@ from dsis.measures.fixed_pattern import Smooth
 from dsis.measures.residuals import pixel_residuals
 
 Array = NDArray[np.float64]
+_CHANCE = 3.0  # standard errors of a mean square
 STANDING_OUT = (3.5, 5)  # standard deviations of a map above its middle
 
 
@@ -61,18 +62,31 @@ def parts(image: Array, noise: float) -> Parts:
     row = m * float(rows @ rows) / (n - 1 - degree)
     column = n * float(columns @ columns) / (m - 1 - degree)
     mean_square = squares / pixels.size
+    lines = (
+        sure_of_lines(row, square, n - 1 - degree),
+        sure_of_lines(column, square, m - 1 - degree),
+    )
     numbers = {
         "fixed_pixel_variance": ratio_root(square, dof),
         "fixed_row_variance": ratio_root(row / square, n - 1 - degree, dof),
         "fixed_column_variance": ratio_root(column / square, m - 1 - degree, dof),
-        **surfaces(coefficients, (row, column, square), dof),
-        **slopes(coefficients, (row, column, square), image.shape),
+        **surfaces(coefficients, (*lines, square), dof),
+        **slopes(coefficients, (*lines, square), image.shape),
         **_correlations(pixels, mean_square),
         "outlying_pixels": _outlying(scatter + mean_square**2, square, pixels.size),
         **_standing_out(pixels, square),
-        **seams(by_row, by_column, (row, column)),
+        **seams(by_row, by_column, lines),
     }
     return Parts(pixels, rows, columns, square, coefficients, numbers)
+
+
+def sure_of_lines(lines: float, pixels: float, dof: float) -> float:
+    """Return the mean square of line means that is beyond chance, that of pixels at least.
+
+    What is compared with it must not scatter as the mean square of few lines does: a clear tilt in
+    units of a noise that is one tenth too large would be off by many standard errors.
+    """
+    return max(pixels, lines / (1 + _CHANCE * sqrt(2 / dof)))
 
 
 def _correlations(pixels: Array, square: float) -> dict[str, Number]:

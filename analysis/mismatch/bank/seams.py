@@ -24,7 +24,7 @@ def seams(by_row: Array, by_column: Array, squares: tuple[float, float]) -> dict
         ("columns", by_column, squares[1], by_row.size),
     ):
         sd = sqrt(square / across)
-        for name, shape in zip(("half_seam", "parity"), _seam_shapes(means.size), strict=True):
+        for name, shape in zip(("half_seam", "parity"), seam_shapes(means.size), strict=True):
             found[f"{name} of {axis}"] = (float(shape @ means) / sd, 1.0)
         half = np.where(np.arange(means.size) < means.size / 2, -1.0, 1.0)
         half = (half - half.mean()) / (sqrt(means.size) * half.std())
@@ -33,12 +33,17 @@ def seams(by_row: Array, by_column: Array, squares: tuple[float, float]) -> dict
 
 
 @lru_cache(maxsize=64)
-def _seam_shapes(size: int) -> tuple[Array, Array]:
+def seam_shapes(size: int) -> tuple[Array, Array]:
     """Return the step between halves and the comb, less smooth polynomials, of norm 1."""
-    place, line = np.linspace(-1, 1, size), np.arange(size)
-    smooth = np.polynomial.legendre.legvander(place, min(4, size - 3))
+    line = np.arange(size)
     step, comb = np.where(line < size / 2, -0.5, 0.5), np.where(line % 2 == 0, -0.5, 0.5)
-    both = np.stack([step, comb], 1)
-    rest = both - smooth @ np.linalg.lstsq(smooth, both, rcond=None)[0]
+    rest = beyond_smooth(np.stack([step, comb], 1))
     rest /= np.linalg.norm(rest, axis=0)
     return np.ascontiguousarray(rest[:, 0]), np.ascontiguousarray(rest[:, 1])
+
+
+def beyond_smooth(values: Array) -> Array:
+    """Return means of lines (line, ...) less the smooth polynomials that fit them best."""
+    size = len(values)
+    smooth = np.polynomial.legendre.legvander(np.linspace(-1, 1, size), min(4, size - 3))
+    return np.asarray(values - smooth @ np.linalg.lstsq(smooth, values, rcond=None)[0])

@@ -10,7 +10,7 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.mismatch.bank.parts import Parts
+from analysis.mismatch.bank.parts import Parts, sure_of_lines
 from analysis.mismatch.bank.scalars import Number, ratio_root
 from analysis.mismatch.bank.seams import WHOLE
 from analysis.mismatch.bank.surfaces import slopes, surfaces
@@ -53,7 +53,7 @@ def together(
             across = float(np.mean([sizes[name][1 - axis] for name in own]))
             top += across * float(moved @ moved)
             bottom += moved.size - 1 - degree
-        lines[axis] = top / bottom
+        lines[axis] = sure_of_lines(top / bottom, square, bottom)
         found[f"{label} of {TOGETHER}"] = ratio_root(top / bottom / square, bottom, dof)
     for seam in (f"{axis}{part}" for axis in ("rows", "columns") for part in ("", f", {WHOLE}")):
         steps = [np.array([parts[n].numbers[f"half_seam of {seam}"][0]]) for n in names]

@@ -72,7 +72,8 @@ def _of_light(own: Mapping[str, float], names: Sequence[str]) -> list[Proposal]:
 def _surfaces(shape: tuple[int, ...]) -> Array:
     """Return what shading does to a unit of light for 1 of each number: (surface, pixel)."""
     n, m = shape
-    y, x = np.linspace(-1, 1, n)[:, None], np.linspace(-1, 1, m)
+    y, x = ((np.arange(size) - (size - 1) / 2) / (size / 2) for size in shape)
+    y = y[:, None]
     fall = -((n * y) ** 2 + (m * x) ** 2) / (n**2 + m**2)
     made = np.stack([np.broadcast_to(one, shape).ravel() for one in (fall, y, x)])
     return np.asarray(made - made.mean(1, keepdims=True))

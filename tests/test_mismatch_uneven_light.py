@@ -1,0 +1,43 @@
+"""Light that is uneven: a fall to the corners, a tilt, or both; no amplifier, no glow."""
+
+import pytest
+
+from analysis.mismatch import find_mismatch
+from analysis.mismatch.diagnose import VOCABULARY
+from dsis.effects import registry
+from mismatch_recordings import camera, recorded
+
+FALL, DOWN, RIGHT = 2.0, -1.5, 1.0
+
+
+def _shading(**percent: float) -> object:
+    return registry()["shading"](**{"falloff_percent": 0.0, **percent})
+
+
+@pytest.mark.parametrize(
+    "percent",
+    [
+        {"falloff_percent": FALL},
+        {"tilt_down_percent": DOWN},
+        {"falloff_percent": FALL, "tilt_down_percent": DOWN, "tilt_right_percent": RIGHT},
+    ],
+)
+def test_uneven_light_is_named_with_its_numbers(percent: dict[str, float]) -> None:
+    true = camera(_shading(**percent))  # type: ignore[arg-type] # an effect of the registry
+    found = find_mismatch(camera(), recorded(true, 8), seed=1)
+    (named,) = found.omitted_physics
+    assert named.effect == "shading"
+    assert not found.unexplained
+    for name in ("falloff_percent", "tilt_down_percent", "tilt_right_percent"):
+        fitted = named.parameters[name]
+        assert isinstance(fitted.value, float)
+        off = abs(fitted.value - percent.get(name, 0.0))
+        assert off < max(4 * fitted.standard_error, 0.02)
+
+
+def test_two_amplifiers_that_have_no_word_are_no_tilt_of_the_light() -> None:
+    taps = registry()["tap_mismatch"](gain_percent=1.5, regions="left_right")
+    words = VOCABULARY - {"tap_mismatch"}
+    found = find_mismatch(camera(), recorded(camera(taps), 9), seed=1, vocabulary=words)
+    assert not found.omitted_physics
+    assert found.verdict == "unexplained"

@@ -8,6 +8,8 @@ from scipy.stats import norm
 from analysis.mismatch.candidates.candidate import Candidate, Proposal, proposals
 from analysis.mismatch.clues import Clues
 
+_UNTOLD_PERCENT = 1.0  # start where levels do not tell
+
 
 def _dark_current(clues: Clues) -> Sequence[Proposal]:
     darks = [e for e in clues.layout.exposures if e.kind == "dark"]
@@ -23,7 +25,10 @@ def _dark_current(clues: Clues) -> Sequence[Proposal]:
 
 
 def _nonlinearity(clues: Clues) -> Sequence[Proposal]:
-    """Solve level residual = a S (0.85 F - S) beside a change of the light's scale."""
+    """Solve level residual = a S (0.85 F - S) beside a change of the light's scale.
+
+    Where light is unknown only variances bend: it is tried both ways.
+    """
     full = clues.layout.white_dn - clues.layout.black_dn
     rows = [
         (clues.signal(place), value, sd)
@@ -31,17 +36,17 @@ def _nonlinearity(clues: Clues) -> Sequence[Proposal]:
         if clues.signal(place) > 0
     ]
     if len({round(s, 1) for s, _, _ in rows}) < 3:
-        return []
+        return _bends(_UNTOLD_PERCENT) + _bends(-_UNTOLD_PERCENT)
     s, value, sd = np.array(rows).T
     design = np.stack([s * (0.85 * full - s), s], 1) / sd[:, None]
     bend = float(np.linalg.lstsq(design, value / sd, rcond=None)[0][0])
     percent = 100 * bend * (0.85 * full / 2) ** 2 / full
-    return proposals(
-        "nonlinearity",
-        ["percent_full_scale"],
-        ["percent_full_scale"],
-        percent_full_scale=float(np.clip(percent, -12, 12)),
-    )
+    return _bends(float(np.clip(percent, -12, 12)))
+
+
+def _bends(percent: float) -> list[Proposal]:
+    name = "percent_full_scale"
+    return proposals("nonlinearity", [name], [name], percent_full_scale=percent)
 
 
 def _saturation(clues: Clues) -> Sequence[Proposal]:

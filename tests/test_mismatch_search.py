@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 
 from analysis.mismatch import name
+from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.name import Named, Search
 from analysis.mismatch.rank import alike
 from analysis.mismatch.recalibrate import _moved
+from dsis.effects import registry
 
 NUMBERS = 12
 STATE: Any = SimpleNamespace(
@@ -70,6 +72,7 @@ def test_nothing_worse_is_claimed_where_two_tie(monkeypatch: pytest.MonkeyPatch)
         ]
 
     monkeypatch.setattr(name, "ranked", ranked)
+    monkeypatch.setattr(Search, "_doubts", lambda *_: False)
     search = _search()
     assert [one.kind for one in search._decided(STATE)] == ["adc_dnl", "row_noise"]
     assert [{one.kind for one in pair} for pair in search.ties] == [
@@ -79,6 +82,50 @@ def test_nothing_worse_is_claimed_where_two_tie(monkeypatch: pytest.MonkeyPatch)
     offered[2] = _ranked("crosstalk", 9.0, 0, 1, 2)
     assert search._decided(STATE)[0].kind == "spatial_filtering"
     assert search.ties == []
+
+
+def test_lines_of_different_frequencies_are_no_rivals() -> None:
+    """The largest peak is one number: either line explains it, and a sensor may have both."""
+
+    def line(kind: str, gain: float, fx: float) -> Any:
+        ranked = _ranked(kind, gain, 0, 1)
+        ranked.proposal.effect = registry()[kind](amplitude_dn=1.0, frequency=(fx, 0.25))
+        return ranked
+
+    best = line("periodic_noise", 15.0, 0.25)
+    assert name._ties(STATE, best, line("bistable_pattern", 14.5, 0.25))
+    assert not name._ties(STATE, best, line("bistable_pattern", 14.5, 0.33))
+
+
+def test_a_rival_that_gains_less_than_is_asked_ties_as_well() -> None:
+    best = _ranked("row_noise", 2.1, 0, 1)
+    assert name._ties(STATE, best, _ranked("pink_noise", 1.1, 0, 1))
+    assert not name._ties(STATE, best, _ranked("pink_noise", -1.0, 0, 1))
+
+
+def test_what_a_statistic_denies_waits_until_more_is_named(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    offered = [_ranked("readout_memory", 9.0, 0), _ranked("crosstalk", 7.0, 1, 2)]
+    denied = {"readout_memory"}
+
+    def ranked(*of: Any) -> list[Any]:
+        return [one for one in offered if one.kind in of[1]]
+
+    def refuted(*of: Any) -> Denial | None:
+        return Denial(0.0, "it shows 0% of it") if of[2] in denied else None
+
+    monkeypatch.setattr(name, "ranked", ranked)
+    monkeypatch.setattr(name, "refuted", refuted)
+    monkeypatch.setattr(name, "replicates_for", lambda *_: 2)
+    state: Any = SimpleNamespace(null=STATE.null, predictor=lambda _: None)
+    search = _search()
+    assert [one.kind for one in search._decided(state)] == ["crosstalk"]
+    assert search.doubted == {"readout_memory": "it shows 0% of it"}
+    assert not search.refused
+    denied.clear()
+    assert search._decided(state)[0].kind == "readout_memory"
+    assert search.doubted == {}
 
 
 def test_an_effect_is_dropped_only_where_many_simulations_say_so() -> None:

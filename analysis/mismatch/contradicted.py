@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.mismatch.candidates import CANDIDATES
 from analysis.mismatch.predict import Predictor
@@ -10,6 +11,7 @@ from analysis.mismatch.state import State
 from analysis.mismatch.words import statistic_words
 from dsis.camera import Camera
 
+Array = NDArray[np.float64]
 _LEAST_SHARE = 0.5  # of what an effect predicts, that a recording must show
 _SURE = 2.0  # standard errors below it: 3.5 below what the right effect shows
 _CLEAR = 3.0  # standard deviations: a predicted change that can be seen at all
@@ -32,14 +34,29 @@ def contradicted(state: State, predictor: Predictor, kind: str, without: Camera)
     form. One statistic that shows less than half of it denies the effect: a tilt, say, is nearly a
     difference of the halves, but has no step where they meet; an amplifier glows in the dark too.
     """
+    mean = predictor.mean(without)
+    return _denied(state, predictor, kind, mean, state.null.mean, state.null.sd)
+
+
+def refuted(state: State, predictor: Predictor, kind: str, mean: Array) -> Denial | None:
+    """Return the same of an effect that a state's camera has not: `mean` is predicted with it."""
+    _, sd, known = predictor.weights(mean)
+    change = np.where(known, predictor.forms * (mean - state.null.mean), 0.0)
+    scatter = np.sqrt(np.maximum(sd**2 - change**2, state.null.sd**2))
+    return _denied(state, predictor, kind, state.null.mean, mean, scatter)
+
+
+def _denied(
+    state: State, predictor: Predictor, kind: str, without: Array, mean: Array, sd: Array
+) -> Denial | None:
     if kind not in CANDIDATES:
         return None
-    null, mean = state.null, predictor.mean(without)
-    known = null.known & np.isfinite(mean) & np.isfinite(state.vector.values)
-    change = np.where(known, null.mean - np.nan_to_num(mean), 0.0) / null.sd
+    known = state.null.known & np.isfinite(mean) & np.isfinite(without)
+    known &= np.isfinite(state.vector.values)
+    change = np.where(known, np.nan_to_num(mean) - np.nan_to_num(without), 0.0) / sd
     form = np.sqrt(1 + (predictor.forms * change) ** 2)
     clear = np.abs(change) > _CLEAR
-    left = null.departures(state.vector)[: change.size]
+    left = np.where(known, state.vector.values - np.nan_to_num(mean), 0.0) / sd
     darks = {e.name for e in state.setting.layout.exposures if e.kind == "dark"}
     groups: dict[tuple[str, str, str, bool], list[int]] = {}
     for i, key in enumerate(state.vector.keys):

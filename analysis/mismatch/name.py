@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.candidates import CANDIDATES, Proposal
-from analysis.mismatch.contradicted import contradicted
+from analysis.mismatch.contradicted import contradicted, refuted
 from analysis.mismatch.feigned import PATTERNS, feigned, stepped
 from analysis.mismatch.instance import LINES, Frequency, frequency_of, instance, same_line
 from analysis.mismatch.observe import Frames
@@ -84,6 +84,7 @@ class Search:
     named: list[Named] = field(default_factory=list)
     refused: dict[str, str] = field(default_factory=dict)
     ties: list[tuple[Ranked, Ranked]] = field(default_factory=list)
+    doubted: dict[str, str] = field(default_factory=dict)
     settled: list[tuple[str, Frequency]] = field(default_factory=list)
     frames_of: Frames | None = None
     memory: Memory = field(default_factory=Memory)
@@ -100,6 +101,8 @@ class Search:
             state = State.of(self.setting, added[1], self.step, draft=True)
         if not state.mismatches:
             self.ties = []  # what was undecided on the way is explained
+            self.doubted = {}
+        self.refused |= self.doubted
         return self._pruned(self._polished(state))
 
     def _take(self, named: Named) -> None:
@@ -211,19 +214,34 @@ class Search:
         worse. What is taken in besides may decide: they are tried again in the next round.
         """
         self.ties = []
+        self.doubted = {}
         while True:
             apart = [one.polished.mean for pair in self.ties for one in pair]
             settled = tuple(self.settled)
-            left = self._left()
+            left = self._left() - self.doubted.keys()
             fitted = self._phased(
                 ranked(state, left, self.memory, self.step, settled, apart, self._possible)
             )
             if len(self.settled) > len(settled):
                 continue  # a line was refused: others were too far behind it
+            if fitted and self._doubts(state, fitted[0]):
+                continue
             rival = next((one for one in fitted[1:] if _ties(state, fitted[0], one)), None)
             if rival is None:
                 return fitted
             self.ties.append((fitted[0], rival))
+
+    def _doubts(self, state: State, best: Ranked) -> bool:
+        """Put an effect aside that a statistic which calls for it denies, for this round.
+
+        What is named besides may show another of it: then it is tried again.
+        """
+        predictor = state.predictor(replicates_for(self.setting, [best.proposal.effect]))
+        denial = refuted(state, predictor, best.kind, best.polished.mean)
+        if best.gain < LEAST_GAIN or best.kind in LINES or denial is None:
+            return False
+        self.doubted[best.name] = denial.why
+        return True
 
     def _possible(self, effect: Effect) -> bool:
         """Return whether an effect may be tried: of a line, the alias that whole frames show."""
@@ -340,7 +358,15 @@ class Search:
 def _ties(state: State, best: Ranked, other: Ranked) -> bool:
     """Return whether another effect explains the same numbers nearly as well as the best."""
     near = other.gain > best.gain - _TIE and other.kind != best.kind
-    return near and alike(state, best.polished.mean, other.polished.mean)
+    if not near or _other_line(best, other):
+        return False
+    return alike(state, best.polished.mean, other.polished.mean)
+
+
+def _other_line(best: Ranked, other: Ranked) -> bool:
+    """Return whether two effects are lines of different frequencies: a sensor may have both."""
+    one, two = (frequency_of(ranked.proposal.effect) for ranked in (best, other))
+    return one is not None and two is not None and one != two
 
 
 def _bent(base: State, final: State) -> Array:

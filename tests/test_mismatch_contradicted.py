@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 
 from analysis.mismatch.bank.key import Key
-from analysis.mismatch.contradicted import Denial, contradicted
+from analysis.mismatch.contradicted import Denial, contradicted, refuted
 from analysis.mismatch.observe import observe
 from analysis.mismatch.source import Source
 from analysis.mismatch.split import Split
 from analysis.mismatch.state import Setting, State
 from analysis.mismatch.taking import layout_of
+from dsis.camera import Camera
 from dsis.effects import registry
 from mismatch_recordings import Array, camera, recorded
 
@@ -22,7 +23,7 @@ ROWS, COLUMNS = 64, 96
 TAPS = registry()["tap_mismatch"](gain_percent=GAIN_PERCENT, regions="top_bottom")
 
 
-def with_taps(gains: Array) -> State:
+def with_taps(gains: Array, model: Camera = camera(TAPS)) -> State:  # noqa: B008 # frozen
     """Return the state of a camera of two taps beside a sensor whose rows have gains: (row,)."""
     recording = recorded(camera(), 5, rows=ROWS, columns=COLUMNS, levels=LEVELS)
     assert recording.stacks is not None
@@ -34,7 +35,7 @@ def with_taps(gains: Array) -> State:
     numbers = {e.name: e.numbers for e in layout.exposures}
     seen = observe(layout, lambda name: source.frames(name, numbers[name]))
     setting = Setting(layout, seen, None, 1, 1, 8, 8, 2, 2, 2)
-    return State.of(setting, camera(TAPS), lambda: None)
+    return State.of(setting, model, lambda: None)
 
 
 def fixed(gains: Array) -> Denial | None:
@@ -48,6 +49,18 @@ def fixed(gains: Array) -> Denial | None:
 def test_halves_of_two_amplifiers_are_believed(share: float) -> None:
     step = np.where(np.arange(ROWS) < ROWS / 2, -0.5, 0.5)
     assert fixed(1 + share * GAIN_PERCENT / 100 * step) is None
+
+
+@pytest.mark.parametrize(("jump", "denied"), [(True, False), (False, True)])
+def test_an_effect_is_denied_before_it_is_taken_in_too(jump: bool, denied: bool) -> None:
+    """A tilt of the light beside a camera without taps shows no step where halves meet."""
+    lines = np.arange(ROWS)
+    shape = np.where(lines < ROWS / 2, -0.5, 0.5) if jump else np.linspace(-1, 1, ROWS)
+    state = with_taps(1 + GAIN_PERCENT / 100 * shape, camera())
+    predictor = state.predictor()
+    having = state.camera.model_copy(update={"effect": (TAPS,)})
+    said = refuted(state, predictor, "tap_mismatch", predictor.mean(having))
+    assert (said is not None) == denied
 
 
 @pytest.mark.parametrize("direction", [1, -1])

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from analysis.mismatch.bank.key import Key
-from analysis.mismatch.feigned import feigned
+from analysis.mismatch.feigned import feigned, stepped
 
 NUMBERS = (0, 1, 2, 4, 5, 6)  # of eight frames two are locked
 FRAMES, PIXELS = 6, 200_000
@@ -60,3 +60,35 @@ def test_a_pattern_beside_them_is_believed() -> None:
 def test_what_is_explained_or_another_effect_feigns_nothing() -> None:
     assert feigned(_state(0.1, 0.0, located=False), "prnu", WITHOUT) is None
     assert feigned(_state(0.1, 0.0), "row_fpn", WITHOUT) is None
+
+
+ROWS, COLUMNS = 48, 64
+
+
+def _lines(columns: Any, name: str = "offset alone", located: str = "half_seam") -> Any:
+    """Return a state with a map of pixel noise 1 whose columns differ: (column,)."""
+    image = np.random.default_rng(3).standard_normal((ROWS, COLUMNS)) + columns
+    return SimpleNamespace(
+        setting=SimpleNamespace(seen=SimpleNamespace(images={("MONO", name): (image, 1.0)})),
+        mismatches=[SimpleNamespace(statistic=located)],
+    )
+
+
+HALVES = np.where(np.arange(COLUMNS) < COLUMNS / 2, -0.5, 0.5)
+COMB = np.where(np.arange(COLUMNS) % 2 == 0, -0.5, 0.5)
+WHITE = np.random.default_rng(4).normal(0, 0.5, COLUMNS)
+
+
+@pytest.mark.parametrize("name", ["offset alone", "offset"])
+@pytest.mark.parametrize("columns", [HALVES, COMB])
+def test_halves_that_differ_as_a_whole_are_no_column_pattern(columns: Any, name: str) -> None:
+    said = stepped(_lines(columns, name), "column_fpn")
+    assert said is not None
+    assert abs(said.share) < 0.2
+    assert stepped(_lines(columns, name), "row_fpn") is None
+    assert stepped(_lines(columns, name, "row_variance"), "column_fpn") is None
+
+
+@pytest.mark.parametrize("columns", [WHITE, WHITE + 0.5 * HALVES])
+def test_columns_that_differ_one_by_one_are_believed(columns: Any) -> None:
+    assert stepped(_lines(columns), "column_fpn") is None

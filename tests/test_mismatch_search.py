@@ -10,13 +10,15 @@ import pytest
 from analysis.mismatch import name
 from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.name import Named, Search
-from analysis.mismatch.rank import alike
+from analysis.mismatch.rank import alike, ties
 from analysis.mismatch.recalibrate import _moved
 from dsis.effects import registry
 
 NUMBERS = 12
 STATE: Any = SimpleNamespace(
-    null=SimpleNamespace(known=np.ones(NUMBERS, bool), mean=np.zeros(NUMBERS), sd=np.ones(NUMBERS))
+    null=SimpleNamespace(known=np.ones(NUMBERS, bool), mean=np.zeros(NUMBERS), sd=np.ones(NUMBERS)),
+    predictor=lambda _: None,
+    setting=SimpleNamespace(layout=SimpleNamespace(rows=64, columns=96)),
 )
 
 
@@ -72,7 +74,8 @@ def test_nothing_worse_is_claimed_where_two_tie(monkeypatch: pytest.MonkeyPatch)
         ]
 
     monkeypatch.setattr(name, "ranked", ranked)
-    monkeypatch.setattr(Search, "_doubts", lambda *_: False)
+    monkeypatch.setattr(name, "refuted", lambda *_: None)
+    monkeypatch.setattr(name, "replicates_for", lambda *_: 2)
     search = _search()
     assert [one.kind for one in search._decided(STATE)] == ["adc_dnl", "row_noise"]
     assert [{one.kind for one in pair} for pair in search.ties] == [
@@ -93,14 +96,17 @@ def test_lines_of_different_frequencies_are_no_rivals() -> None:
         return ranked
 
     best = line("periodic_noise", 15.0, 0.25)
-    assert name._ties(STATE, best, line("bistable_pattern", 14.5, 0.25))
-    assert not name._ties(STATE, best, line("bistable_pattern", 14.5, 0.33))
+    assert ties(STATE, best, line("bistable_pattern", 14.5, 0.25))
+    assert not ties(STATE, best, line("bistable_pattern", 14.5, 0.33))
+    # A real wave has the frequency -f as well, and a peak is known to a bin and a half.
+    best.proposal.effect = registry()["periodic_noise"](amplitude_dn=1, frequency=(-0.255, -0.25))
+    assert ties(STATE, best, line("bistable_pattern", 14.5, 0.25))
 
 
 def test_a_rival_that_gains_less_than_is_asked_ties_as_well() -> None:
     best = _ranked("row_noise", 2.1, 0, 1)
-    assert name._ties(STATE, best, _ranked("pink_noise", 1.1, 0, 1))
-    assert not name._ties(STATE, best, _ranked("pink_noise", -1.0, 0, 1))
+    assert ties(STATE, best, _ranked("pink_noise", 1.1, 0, 1))
+    assert not ties(STATE, best, _ranked("pink_noise", -1.0, 0, 1))
 
 
 def test_what_a_statistic_denies_waits_until_more_is_named(
@@ -118,13 +124,12 @@ def test_what_a_statistic_denies_waits_until_more_is_named(
     monkeypatch.setattr(name, "ranked", ranked)
     monkeypatch.setattr(name, "refuted", refuted)
     monkeypatch.setattr(name, "replicates_for", lambda *_: 2)
-    state: Any = SimpleNamespace(null=STATE.null, predictor=lambda _: None)
     search = _search()
-    assert [one.kind for one in search._decided(state)] == ["crosstalk"]
+    assert [one.kind for one in search._decided(STATE)] == ["crosstalk"]
     assert search.doubted == {"readout_memory": "it shows 0% of it"}
     assert not search.refused
     denied.clear()
-    assert search._decided(state)[0].kind == "readout_memory"
+    assert search._decided(STATE)[0].kind == "readout_memory"
     assert search.doubted == {}
 
 

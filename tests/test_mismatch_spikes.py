@@ -5,13 +5,16 @@ import pytest
 from numpy.typing import NDArray
 
 from analysis.mismatch import find_mismatch
-from analysis.mismatch.bank.bulk import LOSS, Bulk
+from analysis.mismatch.bank.bulk import Bulk
+from analysis.mismatch.basefit import BaseFit
 from analysis.mismatch.observe import observe
 from analysis.mismatch.recalibrate import calibrate
 from analysis.mismatch.source import Source
 from analysis.mismatch.split import Split
 from analysis.mismatch.taking import layout_of
-from dsis.effects import registry
+from dsis.camera import Camera
+from dsis.cfa import Cfa
+from dsis.effects import Effect, registry
 from dsis.measures import Accumulator, Estimate
 from mismatch_recordings import camera, recorded
 
@@ -31,19 +34,25 @@ def _bulk(frames: NDArray[np.float64]) -> Bulk:
     return sums
 
 
-def test_the_variance_of_the_many_is_unbiased_and_its_error_known() -> None:
+@pytest.mark.parametrize("frames", [2, FRAMES])
+def test_the_variance_of_the_many_is_unbiased_and_its_error_known(frames: int) -> None:
     rng = np.random.default_rng(1)
-    found = np.array([_bulk(_noise(rng)).variance_dn2("MONO") for _ in range(200)])
+    sums = [_bulk(_noise(rng)[:frames]) for _ in range(400)]
+    found = np.array([one.variance_dn2("MONO", np.nan) for one in sums])
     true = SIGMA**2 + 1 / 12
-    error = true * np.sqrt(2 * LOSS / ((FRAMES - 1) * (ROWS - 1) * (COLUMNS - 1)))
-    assert abs(found.mean() - true) < 4 * error / 200**0.5
-    assert found.std() == pytest.approx(error, rel=0.2)
+    error = true * np.sqrt(2 / sums[0].dof("MONO"))
+    assert abs(found.mean() - true) < 4 * error / 400**0.5
+    assert found.std() == pytest.approx(error, rel=0.1)
 
 
-def test_lines_that_move_as_one_are_no_noise_of_pixels() -> None:
+def test_lines_and_frames_that_move_as_one_are_no_noise_of_pixels() -> None:
+    """Light that flickers by many standard deviations of a pixel is no spike either."""
     rng = np.random.default_rng(2)
     frames = _noise(rng) + rng.normal(0, 2, (FRAMES, ROWS, 1)).round()
-    assert _bulk(frames).variance_dn2("MONO") == pytest.approx(SIGMA**2, rel=0.05)
+    frames += rng.normal(0, 40, (FRAMES, 1, 1)).round()
+    found = _bulk(frames)
+    assert found.variance_dn2("MONO", np.nan) == pytest.approx(SIGMA**2, rel=0.05)
+    assert found.far("MONO") < 1e-3
 
 
 def test_spikes_are_left_out_and_counted() -> None:
@@ -52,23 +61,58 @@ def test_spikes_are_left_out_and_counted() -> None:
     hit = rng.random(frames.shape) < 0.01
     frames[hit] += 500
     found = _bulk(frames)
-    assert found.variance_dn2("MONO") == pytest.approx(SIGMA**2, rel=0.05)
+    assert found.variance_dn2("MONO", np.nan) == pytest.approx(SIGMA**2, rel=0.05)
     # Both differences of a frame see it; two spikes in a row may cancel.
     assert found.far("MONO") == pytest.approx(2 * 0.01 * 0.99, rel=0.2)
 
 
-def test_base_numbers_beside_spikes_are_those_of_the_many() -> None:
-    true = camera(IMPULSE)
+def test_what_is_not_rare_is_no_spike() -> None:
+    """The scale was wrong, say: then the plain variance is all that is known."""
+    found = Bulk(PLANES, {"MONO": SIGMA**2 / 100})
+    list(found.watching(_noise(np.random.default_rng(5))))
+    assert found.variance_dn2("MONO", 7.0) == 7.0
+    one = Bulk(PLANES, {"MONO": SIGMA**2})
+    list(one.watching(_noise(np.random.default_rng(5))[:1]))
+    assert one.variance_dn2("MONO", 7.0) == 7.0
+
+
+@pytest.mark.parametrize("effects", [(), (IMPULSE,)])
+def test_flicker_does_not_move_base_numbers(effects: tuple[Effect, ...]) -> None:
+    flicker = registry()["flicker"](sigma_percent=20.0)
+    true = camera(*effects, flicker)
+    (piece,) = _fitted(true, cfa="RGGB").pieces
+    assert abs(piece.slope - 0.5) < 5 * piece.slope_error < 0.1
+
+
+def _fitted(true: Camera, cfa: str = "MONO") -> BaseFit:
+    true = true.model_copy(update={"cfa": Cfa(cfa)})
     recording = recorded(true, 6)
     split, source = Split.of(recording), Source(recording)
     layout = layout_of(recording, split.development, source.frames)
     numbers = {e.name: e.numbers for e in layout.exposures}
     seen = observe(layout, lambda name: source.frames(name, numbers[name]))
-    dark = seen.levels["dark-0", "MONO"]
-    assert dark.variance_dn2 > 10 * 20.0  # of the spikes
-    (piece,) = calibrate(true, layout, seen, None, seed=1, jobs=1).fit.pieces
+    dark = seen.levels["dark-0", layout.channels[0]]
+    assert (dark.variance_dn2 > 10 * 20.0) == (IMPULSE in true.effect)  # of the spikes
+    return calibrate(true, layout, seen, None, seed=1, jobs=1).fit
+
+
+def test_base_numbers_beside_spikes_are_those_of_the_many() -> None:
+    (piece,) = _fitted(camera(IMPULSE)).pieces
     assert abs(piece.intercept - 20.0) < 4 * piece.intercept_error < 4.0
     assert abs(piece.slope - 0.5) < 4 * piece.slope_error < 0.1
+
+
+def test_a_wrong_switch_is_found_beside_spikes() -> None:
+    segments = ((0.5, 20.0, 700.0), (0.8, 120.0, None))
+    true = camera(IMPULSE, segments=segments)
+    recording = recorded(true, 6)
+    split, source = Split.of(recording), Source(recording)
+    layout = layout_of(recording, split.development, source.frames)
+    numbers = {e.name: e.numbers for e in layout.exposures}
+    seen = observe(layout, lambda name: source.frames(name, numbers[name]))
+    wrong = camera(IMPULSE, segments=((0.5, 20.0, 1200.0), (0.8, 120.0, None)))
+    (switch,) = calibrate(wrong, layout, seen, None, seed=1, jobs=1).switches
+    assert 500 < switch < 900
 
 
 def test_rare_spikes_are_named_alone_with_their_numbers() -> None:

@@ -12,7 +12,6 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.mismatch.bank.bulk import LOSS
 from analysis.mismatch.layout import Layout, Place
 from analysis.mismatch.observe import Level
 
@@ -43,7 +42,7 @@ class Offsets:
         if not self.bulk_dn2:
             return levels, self
         own = {
-            place: replace(level, variance_dn2=level.bulk_dn2, dof=level.dof / LOSS)
+            place: replace(level, variance_dn2=level.bulk_dn2, dof=level.bulk_dof)
             for place, level in levels.items()
         }
         return own, replace(self, variance_dn2=self.bulk_dn2)

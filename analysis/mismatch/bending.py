@@ -25,20 +25,24 @@ Three = tuple[float, float, float]
 """Level, variance, and the variance of the bulk."""
 
 
-def bends(effects: Iterable[Effect]) -> bool:
+def bends(effects: Iterable[Effect], bending: frozenset[str] = _BENT) -> bool:
     """Return whether effects change levels or variances; of coarse codes that is known exactly."""
-    return any(e.measures & _BENT for e in effects if not isinstance(e, Quantisation))
+    return any(e.measures & bending for e in effects if not isinstance(e, Quantisation))
 
 
-def bending_offsets(model: Model, layout: Layout, seed: int, jobs: int) -> Offsets:
+def bending_offsets(
+    model: Model, layout: Layout, seed: int, jobs: int, *, spiky: bool = False
+) -> Offsets:
     """Return what the camera's own effects add to level and variance, by simulation.
 
-    Only effects that change either are simulated, with and without: the draws are the same.
+    Only effects that change either are simulated, with and without: the draws are the same. Where
+    recordings are `spiky`, the variance of the many counts as well, which tails change.
     """
-    if not bends(model.camera.effect):
+    bending = _BENT | {"kurtosis"} if spiky else _BENT
+    if not bends(model.camera.effect, bending):
         return Offsets()
     codes = [e for e in model.camera.effect if isinstance(e, Quantisation)]
-    bent = [e for e in model.camera.effect if isinstance(e, Quantisation) or e.measures & _BENT]
+    bent = [e for e in model.camera.effect if isinstance(e, Quantisation) or e.measures & bending]
     cameras = [model.camera.model_copy(update={"effect": tuple(own)}) for own in (bent, codes)]
     samples = sum(min(len(e.numbers), _FRAMES) for e in layout.uniform)
     samples *= layout.rows * layout.columns
@@ -52,7 +56,7 @@ def bending_offsets(model: Model, layout: Layout, seed: int, jobs: int) -> Offse
             many = Bulk.of(layout, e.name)
             pairs = _pairs(layout, many.watching(islice(frames_of(e.name), _FRAMES)))
             for channel, pair in pairs.items():
-                found[e.name, channel] = (*pair, many.variance_dn2(channel))
+                found[e.name, channel] = (*pair, many.variance_dn2(channel, pair[1]))
         return found
 
     work = [(camera, replicate) for replicate in range(replicates) for camera in cameras]

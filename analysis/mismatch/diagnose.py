@@ -97,6 +97,7 @@ def find_mismatch(
     final = _searched(search, source) if large else search.run()
     if large:  # simulations of large recordings tell more, and cost more
         search.setting = replace(setting, nulls=setting.drafts)
+        final = _undenied(search, final)  # all frames may deny what some showed
     final, gains = _proven(search, search.settle(final), trial)
     proof = trial.proof(search.base, final, step, source)
     evidence = evidence_of(search.base, final, album, split)
@@ -135,13 +136,17 @@ def _searched(search: Search, source: Source) -> State:
     return State.of(whole, found.camera, search.step) if search.named else base
 
 
+def _undenied(search: Search, final: State) -> State:
+    """Drop, one by one, effects that are denied."""
+    while (denied := search.denied(final)) is not None:
+        final = search.drop(final, *denied)
+    return final
+
+
 def _proven(search: Search, final: State, trial: Trial) -> tuple[State, dict[str, Gain]]:
     """Drop, one by one, effects that are denied, or whose gain is within its uncertainty."""
     while True:
-        denied = search.denied(final)
-        if denied is not None:
-            final = search.drop(final, *denied)
-            continue
+        final = _undenied(search, final)
         without = {named.name: search.fitted_without(final, named) for named in search.named}
         gained = trial.gains(final, without)
         weak = [named for named in search.named if not gained[named.name].certain]

@@ -3,13 +3,14 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.mismatch.bank.seams import beyond_smooth, seam_shapes
+from analysis.mismatch.bank.seams import SMOOTH_DEGREE, beyond_smooth, seam_shapes
 from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.state import State
 
 Array = NDArray[np.float64]
 PATTERNS = frozenset({"dsnu", "prnu"})
-LINES = {"row_fpn": "rows", "column_fpn": "columns"}
+_AXES = {"row_fpn": "rows", "column_fpn": "columns"}
+_SHAPES = 2  # a step and a comb
 _MOST = 0.5  # of a pattern's variance, that something else may feign
 
 
@@ -65,20 +66,22 @@ def stepped(state: State, kind: str) -> Denial | None:
     is left unexplained, and makes half of what the lines differ by beyond smooth surfaces, lines
     may be alike but for that.
     """
-    axis = LINES.get(kind)
+    axis = _AXES.get(kind)
     if axis is None or not any(m.statistic in ("half_seam", "parity") for m in state.mismatches):
         return None
     whole, rest = 0.0, 0.0
-    for (_, name), (image, noise) in state.setting.seen.images.items():
-        if name != "offset alone":
+    images = state.setting.seen.images
+    for (channel, name), (image, noise) in images.items():
+        if name != ("offset alone" if (channel, "offset alone") in images else "offset"):
             continue
         means = (image - image.mean()).mean(1 if axis == "rows" else 0) / noise
         own = beyond_smooth(means)
         shapes = np.stack(seam_shapes(means.size))
         without = own - shapes.T @ (shapes @ own)
         across = image.size / means.size
-        whole += float(own @ own) * across - means.size
-        rest += float(without @ without) * across - means.size
+        free = means.size - 1 - SMOOTH_DEGREE
+        whole += float(own @ own) * across - free
+        rest += float(without @ without) * across - (free - _SHAPES)
     if whole <= 0 or rest >= _MOST * whole:
         return None
     return Denial(rest / whole, "halves, or even and odd lines, differ as a whole and feign it")

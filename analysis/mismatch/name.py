@@ -14,8 +14,9 @@ from analysis.mismatch.observe import Frames
 from analysis.mismatch.phase import aliases, keeps_phase, strongest
 from analysis.mismatch.polish import polish, with_effects
 from analysis.mismatch.predict import Predictor
-from analysis.mismatch.rank import Memory, Ranked, alike, ranked, replicates_for
+from analysis.mismatch.rank import Memory, Ranked, ranked, replicates_for, ties
 from analysis.mismatch.recalibrate import calibrate
+from analysis.mismatch.resolved import resolved
 from analysis.mismatch.segments import second_path
 from analysis.mismatch.state import Setting, State
 from analysis.mismatch.uncertainty import settled
@@ -26,18 +27,14 @@ from dsis.effects import Effect
 Array = NDArray[np.float64]
 Step = Callable[[], None]
 LEAST_GAIN = 2.0  # of log-likelihood, for an effect to be taken in where something is located
-_TIE = 3.0  # of log-likelihood: odds below 20 do not tell two effects apart
 _MOST_EFFECTS = 10  # some may have to go again
 _MOST_LINES = 3  # further ones stay unexplained, located
-_CLEAR = 3.0  # departures below are chance
 _PHASES = {
     "periodic_noise": "the pattern's phase is the same in all frames but for its sign",
     "bistable_pattern": "the pattern's phase is another in every frame",
 }
 _SPIKY = 10.0  # standard errors from which tails bend the variances
 _TAILS = frozenset({"kurtosis", "kurtosis_within_pixels", "one_off_outliers"})
-_MOST_OF, _LEAST_CHANGE = 0.7, 1.0
-_MINOR = 0.3  # share of a departure
 _RESOLVED = 0.7  # share of what an effect touches that it must explain
 
 
@@ -224,24 +221,34 @@ class Search:
             )
             if len(self.settled) > len(settled):
                 continue  # a line was refused: others were too far behind it
-            if fitted and self._doubts(state, fitted[0]):
-                continue
-            rival = next((one for one in fitted[1:] if _ties(state, fitted[0], one)), None)
+            before = len(self.doubted)
+            fitted = self._undoubted(state, fitted)
+            if len(self.doubted) > before:
+                continue  # all that was fitted of a kind is denied: others were too far behind it
+            if not fitted or fitted[0].gain < LEAST_GAIN:
+                return fitted
+            rival = next((one for one in fitted[1:] if ties(state, fitted[0], one)), None)
             if rival is None:
                 return fitted
             self.ties.append((fitted[0], rival))
 
-    def _doubts(self, state: State, best: Ranked) -> bool:
-        """Put an effect aside that a statistic which calls for it denies, for this round.
+    def _undoubted(self, state: State, fitted: list[Ranked]) -> list[Ranked]:
+        """Leave out the best as long as a statistic which calls for it denies it, for this round.
 
-        What is named besides may show another of it: then it is tried again.
+        A kind of which nothing is left is doubted. What is named besides may show another of it:
+        then it is tried again.
         """
-        predictor = state.predictor(replicates_for(self.setting, [best.proposal.effect]))
-        denial = refuted(state, predictor, best.kind, best.polished.mean)
-        if best.gain < LEAST_GAIN or best.kind in LINES or denial is None:
-            return False
-        self.doubted[best.name] = denial.why
-        return True
+        while fitted and fitted[0].gain >= LEAST_GAIN and fitted[0].kind not in LINES:
+            best, *others = fitted
+            predictor = state.predictor(replicates_for(self.setting, [best.proposal.effect]))
+            denial = refuted(state, predictor, best.kind, best.polished.mean)
+            if denial is None:
+                break
+            fitted = others
+            if all(one.kind != best.kind for one in others):
+                self.doubted[best.name] = denial.why
+                break
+        return fitted
 
     def _possible(self, effect: Effect) -> bool:
         """Return whether an effect may be tried: of a line, the alias that whole frames show."""
@@ -355,20 +362,6 @@ class Search:
         return None
 
 
-def _ties(state: State, best: Ranked, other: Ranked) -> bool:
-    """Return whether another effect explains the same numbers nearly as well as the best."""
-    near = other.gain > best.gain - _TIE and other.kind != best.kind
-    if not near or _other_line(best, other):
-        return False
-    return alike(state, best.polished.mean, other.polished.mean)
-
-
-def _other_line(best: Ranked, other: Ranked) -> bool:
-    """Return whether two effects are lines of different frequencies: a sensor may have both."""
-    one, two = (frequency_of(ranked.proposal.effect) for ranked in (best, other))
-    return one is not None and two is not None and one != two
-
-
 def _bent(base: State, final: State) -> Array:
     """Return what a second read-out path changes: the residuals of the variances."""
     own = np.array([key.statistic == "pixel_variance" for key in base.vector.keys])
@@ -392,31 +385,3 @@ def _without(camera: Camera, effects: Sequence[Effect], given: Camera) -> Camera
                 del left[i]
                 break
     return camera.model_copy(update={"effect": tuple(left)})
-
-
-def resolved(predictor: Predictor, state: State, without: Array) -> float:
-    """Return the share of departures that an effect explains, of those numbers that it changes.
-
-    `without` are the numbers predicted without it. What is explained within 3 standard errors, or
-    within the likelihood's allowance for the effect's form, is explained.
-    """
-    null = state.null
-    known = null.known & np.isfinite(without)
-    single = np.where(known, (null.mean - without) / null.sd, 0.0)
-    sums = null.contrasts.matrix
-    change = np.concatenate([single, sums @ single / null.contrast_sd])
-    forms = np.concatenate([predictor.forms, np.full(len(sums), float(np.median(predictor.forms)))])
-    after = null.departures(state.vector)
-    # What changes nothing clearly is judged by what it changes most.
-    limit = min(_CLEAR, _MOST_OF * float(np.abs(change).max(initial=0.0)))
-    clear = np.abs(change) > max(limit, _LEAST_CHANGE)
-    # Where an effect adds little, and rightly, to a large departure, the rest is another's.
-    departure = after + change
-    clear &= ~((change * departure > 0) & (np.abs(change) < _MINOR * np.abs(departure)))
-    if not clear.any():
-        return 0.0
-    before = np.abs(departure)[clear]
-    allowed = _CLEAR + 2 * forms[clear] * np.abs(change[clear])
-    left = np.maximum(np.abs(after[clear]) - allowed, 0.0).sum()
-    total = np.maximum(np.maximum(before, np.abs(change[clear])) - limit, 0.0).sum()
-    return float(1 - left / total) if total > 0 else 0.0

@@ -44,7 +44,9 @@ class Level:
     pixels
         Pixels of the channel.
     bulk_dn2
-        Its variance with single spikes left out; nan where unknown.
+        Its variance with single spikes left out.
+    bulk_dof
+        Degrees of freedom of that.
     far
         Share of differences of successive frames that were left out.
     """
@@ -57,6 +59,7 @@ class Level:
     clipped_high: float
     pixels: int
     bulk_dn2: float = nan
+    bulk_dof: float = nan
     far: float = nan
 
 
@@ -167,8 +170,13 @@ def observe(
             bands.add(measured.channels, expected, signals, frames)
         for name, channel in measured.channels.items():
             place = (exposure.name, name)
-            bulk, far = many.variance_dn2(name), many.far(name)
-            levels[place] = replace(_level(channel, frames), bulk_dn2=bulk, far=far)
+            level = _level(channel, frames)
+            levels[place] = replace(
+                level,
+                bulk_dn2=many.variance_dn2(name, level.variance_dn2),
+                bulk_dof=many.dof(name),
+                far=many.far(name),
+            )
             if name not in sums:
                 n, m = channel.mean_frame.shape
                 sums[name] = _Channel(layout.regressors(name), (n, m))

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.candidates import CANDIDATES, Proposal
-from analysis.mismatch.instance import Frequency, instance
+from analysis.mismatch.instance import Frequency, frequency_of, instance, same_line
 from analysis.mismatch.model import in_threads
 from analysis.mismatch.polish import Polished, polish, with_effects
 from analysis.mismatch.state import Setting, State
@@ -17,6 +17,7 @@ Array = NDArray[np.float64]
 _MOST = 4  # kinds that are fitted, after all were tried as proposed
 _FAR = 15.0  # of log-likelihood behind the best as proposed: fitting does not make up for it
 _SHARE = 0.03  # or that share of what the best gains
+_TIE = 3.0  # of log-likelihood: odds below 20 do not tell two effects apart
 _COSINE = 0.5  # of what two predictions change, from which they change the same
 _ALIKE = 0.05  # relative difference of parameters up to which a proposal is an earlier one
 _SPARSE = 4  # times as many simulations
@@ -143,7 +144,7 @@ def _others(state: State, means: Sequence[Array]) -> NDArray[np.bool_]:
     far: NDArray[np.bool_] = np.abs(seen) > _FAR_OFF
     for mean in means:
         change = np.where(null.known, np.nan_to_num(mean - null.mean), 0.0) / null.sd
-        far &= change * seen < _LITTLE * seen**2
+        far &= np.abs(change) < _LITTLE * np.abs(seen)
     return far
 
 
@@ -208,3 +209,20 @@ def alike(state: State, one: Array, other: Array) -> bool:
     )
     size = float(np.linalg.norm(a) * np.linalg.norm(b))
     return size > 0 and float(a @ b) / size > _COSINE
+
+
+def ties(state: State, best: Ranked, other: Ranked) -> bool:
+    """Return whether another effect explains the same numbers nearly as well as the best."""
+    near = other.gain > best.gain - _TIE and other.kind != best.kind
+    if not near or _other_line(state, best, other):
+        return False
+    return alike(state, best.polished.mean, other.polished.mean)
+
+
+def _other_line(state: State, best: Ranked, other: Ranked) -> bool:
+    """Return whether two effects are lines of different frequencies: a sensor may have both."""
+    one, two = (frequency_of(ranked.proposal.effect) for ranked in (best, other))
+    if one is None or two is None:
+        return False
+    layout = state.setting.layout
+    return not same_line(one, two, layout.rows, layout.columns)

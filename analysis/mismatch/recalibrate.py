@@ -1,7 +1,7 @@
 """The base model's numbers, fitted again."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
 from math import isfinite, sqrt
@@ -17,11 +17,11 @@ from analysis.mismatch.rounding import rounded, unrounded
 from analysis.mismatch.staging import with_pictures
 from dsis.camera import BaseNoise, Camera, Segment
 from dsis.effects.quantisation import Quantisation
+from dsis.measures.spikes import SPIKED
 
 _ROUNDS = 3
 _SAME = 0.05  # of an error: the fit has settled
 _SWITCH_DEVIANCE = 12.0  # by which another gap must fit better before the switch is moved
-_SPIKED = 1.5  # times the variance of the many: no law of read noise has such tails
 _APART = 1.005  # ratio of signals from which they are two levels
 
 
@@ -82,23 +82,27 @@ def calibrate(
     undone = _undone(layout, seen.levels, code_step(camera), spiky=spiky)
     effects = Offsets()
 
-    def fitted(offsets: Offsets, at: tuple[float, ...]) -> BaseFit:
+    def fitted(
+        offsets: Offsets, at: tuple[float, ...], levels: Mapping[Place, Level] = seen.levels
+    ) -> BaseFit:
         return fit_base(
-            layout, seen.levels, at, offsets, black_dn=start, left_out=left_out, slopes=slopes
+            layout, levels, at, offsets, black_dn=start, left_out=left_out, slopes=slopes
         )
 
     before: BaseFit | None = None
-    for _ in range(_ROUNDS if bends(camera.effect) else 1):
+    for _ in range(_ROUNDS if spiky or bends(camera.effect) else 1):
         recorded = _sum(undone, effects)
         fit = fitted(recorded, switches)
         if before is not None and _same(before, fit):
             break
         before = fit
-        if len(switches) == 1 and not spiky:
-            switches = _moved(seen.levels, left_out, switches, fit, partial(fitted, recorded))
+        if len(switches) == 1:
+            own, added = recorded.fitted(seen.levels)
+            again = partial(fitted, replace(added, bulk_dn2={}), levels=own)
+            switches = _moved(own, left_out, switches, fit, again)
             fit = fitted(recorded, switches)
         model = Model(with_numbers(camera, fit, switches, layout.black_dn), signals_of(layout, fit))
-        effects = bending_offsets(model, layout, seed + 1, jobs)
+        effects = bending_offsets(model, layout, seed + 1, jobs, spiky=spiky)
     if layout.scenes:
         model = with_pictures(model, layout, fit, effects, seed=seed + 1, jobs=jobs)
     offsets = _sum(_rounding(model, layout, fit, spiky=spiky), effects)
@@ -169,7 +173,7 @@ def code_step(camera: Camera) -> float:
 
 def _spiky(levels: Mapping[Place, Level]) -> bool:
     """Return whether spikes dominate variances: the base numbers are then those of the many."""
-    return any(level.variance_dn2 > _SPIKED * level.bulk_dn2 > 0 for level in levels.values())
+    return any(level.variance_dn2 > SPIKED * level.bulk_dn2 > 0 for level in levels.values())
 
 
 def _undone(

@@ -6,24 +6,34 @@ from numpy.typing import NDArray
 from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.state import State
 from dsis.effects import Effect
+from dsis.effects.amp_glow import AmpGlow
 from dsis.effects.dark_current import DarkCurrent
+from dsis.effects.hot_pixels import HotPixels
 
 Array = NDArray[np.float64]
 _PARTS = 4  # along each side
 _LEAST_SHARE = 0.5  # of a dark current, that every part of the sensor must show
-_SURE = 2.0  # standard errors below it
+_SURE = 3.0  # standard errors below it: the least of sixteen
+_SEEN = 5.0  # standard errors of a surface
 _SMOOTH = "fixed_smooth"
 
 
 def uneven(state: State, effect: Effect | None) -> Denial | None:
     """Return how an even dark current is denied by where levels grow with time; None: it is not.
 
-    Where a smooth surface is left unexplained, and the part of the sensor that grows least has not
-    half of the dark current, the mean that grows may be the surface's: a glow, say.
+    Where a smooth surface that grows with time is left unexplained, and the part of the sensor that
+    grows least has not half of the dark current, the mean that grows may be the surface's: a glow,
+    say. Beside a glow or hot pixels that are named nothing is said: the map has their mean too.
     """
     if not isinstance(effect, DarkCurrent) or not effect.dn_per_s:
         return None
-    if not any(m.statistic.startswith(_SMOOTH) for m in state.mismatches):
+    if any(isinstance(other, AmpGlow | HotPixels) for other in state.camera.effect):
+        return None
+    left = state.null.departures(state.vector)
+    if not any(
+        abs(z) > _SEEN and key.scope == "time" and key.statistic.startswith(_SMOOTH)
+        for key, z in zip(state.vector.keys, left, strict=False)
+    ):
         return None
     shares, errors = [], []
     for (channel, name), (image, noise) in state.setting.seen.images.items():

@@ -13,9 +13,10 @@ class Shading(Effect):
     """A fixed smooth fall-off of light: to the corners, and to one side where light is uneven.
 
     S'(y, x) = S(y, x) max(1 - f r^2 / R^2 + a y / Y + b x / X, 0), from the sensor's centre: r the
-    distance and R the corner's, Y and X the last row and column. On a whole sensor the mean falls
-    by f S / 3, for the mean of r^2 / R^2 is 1/3; tilts a, down, and b, to the right, leave it. A
-    lamp beside the axis gives both, and so does a part of a sensor: its centre is another.
+    distance and R the corner's, Y and X half the height and width. On a whole sensor the mean falls
+    by f S / 3, for the mean of r^2 / R^2 is 1/3; tilts a, down, and b, to the right, leave it where
+    light ends nowhere. A lamp beside the axis gives both, and so does a part of a sensor: its
+    centre is another.
     """
 
     kind: Literal["shading"] = "shading"

@@ -18,14 +18,13 @@ from numpy.typing import NDArray
 
 from dsis.measures.estimate import Estimate, estimate, unknown
 from dsis.measures.kernels import count_codes
+from dsis.measures.spikes import variance_of_quartiles, without_spikes
 
 LOWEST_CODE, CODES = -(2**16), 2**18  # the first code counted, and how many
 LEAST_SIGMA_STEPS = 2.0  # below, noise does not smooth the density: no code width can be told
 _LEAK = 1e-7  # of the smooth density's power is let into the band
 _REMEMBERED = 4096  # transforms up to this size keep their bands: 17 MB at most
 _LEAST_DOF, _NODES = 4.0, 20
-_SPIKED = 1.5  # times the variance of the middle: no law of read noise has such tails
-_QUARTILES = 1.3489795  # of the normal law, apart
 
 
 class CodeCounts:
@@ -137,8 +136,7 @@ class Codes:
         With D(w) the transform of counts h, mean |D|^2 over the band = sum h + rms^2 sum h^2.
         """
         step = self.spacing().value
-        if variance_dn2 > _SPIKED * self._middle_dn2:
-            variance_dn2 = self._middle_dn2
+        variance_dn2 = without_spikes(variance_dn2, self._middle_dn2)
         sigma = variance_dn2**0.5 / step if variance_dn2 >= 0 else nan
         if not sigma >= LEAST_SIGMA_STEPS or self._clipped:
             return unknown(0.0)
@@ -165,7 +163,7 @@ class Codes:
         """The variance of a normal law with the quartiles of the histogram."""
         below = (np.cumsum(self.counts) - self.counts / 2) / self.total
         low, high = np.interp((0.25, 0.75), below, np.arange(self.counts.size))
-        return float(high - low) ** 2 / _QUARTILES**2
+        return variance_of_quartiles(float(low), float(high))
 
     @cached_property
     def _clipped(self) -> bool:

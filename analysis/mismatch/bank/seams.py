@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from analysis.mismatch.bank.scalars import Number
 
 Array = NDArray[np.float64]
+SMOOTH_DEGREE = 4  # of the polynomials along an axis
 WHOLE = "halves as a whole"
 
 
@@ -45,5 +46,7 @@ def seam_shapes(size: int) -> tuple[Array, Array]:
 def beyond_smooth(values: Array) -> Array:
     """Return means of lines (line, ...) less the smooth polynomials that fit them best."""
     size = len(values)
-    smooth = np.polynomial.legendre.legvander(np.linspace(-1, 1, size), min(4, size - 3))
+    smooth = np.polynomial.legendre.legvander(
+        np.linspace(-1, 1, size), min(SMOOTH_DEGREE, size - 3)
+    )
     return np.asarray(values - smooth @ np.linalg.lstsq(smooth, values, rcond=None)[0])

@@ -42,22 +42,39 @@ def _shading(clues: Clues) -> Sequence[Proposal]:
     """Start from the surface that fits the gain: a fall to the corners, a tilt, or both."""
     images = clues.image("gain")
     if not images:
-        return []
+        return _of_strength(clues)
     values, errors = np.zeros(3), np.zeros(3)
     for channel, (image, noise) in images.items():
         surfaces = _surfaces(image.shape)
         inverse = np.linalg.inv(surfaces @ surfaces.T)
         scale = 100 / clues.scale("gain", channel) / len(images)
         values += scale * (inverse @ surfaces @ (image - image.mean()).ravel())
+        values -= _had(clues) / len(images)
         errors = np.hypot(errors, scale * noise * np.sqrt(np.diag(inverse)))
     own = dict(zip(_SURFACES, values.tolist(), strict=True))
     clear = {name for name, error in zip(_SURFACES, errors, strict=True)
              if abs(own[name]) > _CLEAR * error}  # fmt: skip
     fall, *tilts = _SURFACES
     found: list[Proposal] = []
-    for names in ([fall], [name for name in tilts if name in clear]):
+    leaning = [name for name in tilts if name in clear]
+    for names in ([fall], leaning, [fall, *leaning] if leaning else []):
         found += _of_light(own, names)
-    return [*found, *_of_light(own, [fall, *(n for n in tilts if n in clear)])]
+    return found
+
+
+def _of_strength(clues: Clues) -> Sequence[Proposal]:
+    """Start from how strong the surfaces of single exposures are: one level has no gain."""
+    variance, _ = clues.amplitude("fixed_smooth_variance", _squared(clues))
+    if variance <= 0:
+        return []
+    spread = float(_surfaces((clues.layout.rows, clues.layout.columns))[0].var())
+    return _of_light({_SURFACES[0]: 100 * sqrt(variance / spread)}, _SURFACES[:1])
+
+
+def _had(clues: Clues) -> Array:
+    """Return what the camera's own shading does to the light, per cent of each surface."""
+    own = [e.model_dump() for e in clues.camera.effect if e.kind == "shading"]
+    return np.array([sum(effect[name] for effect in own) for name in _SURFACES], float)
 
 
 def _of_light(own: Mapping[str, float], names: Sequence[str]) -> list[Proposal]:

@@ -11,7 +11,6 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from analysis.mismatch.prove.cells import cells_of
 from analysis.mismatch.prove.dependence import with_dependence, with_levels
@@ -25,9 +24,8 @@ from analysis.mismatch.prove.sites import site_places
 from analysis.mismatch.prove.virtual import Signals, Stack, base_of, clean_signal, virtual_sensor
 from dsis.camera import Camera
 from dsis.effects import Image
+from dsis.measures.spikes import variance_of_most
 
-_QUARTILES = 1.3489795  # of the normal law, apart
-_SPIKED = 1.5  # times the variance that the quartiles say: outliers dominate it
 _LEAST_DN2 = 0.01  # codes are whole: less noise cannot be seen
 
 
@@ -122,14 +120,6 @@ def _halves(stacks: list[Stack], place: tuple[slice, slice]) -> Halves:
     )
 
 
-def _variance_of_most(image: NDArray[np.float64]) -> float:
-    """Return the variance of an image; without the outliers where they dominate it."""
-    plain = float(image.var())
-    low, high = np.percentile(image, [25, 75])
-    most = float((high - low) / _QUARTILES) ** 2
-    return most if plain > _SPIKED * most > 0 else plain
-
-
 def _with_widths(law: Law, held: Held) -> Law:
     """Return the law with the widths of codes that the training frames show."""
     size = law.cells.lower_dn.size
@@ -142,7 +132,8 @@ def _with_widths(law: Law, held: Held) -> Law:
         means = e.training_means_dn.mean(0) - law.cells.black_dn
         for site, place in enumerate(site_places(held.cfa)):
             variance = float(own.variance_dn2[place].mean() * own.factor[site])
-            spread = max(_variance_of_most(e.mean_dn[place]) - variance / e.trained, 0.0)
+            means_of = np.var if e.kind == "scene" else variance_of_most  # lights are no spikes
+            spread = max(float(means_of(e.mean_dn[place])) - variance / e.trained, 0.0)
             sd = np.sqrt(variance + spread)
             centre = law.cells.centre(float(means[site]), sd)
             edges = own.shapes[site].below((law.cells.upper_dn - centre) / sd)

@@ -1,0 +1,40 @@
+"""How much an effect explains of what it changes."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.mismatch.predict import Predictor
+from analysis.mismatch.state import State
+
+Array = NDArray[np.float64]
+_CLEAR = 3.0  # departures below are chance
+_MOST_OF, _LEAST_CHANGE = 0.7, 1.0
+_MINOR = 0.3  # share of a departure
+
+
+def resolved(predictor: Predictor, state: State, without: Array) -> float:
+    """Return the share of departures that an effect explains, of those numbers that it changes.
+
+    `without` are the numbers predicted without it. What is explained within 3 standard errors, or
+    within the likelihood's allowance for the effect's form, is explained.
+    """
+    null = state.null
+    known = null.known & np.isfinite(without)
+    single = np.where(known, (null.mean - without) / null.sd, 0.0)
+    sums = null.contrasts.matrix
+    change = np.concatenate([single, sums @ single / null.contrast_sd])
+    forms = np.concatenate([predictor.forms, np.full(len(sums), float(np.median(predictor.forms)))])
+    after = null.departures(state.vector)
+    # What changes nothing clearly is judged by what it changes most.
+    limit = min(_CLEAR, _MOST_OF * float(np.abs(change).max(initial=0.0)))
+    clear = np.abs(change) > max(limit, _LEAST_CHANGE)
+    # Where an effect adds little, and rightly, to a large departure, the rest is another's.
+    departure = after + change
+    clear &= ~((change * departure > 0) & (np.abs(change) < _MINOR * np.abs(departure)))
+    if not clear.any():
+        return 0.0
+    before = np.abs(departure)[clear]
+    allowed = _CLEAR + 2 * forms[clear] * np.abs(change[clear])
+    left = np.maximum(np.abs(after[clear]) - allowed, 0.0).sum()
+    total = np.maximum(np.maximum(before, np.abs(change[clear])) - limit, 0.0).sum()
+    return float(1 - left / total) if total > 0 else 0.0

@@ -45,11 +45,13 @@ class Shading(Effect):
         rows, columns = exposure.grid.sensor_shape
         y = exposure.grid.row_numbers() - (rows - 1) / 2
         x = exposure.grid.column_numbers() - (columns - 1) / 2
-        share = (y**2 + x**2) / ((rows / 2) ** 2 + (columns / 2) ** 2)
-        tilt = self.tilt_down_percent * y / (rows / 2)
-        tilt = tilt + self.tilt_right_percent * x / (columns / 2)
-        light = 1 - self.falloff_percent / 100 * share + tilt / 100
-        return image * np.maximum(light, 0.0).astype(np.float32)
+        fall = self.falloff_percent / 100 / ((rows / 2) ** 2 + (columns / 2) ** 2)
+        down = 1 - fall * y**2 + self.tilt_down_percent / 100 * y / (rows / 2)
+        across = -fall * x**2 + self.tilt_right_percent / 100 * x / (columns / 2)
+        light = down.astype(np.float32) + across.astype(np.float32)
+        if down.min() + across.min() < 0:
+            light = np.maximum(light, np.float32(0))
+        return image * light
 
     def contributions(self, point: OperatingPoint) -> Mapping[str, float]:
         """Return what mean and shot noise lose, and the variance of the whole sensor's light."""

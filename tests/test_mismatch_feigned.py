@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from analysis.mismatch.bank.key import Key
-from analysis.mismatch.feigned import feigned, stepped
+from analysis.mismatch.feigned import feigned, heated, stepped
 
 NUMBERS = (0, 1, 2, 4, 5, 6)  # of eight frames two are locked
 FRAMES, PIXELS = 6, 200_000
@@ -92,3 +92,22 @@ def test_halves_that_differ_as_a_whole_are_no_column_pattern(columns: Any, name:
 @pytest.mark.parametrize("columns", [WHITE, WHITE + 0.5 * HALVES])
 def test_columns_that_differ_one_by_one_are_believed(columns: Any) -> None:
     assert stepped(_lines(columns), "column_fpn") is None
+
+
+@pytest.mark.parametrize(
+    ("kind", "scope", "z", "denied"),
+    [
+        ("rts", "time", 8.0, True),
+        ("rts", "time", 2.0, False),
+        ("rts", "offset", 8.0, False),
+        ("hot_pixels", "time", 8.0, False),
+    ],
+)
+def test_hot_pixels_that_have_no_word_do_not_jump(
+    kind: str, scope: str, z: float, denied: bool
+) -> None:
+    state: Any = SimpleNamespace(
+        vector=SimpleNamespace(keys=(Key("outlying_pixels", scope, "", "R"),)),
+        null=SimpleNamespace(departures=lambda _: np.array([z])),
+    )
+    assert (heated(state, kind) is not None) == denied

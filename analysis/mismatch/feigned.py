@@ -1,4 +1,4 @@
-"""Fixed patterns that something else feigns: frames that are alike, halves that differ."""
+"""Patterns and pixels that something else feigns: alike frames, halves, dark current."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +10,7 @@ from analysis.mismatch.state import State
 Array = NDArray[np.float64]
 PATTERNS = frozenset({"dsnu", "prnu"})
 _AXES = {"row_fpn": "rows", "column_fpn": "columns"}
+_CLEAR = 5.0  # standard errors of what stands out with exposure time
 _SHAPES = 2  # a step and a comb
 _MOST = 0.5  # of a pattern's variance, that something else may feign
 
@@ -85,3 +86,20 @@ def stepped(state: State, kind: str) -> Denial | None:
     if whole <= 0 or rest >= _MOST * whole:
         return None
     return Denial(rest / whole, "halves, or even and odd lines, differ as a whole and feign it")
+
+
+def heated(state: State, kind: str) -> Denial | None:
+    """Return how pixels that jump are denied by others that stand out with exposure time.
+
+    The dark current of hot pixels is noisy, and so are they, in long exposures. Where pixels that
+    grow with time are left unexplained, they may be all that is noisy.
+    """
+    if kind != "rts":
+        return None
+    left = state.null.departures(state.vector)
+    hot = any(
+        z > _CLEAR and key.statistic == "outlying_pixels" and key.scope == "time"
+        for key, z in zip(state.vector.keys, left, strict=False)
+    )
+    why = "pixels that stand out with exposure time are left, whose dark current is noisy too"
+    return Denial(0.0, why) if hot else None

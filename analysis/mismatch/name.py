@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from analysis.mismatch.candidates import CANDIDATES, Proposal
 from analysis.mismatch.contradicted import contradicted, refuted
-from analysis.mismatch.feigned import PATTERNS, feigned, stepped
+from analysis.mismatch.feigned import PATTERNS, feigned, heated, stepped
 from analysis.mismatch.instance import LINES, Frequency, frequency_of, instance, same_line
 from analysis.mismatch.observe import Frames
 from analysis.mismatch.phase import aliases, keeps_phase, strongest
@@ -341,7 +341,11 @@ class Search:
         if denial is None and named.kind in PATTERNS:
             denial = feigned(state, named.kind, predictor.mean(without))
         if denial is None and named.proposal is not None:
-            denial = uneven(state, named.proposal.effect) or stepped(state, named.kind)
+            denial = (
+                uneven(state, named.proposal.effect)
+                or stepped(state, named.kind)
+                or heated(state, named.kind)
+            )
         return None if denial is None else (denial.share, denial.why)
 
     def _needless(

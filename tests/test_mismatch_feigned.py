@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from analysis.mismatch.bank.key import Key
-from analysis.mismatch.feigned import feigned, heated, stepped
+from analysis.mismatch.feigned import feigned, heated, outlying, stepped
 
 NUMBERS = (0, 1, 2, 4, 5, 6)  # of eight frames two are locked
 FRAMES, PIXELS = 6, 200_000
@@ -111,3 +111,18 @@ def test_hot_pixels_that_have_no_word_do_not_jump(
         null=SimpleNamespace(departures=lambda _: np.array([z])),
     )
     assert (heated(state, kind) is not None) == denied
+
+
+@pytest.mark.parametrize(("kind", "name"), [("dsnu", "offset"), ("prnu", "gain alone")])
+@pytest.mark.parametrize(("spread", "denied"), [(0.0, True), (1.0, False)])
+def test_few_pixels_that_stand_out_are_no_pattern(
+    kind: str, name: str, spread: float, denied: bool
+) -> None:
+    rng = np.random.default_rng(6)
+    image = rng.normal(0, np.hypot(1, spread), (ROWS, COLUMNS))
+    image[rng.random(image.shape) < 0.002] += 20  # a variance of 0.8 in all
+    state = _lines(0.0, name, "outlying_pixels")
+    state.setting.seen.images["MONO", name] = (image, 1.0)
+    assert (outlying(state, kind) is not None) == denied
+    state.mismatches[0].statistic = "fixed_pixel_variance"
+    assert outlying(state, kind) is None

@@ -6,9 +6,11 @@ from numpy.typing import NDArray
 from analysis.mismatch.bank.seams import SMOOTH_DEGREE, beyond_smooth, seam_shapes
 from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.state import State
+from dsis.measures.spikes import variance_of_quartiles
 
 Array = NDArray[np.float64]
-PATTERNS = frozenset({"dsnu", "prnu"})
+_MAPS = {"dsnu": ("offset", "offset alone"), "prnu": ("gain", "gain alone")}
+PATTERNS = frozenset(_MAPS)
 _AXES = {"row_fpn": "rows", "column_fpn": "columns"}
 _CLEAR = 5.0  # standard errors of what stands out with exposure time
 _SHAPES = 2  # a step and a comb
@@ -103,3 +105,26 @@ def heated(state: State, kind: str) -> Denial | None:
     )
     why = "pixels that stand out with exposure time are left, whose dark current is noisy too"
     return Denial(0.0, why) if hot else None
+
+
+def outlying(state: State, kind: str) -> Denial | None:
+    """Return how a pattern of all pixels is denied by few that stand far out; None: not.
+
+    Where pixels that stand out are left unexplained, and make half of the map's variance beyond its
+    noise, the others may be alike: quartiles know of the many.
+    """
+    if kind not in PATTERNS or all(m.statistic != "outlying_pixels" for m in state.mismatches):
+        return None
+    images = state.setting.seen.images
+    plain, most = 0.0, 0.0
+    for channel in sorted({channel for channel, _ in images}):
+        own = [images[channel, name] for name in _MAPS[kind] if (channel, name) in images]
+        if not own:
+            continue
+        image, noise = own[0]
+        low, high = np.percentile(image, [25, 75])
+        plain += float(image.var()) / noise**2 - 1
+        most += variance_of_quartiles(float(low), float(high)) / noise**2 - 1
+    if plain <= 0 or most >= _MOST * plain:
+        return None
+    return Denial(most / plain, "few pixels that stand far out make most of what it would explain")

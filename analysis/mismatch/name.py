@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from analysis.mismatch.candidates import CANDIDATES, Proposal
 from analysis.mismatch.contradicted import contradicted, refuted
-from analysis.mismatch.feigned import PATTERNS, feigned, heated, stepped
+from analysis.mismatch.feigned import PATTERNS, feigned, heated, outlying, stepped
 from analysis.mismatch.instance import LINES, Frequency, frequency_of, instance, same_line
 from analysis.mismatch.observe import Frames
 from analysis.mismatch.phase import aliases, keeps_phase, strongest
@@ -340,6 +340,7 @@ class Search:
         denial = contradicted(state, predictor, named.kind, without)
         if denial is None and named.kind in PATTERNS:
             denial = feigned(state, named.kind, predictor.mean(without))
+            denial = denial or outlying(state, named.kind)
         if denial is None and named.proposal is not None:
             denial = (
                 uneven(state, named.proposal.effect)

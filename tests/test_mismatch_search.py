@@ -103,6 +103,34 @@ def test_lines_of_different_frequencies_are_no_rivals() -> None:
     assert ties(STATE, best, line("bistable_pattern", 14.5, 0.25))
 
 
+def test_a_tie_lasts_though_its_rivals_kind_is_named_for_something_else(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Amplifiers of the two halves say nothing of those of even and odd rows."""
+    offered = [_ranked("crosstalk", 9.0, 0, 1), _ranked("spatial_filtering", 8.5, 0, 1)]
+
+    def ranked(*of: Any) -> list[Any]:
+        state, kinds, apart = of[0], of[1], of[5]
+        return [
+            one
+            for one in offered
+            if one.kind in kinds and not any(alike(state, one.polished.mean, a) for a in apart)
+        ]
+
+    monkeypatch.setattr(name, "ranked", ranked)
+    monkeypatch.setattr(name, "refuted", lambda *_: None)
+    monkeypatch.setattr(name, "replicates_for", lambda *_: 2)
+    search = _search()
+    assert search._decided(STATE) == []
+    search.named.append(Named("spatial_filtering", None, {}, 5.0, ()))
+    assert search._decided(STATE) == []
+    assert {one.kind for one in search.ties[0]} == {"crosstalk", "spatial_filtering"}
+    # A rival that was refused is none.
+    search.named.clear()
+    search.refused["spatial_filtering"] = "denied"
+    assert [one.kind for one in search._decided(STATE)] == ["crosstalk"]
+
+
 def test_a_rival_that_gains_less_than_is_asked_ties_as_well() -> None:
     best = _ranked("row_noise", 2.1, 0, 1)
     assert ties(STATE, best, _ranked("pink_noise", 1.1, 0, 1))

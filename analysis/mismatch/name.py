@@ -17,7 +17,7 @@ from analysis.mismatch.predict import Predictor
 from analysis.mismatch.rank import Memory, Ranked, ranked, replicates_for, ties
 from analysis.mismatch.recalibrate import calibrate
 from analysis.mismatch.resolved import resolved
-from analysis.mismatch.segments import second_path
+from analysis.mismatch.segments import bent, second_path
 from analysis.mismatch.state import Setting, State
 from analysis.mismatch.uncertainty import settled
 from analysis.mismatch.uneven import uneven
@@ -81,6 +81,7 @@ class Search:
     named: list[Named] = field(default_factory=list)
     refused: dict[str, str] = field(default_factory=dict)
     ties: list[tuple[Ranked, Ranked]] = field(default_factory=list)
+    tied: dict[str, Ranked] = field(default_factory=dict)
     doubted: dict[str, str] = field(default_factory=dict)
     settled: list[tuple[str, Frequency]] = field(default_factory=list)
     frames_of: Frames | None = None
@@ -162,7 +163,7 @@ class Search:
         predictor = final.predictor() if self.named else None
         for named in self.named:
             if named.proposal is None or predictor is None:
-                change = _bent(base, final)
+                change = bent(base, final)
             else:
                 change = final.null.mean - predictor.mean(self.without(final, named))
             known = null.known & np.isfinite(change)
@@ -228,9 +229,20 @@ class Search:
             if not fitted or fitted[0].gain < LEAST_GAIN:
                 return fitted
             rival = next((one for one in fitted[1:] if ties(state, fitted[0], one)), None)
+            rival = rival or self._named_otherwise(fitted[0])
             if rival is None:
                 return fitted
             self.ties.append((fitted[0], rival))
+            self.tied |= {fitted[0].kind: rival, rival.kind: fitted[0]}
+
+    def _named_otherwise(self, best: Ranked) -> Ranked | None:
+        """Return the rival that tied before, if it only is no rival since its kind was named.
+
+        Amplifiers of the two halves say nothing of those of even and odd rows.
+        """
+        rival = self.tied.get(best.kind)
+        named = {n.kind for n in self.named}
+        return rival if rival is not None and rival.kind in named - LINES else None
 
     def _undoubted(self, state: State, fitted: list[Ranked]) -> list[Ranked]:
         """Leave out the best as long as a statistic which calls for it denies it, for this round.
@@ -365,12 +377,6 @@ class Search:
         if share < _RESOLVED:
             return share, f"it would explain {max(share, 0):.0%} of what it changes"
         return None
-
-
-def _bent(base: State, final: State) -> Array:
-    """Return what a second read-out path changes: the residuals of the variances."""
-    own = np.array([key.statistic == "pixel_variance" for key in base.vector.keys])
-    return np.where(own, base.vector.values - final.vector.values, 0.0)
 
 
 def _renewed(named: Named, proposal: Proposal, effect: Effect, errors: dict[str, float]) -> Named:

@@ -5,6 +5,7 @@ from itertools import pairwise
 from math import sqrt
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.mismatch.basefit import fit_base
 from analysis.mismatch.recalibrate import with_numbers
@@ -84,3 +85,9 @@ def _path(state: State, low: float, high: float) -> Path | None:
 
 def _loglik(z: np.ndarray) -> float:
     return float(-((_NU + 1) / 2 * np.log1p(z**2 / _NU)).sum())
+
+
+def bent(base: State, final: State) -> NDArray[np.float64]:
+    """Return what a second read-out path changes: the residuals of the variances."""
+    own = np.array([key.statistic == "pixel_variance" for key in base.vector.keys])
+    return np.where(own, base.vector.values - final.vector.values, 0.0)

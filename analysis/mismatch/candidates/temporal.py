@@ -70,7 +70,11 @@ def _pink(clues: Clues) -> Sequence[Proposal]:
     variance, _ = clues.amplitude("row_variance", alike)
     frame, _ = clues.amplitude("frame_variance", alike)
     guess = max(variance * 4, frame * 8, 0.0)
-    return proposals("pink_noise", ["sigma_dn"], sigma_dn=sqrt(guess)) if guess > 0 else []
+    if guess <= 0:
+        return []
+    # Rows hold a quarter of it where they are long, more where they are few.
+    starts = (sqrt(guess), sqrt(guess / 3))
+    return [one for s in starts for one in proposals("pink_noise", ["sigma_dn"], sigma_dn=s)]
 
 
 def _patterns(kind: str) -> Candidate:

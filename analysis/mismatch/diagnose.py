@@ -98,7 +98,7 @@ def find_mismatch(
     if large:  # simulations of large recordings tell more, and cost more
         search.setting = replace(setting, nulls=setting.drafts)
         final = _undenied(search, final)  # all frames may deny what some showed
-    final, gains = _proven(search, search.settle(final), trial)
+    final, gains = _proven(search, search.settle(final), trial, judged=large)
     proof = trial.proof(search.base, final, step, source)
     evidence = evidence_of(search.base, final, album, split)
     if not large:
@@ -143,10 +143,15 @@ def _undenied(search: Search, final: State) -> State:
     return final
 
 
-def _proven(search: Search, final: State, trial: Trial) -> tuple[State, dict[str, Gain]]:
-    """Drop, one by one, effects that are denied, or whose gain is within its uncertainty."""
+def _proven(
+    search: Search, final: State, trial: Trial, *, judged: bool
+) -> tuple[State, dict[str, Gain]]:
+    """Drop, one by one, effects that are denied, or whose gain is within its uncertainty.
+
+    `judged`: all frames were asked already which are denied.
+    """
     while True:
-        final = _undenied(search, final)
+        final = final if judged else _undenied(search, final)
         without = {named.name: search.fitted_without(final, named) for named in search.named}
         gained = trial.gains(final, without)
         weak = [named for named in search.named if not gained[named.name].certain]

@@ -16,7 +16,7 @@ import scipy.stats
 from numpy.typing import NDArray
 
 from analysis.mismatch.candidates import Proposal
-from analysis.mismatch.polish import Free, moved, precisions, shifted, with_effects
+from analysis.mismatch.polish import Free, largest, moved, precisions, shifted, with_effects
 from analysis.mismatch.predict import Predictor
 from analysis.mismatch.state import State
 from dsis.camera import Camera
@@ -66,7 +66,8 @@ def settled(
     reach = float(scipy.stats.t.ppf(0.975, count - 1)) * np.sqrt(np.diag(sandwich))
     corrected = effects
     for (i, name, signed), delta in zip(free, step, strict=True):
-        limited = float(delta if signed else np.clip(delta, -_LARGEST, _LARGEST))
+        most = min(_LARGEST, largest(corrected, i, name))
+        limited = float(delta if signed else np.clip(delta, -most, most))
         changed = moved(corrected, i, name, signed, limited, as_is=True)
         corrected = corrected if changed is None else changed[0]
     # Where a parameter acts by a threshold the step is no guide: it must not make things worse.

@@ -140,6 +140,17 @@ class Clues:
         ]
         return float(np.mean(picked)) if picked else 0.0
 
+    def value(self, statistic: str, scope: str, detail: str) -> float:
+        """Return the mean of a number over channels, in its unit; 0 where it is unknown."""
+        picked = [
+            float(value)
+            for key, value, known in zip(
+                self.vector.keys, self.vector.values, self.null.known, strict=True
+            )
+            if known and (key.statistic, key.scope, key.detail) == (statistic, scope, detail)
+        ]
+        return float(np.mean(picked)) if picked else 0.0
+
     def image(self, name: str) -> Mapping[str, tuple[Array, float]]:
         """Return a map by channel, with its noise."""
         return {c: found for (c, kind), found in self.seen.images.items() if kind == name}

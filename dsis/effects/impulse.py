@@ -27,7 +27,7 @@ class Impulse(Effect):
         "14, 2002"
     )
     measures: ClassVar[frozenset[str]] = frozenset(
-        {"level", "pixel_variance", "skewness", "kurtosis", "variance_spread", "code_imbalance"}
+        {"level", "pixel_variance", "skewness", "kurtosis", "variance_spread"}
     )
     confounders: ClassVar[str] = (
         "rts and hot_pixels come back at the same pixels; heavy_tailed_read_noise is symmetric."

@@ -8,6 +8,7 @@ from analysis.mismatch.candidates.candidate import Candidate, Proposal, proposal
 from analysis.mismatch.clues import Clues, alike
 from analysis.mismatch.instance import Frequency, same_line
 
+_ALTERNATING = {"checkerboard": (0.5, 0.5), "rows": (0.0, 0.5), "columns": (0.5, 0.0)}
 _LEAST_POWER = 1.2  # of a line worth a trial, white noise at 1
 
 
@@ -116,6 +117,12 @@ def frequencies(clues: Clues, kind: str) -> list[tuple[float, float, float]]:
         frame, _ = clues.amplitude("frame_variance", alike)
         stripes = ((0.5, 0.0), (0.0, 0.5), (0.5, 0.5)) if frame > 0 else ()
         found += [(*own, 2 * sqrt(frame)) for own in stripes if not _settled(clues, kind, own, 1)]
+    else:
+        n, m = clues.shape("MONO")
+        for name, own in _ALTERNATING.items():
+            ratio = clues.value("alternation_variance", "all", name) ** 3
+            if ratio > _LEAST_POWER and not _settled(clues, kind, own, 1):
+                found.append((*own, 2 * sqrt((ratio - 1) * v / (n * m))))
     return found
 
 

@@ -16,6 +16,8 @@ from analysis.mismatch.state import State
 Array = NDArray[np.float64]
 NOISY = "variance"
 UNITS = {"offset": "DN", "gain": "%", "time": "DN/s", NOISY: "variance over its mean"}
+# What no single exposure shows by itself: channels together may be clear, where each is not.
+_MAPS_ALONE = ("fixed_smooth_tilt", "fixed_smooth_falloff", "half_seam", "parity")
 KINDS = (*MAPS, *(f"{name} alone" for name in ALONE))
 
 
@@ -32,7 +34,11 @@ def shown_in(states: Sequence[State], threshold_z: float) -> dict[str, Shown]:
             best = own.get(key.statistic)
             if key.statistic in wanted and key.scope in KINDS and z > (best.z if best else 0):
                 own[key.statistic] = Shown(map_name(key.scope), _axis(key), float(z))
-        found |= {name: shown for name, shown in own.items() if shown.z > threshold_z}
+        found |= {
+            name: shown
+            for name, shown in own.items()
+            if shown.z > threshold_z or name.startswith(_MAPS_ALONE)
+        }
     return found
 
 

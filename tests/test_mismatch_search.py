@@ -1,5 +1,6 @@
 """The search: what ties is not claimed, nor what is worse; few simulations mislead."""
 
+from collections.abc import Collection
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -49,6 +50,27 @@ def _search(**values: Any) -> Search:
     return Search(**{**bare, **values})
 
 
+def _offering(
+    monkeypatch: pytest.MonkeyPatch, offered: list[Any], denied: Collection[str] = ()
+) -> None:
+    """Let a search be offered these effects, some of them denied by a statistic."""
+
+    def ranked(*of: Any) -> list[Any]:
+        state, kinds, apart = of[0], of[1], of[5]
+        return [
+            one
+            for one in offered
+            if one.kind in kinds and not any(alike(state, one.polished.mean, a) for a in apart)
+        ]
+
+    def refuted(*of: Any) -> Denial | None:
+        return Denial(0.0, "it shows 0% of it") if of[2] in denied else None
+
+    monkeypatch.setattr(name, "ranked", ranked)
+    monkeypatch.setattr(name, "refuted", refuted)
+    monkeypatch.setattr(name, "replicates_for", lambda *_: 2)
+
+
 def test_predictions_of_the_same_numbers_are_alike() -> None:
     one, same, other = (_ranked("", 1, *which).polished.mean for which in ((0, 1), (1, 0), (2, 3)))
     assert alike(STATE, one, 0.3 * same)
@@ -66,17 +88,7 @@ def test_nothing_worse_is_claimed_where_two_tie(monkeypatch: pytest.MonkeyPatch)
         _ranked("row_noise", 5.0, 8, 9),
     ]
 
-    def ranked(*of: Any) -> list[Any]:
-        state, kinds, apart = of[0], of[1], of[5]
-        return [
-            one
-            for one in offered
-            if one.kind in kinds and not any(alike(state, one.polished.mean, a) for a in apart)
-        ]
-
-    monkeypatch.setattr(name, "ranked", ranked)
-    monkeypatch.setattr(name, "refuted", lambda *_: None)
-    monkeypatch.setattr(name, "replicates_for", lambda *_: 2)
+    _offering(monkeypatch, offered)
     search = _search()
     assert [one.kind for one in search._decided(STATE)] == ["adc_dnl", "row_noise"]
     assert [{one.kind for one in pair} for pair in search.ties] == [
@@ -110,17 +122,7 @@ def test_a_tie_lasts_though_its_rivals_kind_is_named_for_something_else(
     """Amplifiers of the two halves say nothing of those of even and odd rows."""
     offered = [_ranked("crosstalk", 9.0, 0, 1), _ranked("spatial_filtering", 8.5, 0, 1)]
 
-    def ranked(*of: Any) -> list[Any]:
-        state, kinds, apart = of[0], of[1], of[5]
-        return [
-            one
-            for one in offered
-            if one.kind in kinds and not any(alike(state, one.polished.mean, a) for a in apart)
-        ]
-
-    monkeypatch.setattr(name, "ranked", ranked)
-    monkeypatch.setattr(name, "refuted", lambda *_: None)
-    monkeypatch.setattr(name, "replicates_for", lambda *_: 2)
+    _offering(monkeypatch, offered)
     search = _search()
     assert search._decided(STATE) == []
     search.named.append(Named("spatial_filtering", None, {}, 5.0, ()))
@@ -144,15 +146,7 @@ def test_what_a_statistic_denies_waits_until_more_is_named(
     offered = [_ranked("readout_memory", 9.0, 0), _ranked("crosstalk", 7.0, 1, 2)]
     denied = {"readout_memory"}
 
-    def ranked(*of: Any) -> list[Any]:
-        return [one for one in offered if one.kind in of[1]]
-
-    def refuted(*of: Any) -> Denial | None:
-        return Denial(0.0, "it shows 0% of it") if of[2] in denied else None
-
-    monkeypatch.setattr(name, "ranked", ranked)
-    monkeypatch.setattr(name, "refuted", refuted)
-    monkeypatch.setattr(name, "replicates_for", lambda *_: 2)
+    _offering(monkeypatch, offered, denied)
     search = _search()
     assert [one.kind for one in search._decided(STATE)] == ["crosstalk"]
     assert search.doubted == {"readout_memory": "it shows 0% of it"}

@@ -129,25 +129,23 @@ class Clues:
 
     def number(self, statistic: str, scope: str, detail: str = "", channel: str = "") -> float:
         """Return the mean departure (value less the model's mean) over channels, in its unit."""
+        return self._mean_of(self.vector.values - self.null.mean, statistic, scope, detail, channel)
+
+    def value(self, statistic: str, scope: str, detail: str) -> float:
+        """Return the mean of a number over channels, in its unit; 0 where it is unknown."""
+        return self._mean_of(self.vector.values, statistic, scope, detail, "")
+
+    def _mean_of(
+        self, values: Array, statistic: str, scope: str, detail: str, channel: str
+    ) -> float:
         picked = [
-            float(self.vector.values[i] - self.null.mean[i])
+            float(values[i])
             for i, key in enumerate(self.vector.keys)
             if key.statistic == statistic
             and key.scope == scope
             and key.detail == detail
             and channel in ("", key.channel)
             and self.null.known[i]
-        ]
-        return float(np.mean(picked)) if picked else 0.0
-
-    def value(self, statistic: str, scope: str, detail: str) -> float:
-        """Return the mean of a number over channels, in its unit; 0 where it is unknown."""
-        picked = [
-            float(value)
-            for key, value, known in zip(
-                self.vector.keys, self.vector.values, self.null.known, strict=True
-            )
-            if known and (key.statistic, key.scope, key.detail) == (statistic, scope, detail)
         ]
         return float(np.mean(picked)) if picked else 0.0
 

@@ -6,15 +6,31 @@ from numpy.typing import NDArray
 from analysis.mismatch.bank.seams import SMOOTH_DEGREE, beyond_smooth, seam_shapes
 from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.state import State
+from analysis.mismatch.uneven import uneven
+from dsis.effects import Effect
 from dsis.measures.spikes import variance_of_quartiles
 
 Array = NDArray[np.float64]
 _MAPS = {"dsnu": ("offset", "offset alone"), "prnu": ("gain", "gain alone")}
-PATTERNS = frozenset(_MAPS)
 _AXES = {"row_fpn": "rows", "column_fpn": "columns"}
 _CLEAR = 5.0  # standard errors of what stands out with exposure time
 _SHAPES = 2  # a step and a comb
 _MOST = 0.5  # of a pattern's variance, that something else may feign
+
+
+def of_another(state: State, effect: Effect, without: Array) -> Denial | None:
+    """Return how an effect is denied by something unexplained that looks like it; None: it is not.
+
+    `without` are the numbers predicted without the effect.
+    """
+    kind = effect.kind
+    return (
+        feigned(state, kind, without)
+        or outlying(state, kind)
+        or stepped(state, kind)
+        or heated(state, kind)
+        or uneven(state, effect)
+    )
 
 
 def feigned(state: State, kind: str, without: Array) -> Denial | None:
@@ -33,7 +49,7 @@ def feigned(state: State, kind: str, without: Array) -> Denial | None:
     without
         The numbers predicted without it.
     """
-    if kind not in PATTERNS or all(m.statistic != "frame_correlation" for m in state.mismatches):
+    if kind not in _MAPS or all(m.statistic != "frame_correlation" for m in state.mismatches):
         return None
     numbers = {e.name: e.numbers for e in state.setting.layout.exposures}
     left = {
@@ -113,7 +129,7 @@ def outlying(state: State, kind: str) -> Denial | None:
     Where pixels that stand out are left unexplained, and make half of the map's variance beyond its
     noise, the others may be alike: quartiles know of the many.
     """
-    if kind not in PATTERNS or all(m.statistic != "outlying_pixels" for m in state.mismatches):
+    if kind not in _MAPS or all(m.statistic != "outlying_pixels" for m in state.mismatches):
         return None
     images = state.setting.seen.images
     plain, most = 0.0, 0.0

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from analysis.mismatch.candidates import CANDIDATES, Proposal
 from analysis.mismatch.contradicted import contradicted, refuted
-from analysis.mismatch.feigned import PATTERNS, feigned, heated, outlying, stepped
+from analysis.mismatch.feigned import of_another
 from analysis.mismatch.instance import LINES, Frequency, frequency_of, instance, same_line
 from analysis.mismatch.observe import Frames
 from analysis.mismatch.phase import aliases, keeps_phase, strongest
@@ -20,7 +20,6 @@ from analysis.mismatch.resolved import resolved
 from analysis.mismatch.segments import bent, second_path
 from analysis.mismatch.state import Setting, State
 from analysis.mismatch.uncertainty import settled
-from analysis.mismatch.uneven import uneven
 from dsis.camera import Camera
 from dsis.effects import Effect
 
@@ -350,15 +349,8 @@ class Search:
     def _denial(self, state: State, predictor: Predictor, named: Named) -> tuple[float, str] | None:
         without = self.without(state, named)
         denial = contradicted(state, predictor, named.kind, without)
-        if denial is None and named.kind in PATTERNS:
-            denial = feigned(state, named.kind, predictor.mean(without))
-            denial = denial or outlying(state, named.kind)
         if denial is None and named.proposal is not None:
-            denial = (
-                uneven(state, named.proposal.effect)
-                or stepped(state, named.kind)
-                or heated(state, named.kind)
-            )
+            denial = of_another(state, named.proposal.effect, predictor.mean(without))
         return None if denial is None else (denial.share, denial.why)
 
     def _needless(

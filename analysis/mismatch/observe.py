@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from analysis.mismatch.bank.bands import Bands
 from analysis.mismatch.bank.bulk import Bulk
+from analysis.mismatch.bank.carryover import AXES, CarryOver, CarryOverSums, Samples
 from analysis.mismatch.bank.coherent import Peak, SpectrumSums
 from analysis.mismatch.bank.common import common
 from analysis.mismatch.bank.local import local_scalars, variances, widened
@@ -87,6 +88,8 @@ class Observation:
         What the channels of a mosaic have in common, by exposure.
     local
         The same as `levels` of scenes: by exposure and channel, and in bins of signal.
+    carried
+        Kept on demand: samples and those read before, by axis, of each exposure.
     """
 
     levels: Mapping[Place, Level]
@@ -97,6 +100,7 @@ class Observation:
     images: Mapping[tuple[str, str], tuple[Array, float]] = field(default_factory=dict)
     common: Mapping[str, Mapping[str, Number]] = field(default_factory=dict)
     local: Mapping[Place, Level] = field(default_factory=dict)
+    carried: Mapping[str, tuple[Samples, ...]] = field(default_factory=dict)
 
     def level(self, place: Place) -> Level | None:
         """Return mean and variance at a place, of a scene or not; None: it is none."""
@@ -156,13 +160,19 @@ def observe(
     sums: dict[str, _Channel] = {}
     shared: dict[str, Mapping[str, Number]] = {}
     bands = Bands(layout.rows, layout.sites)
+    carried: dict[str, list[Samples]] = {axis: [] for axis in AXES}
+    memory = CarryOverSums()
     for exposure in layout.uniform:
-        many = Bulk.of(layout, exposure.name)
-        measured = measure(layout, many.watching(frames_of(exposure.name)))
+        many, after = Bulk.of(layout, exposure.name), CarryOver(keep=keep)
+        measured = measure(layout, after.watching(many.watching(frames_of(exposure.name))))
         if watch is not None:
             watch(exposure.name, measured)
         frames = len(exposure.numbers)
         still = {name for name in measured.channels if (exposure.name, name) in layout.still}
+        if not still:
+            memory.add(after)
+            for axis, own in carried.items():
+                own += [one] if (one := after.samples(axis)) is not None else []
         if len(measured.channels) > 1 and not still:
             signals = {name: layout.signal_dn[exposure.name, name] for name in measured.channels}
             shared[exposure.name] = common(measured.channels, signals, frames, layout.sites)
@@ -201,6 +211,9 @@ def observe(
     if len(layout.sites) > 1:
         found_peaks |= {("", kind): peak for kind, peak in bands.peaks().items()}
         found_pooled.setdefault("", {}).update(bands.numbers())
+    found_pooled.setdefault("" if len(layout.sites) > 1 else layout.channels[0], {}).update(
+        memory.numbers()
+    )
     return Observation(
         levels,
         found,
@@ -210,6 +223,7 @@ def observe(
         images if keep else {},
         shared,
         local,
+        {axis: tuple(own) for axis, own in carried.items()},
     )
 
 

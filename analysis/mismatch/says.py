@@ -24,6 +24,7 @@ _WORDS = {
     "correlation_1_1": "the noise of diagonal neighbours is correlated",
     "correlation_0_2": "the noise two pixels apart along a row is correlated",
     "correlation_2_0": "the noise two pixels apart along a column is correlated",
+    "carry_over": "a sample follows the code of the one read before it, in periods",
     "line_correlation": "the noise is correlated over some distance along a line",
     "alternation_variance": "the noise alternates from pixel to pixel, or from line to line",
     "spectral_peak": "the noise has a periodic component",

@@ -28,6 +28,7 @@ _FOLLOWS = {
     "noisy_pixels": frozenset({"variance_spread"}),
     "outlying_pixels": frozenset({"fixed_pixel_variance"}),
     "line_correlation": _CORRELATIONS | _LINES,
+    "carry_over": _CORRELATIONS,
     "alternation_variance": frozenset({"spectral_peak"}) | _LINES | _CORRELATIONS,
     "column_spectrum_peak": frozenset({"column_variance"}),
     "row_spectrum_peak": frozenset({"row_spectrum_peak", "row_variance"}),

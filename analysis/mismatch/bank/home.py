@@ -21,7 +21,7 @@ READ_NOISE = "of read noise"
 PERSISTENT = "of read noise, in all exposures"
 LAG = 0.1  # share of one of many lags along a line, in that of another sum
 _TWO_SIDED = frozenset({"pixel_variance", "channel_ratio", "half_seam", "parity",
-                        "line_correlation", "fixed_smooth_tilt",
+                        "line_correlation", "carry_over", "fixed_smooth_tilt",
                         "fixed_smooth_falloff"})  # fmt: skip
 # Sums over exposures: statistic, how what it shows grows with the signal.
 SHAPED: Mapping[str, tuple[str, ...]] = {
@@ -88,6 +88,8 @@ def homes(keys: Sequence[Key], channels: Sequence[str]) -> list[float]:
         weight = float(own in wanted)
         if key.statistic == "line_correlation" and mosaic == (key.channel == ""):
             weight = LAG * (key.scope == summed)
+        if key.statistic == "carry_over":
+            weight = LAG
         if key.statistic == "pixel_variance" and key.detail.startswith(ABOVE):
             weight = 1.0
         found.append(weight)

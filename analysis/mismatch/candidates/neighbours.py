@@ -4,10 +4,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from analysis.mismatch.bank.carryover import PERIODS, sawtooth
 from analysis.mismatch.candidates.candidate import Candidate, Proposal, proposals
 from analysis.mismatch.clues import Clues, alike
 
 _ALONG_ROWS, _ALONG_COLUMNS = "correlation_0_1", "correlation_1_0"
+_RESIDUES = 3  # that are tried: of few levels, periods are much alike
 _NEAR = (_ALONG_ROWS, _ALONG_COLUMNS, "line_correlation", "pixel_variance")
 
 
@@ -72,6 +74,27 @@ def _memory(clues: Clues) -> Sequence[Proposal]:
     return found
 
 
+def _converter(clues: Clues) -> Sequence[Proposal]:
+    """Propose the residues, of either direction, that explain most of what samples carry over."""
+    sawteeth = [
+        (axis, sawtooth(own, period))
+        for axis, own in clues.seen.carried.items()
+        for period in PERIODS
+    ]
+    found: list[Proposal] = []
+    for axis, own in sorted(sawteeth, key=lambda one: -one[1].chi2)[:_RESIDUES]:
+        found += proposals(
+            "adc_memory",
+            ["step_dn", "at_code"],
+            ["step_dn", "at_code"],
+            step_dn=own.step_dn,
+            period_codes=own.period,
+            at_code=own.at_code,
+            along=axis,
+        )
+    return found
+
+
 def _lag(clues: Clues) -> Sequence[Proposal]:
     rho, _ = clues.amplitude("frame_correlation", clues.shot_share)
     if rho <= 0:
@@ -94,5 +117,6 @@ CANDIDATES = (
          "correlation_2_0"),
         _memory,
     ),
+    Candidate("adc_memory", ("carry_over",), _converter),
     Candidate("image_lag", ("frame_correlation",), _lag),
 )  # fmt: skip

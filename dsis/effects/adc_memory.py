@@ -1,0 +1,80 @@
+"""Memory of the converter: a conversion carries over the residue of the one before."""
+
+from collections.abc import Mapping
+from typing import Annotated, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field
+
+from dsis.compiled import kernel
+from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, Stage
+
+
+class AdcMemory(Effect):
+    """A conversion carries over some of the residue that the one before left in the converter.
+
+    v'(i) = v(i) + d (frac((v(i - 1) + black - c) / P) - 1/2). Converters of several steps (pipeline,
+    sub-ranging) take a coarse decision off the sample and amplify the residue, which rises over P
+    codes and falls back by one step at c + n P; capacitors shared between samples, or not reset,
+    keep a part of it. d is what the step makes of the next sample of the line, in DN: the
+    correlation with it is negative where the noise straddles a step (d > 0) and slightly positive
+    between. The first samples of a line have nothing before them.
+    """
+
+    kind: Literal["adc_memory"] = "adc_memory"
+    step_dn: Annotated[float, Field(gt=-100, lt=100, examples=[0.4])]
+    period_codes: Annotated[int, Field(ge=4, le=32768, examples=[128])]
+    at_code: Annotated[float, Field(examples=[12.0])]
+    along: Literal["rows", "columns"] = "rows"
+
+    stage: ClassVar[Stage] = Stage.READ_OUT
+    rank: ClassVar[int] = 90  # what the converter is given
+    reference: ClassVar[str] = (
+        "Chiu, Gray & Nikolic, A 14-b 12-MS/s CMOS pipeline ADC with over 100-dB SFDR, IEEE J. "
+        "Solid-State Circuits 39, 2004 (memory of shared capacitors); IEEE Std 1241-2010"
+    )
+    measures: ClassVar[frozenset[str]] = frozenset(
+        {
+            "level",
+            "pixel_variance",
+            "row_variance",
+            "column_variance",
+            "frame_variance",
+            "correlation_0_1",
+            "correlation_1_0",
+            "spectral_peak",
+            "row_spectrum_peak",
+        }
+    )
+    confounders: ClassVar[str] = (
+        "readout_memory correlates neighbours alike at all signals; here the sign and size of the "
+        "correlation follow the codes."
+    )
+
+    def apply(self, image: Image, exposure: Exposure) -> Image:
+        """Add the residue of the sample before."""
+        made = image.copy()
+        first = np.float32(exposure.read_out.black_level_dn - self.at_code)
+        one, other = (image, made) if self.along == "rows" else (image.T, made.T)
+        _carry(one, first, np.float32(self.period_codes), np.float32(self.step_dn), other)
+        return made
+
+    def reach_pixels(self) -> int:
+        """Return how far away a pixel may matter."""
+        return 1
+
+    def contributions(self, point: OperatingPoint) -> Mapping[str, float]:
+        """Return nothing: it depends on where the codes of the steps lie to the black level."""
+        del point
+        return {}
+
+
+@kernel
+def _carry(
+    image: Image, first: np.float32, period: np.float32, step: np.float32, out: Image
+) -> None:
+    rows, columns = image.shape
+    for y in range(rows):
+        for x in range(1, columns):
+            phase = (image[y, x - 1] + first) / period
+            out[y, x] = image[y, x] + step * (phase - np.floor(phase) - np.float32(0.5))

@@ -9,7 +9,7 @@ import pytest
 from dsis.cfa import Cfa
 from dsis.draw import Draw
 from dsis.grid import PixelGrid
-from exposing import SIDE, Z_MAX, apply, camera, effect, recorded, white
+from exposing import BLACK_DN, SIDE, Z_MAX, apply, camera, effect, recorded, white
 
 SAME_NOISE = (
     0.03  # of a change seen in one and the same noise: 2^18 pixels, correlation's own error
@@ -122,3 +122,42 @@ def test_readout_memory_remembers_a_shifted_mean() -> None:
     rest = stack[:, :, 2:]
     assert abs(rest.mean() - 890) < Z_MAX * 2.1 * 1.1 / np.sqrt(rest.size)
     assert abs(stack[:, :, :2].mean() - 900) < Z_MAX * 2.1 / np.sqrt(stack[:, :, :2].size)
+
+
+def _of_a_sawtooth(mean: float, sd: float, period: float, at: float) -> tuple[float, float, float]:
+    """Return mean, mean square and mean slope of frac((c - at) / period) - 1/2 of normal codes c.
+
+    From its Fourier series; a wave of a normal variate shrinks by exp(-variance / 2).
+    """
+    k = np.arange(1, 20000)
+    angle = 2 * np.pi * k * (mean - at) / period
+    fade = np.exp(-2 * (np.pi * k * sd / period) ** 2)
+    first = -(np.sin(angle) * fade / (np.pi * k)).sum()
+    # Its square is a parabola: 1/12 + sum of cos(k t) / (pi k)^2.
+    second = 1 / 12 + (np.cos(angle) * fade / (np.pi * k) ** 2).sum()
+    return first, second, -(2 / period * np.cos(angle) * fade).sum()
+
+
+@pytest.mark.parametrize(("along", "lag"), [("rows", (0, 1)), ("columns", (1, 0))])
+@pytest.mark.parametrize(("mean", "at"), [(30.0, 86.0), (30.0, 100.0), (158.0, 70.0), (47.0, 3.0)])
+@pytest.mark.parametrize("step", [2.0, -2.0])
+def test_a_converter_carries_its_residue_over(
+    along: str, lag: tuple[int, int], mean: float, at: float, step: float
+) -> None:
+    """Means, variances and covariances (Stein's lemma) of a sawtooth of normal codes."""
+    sd, period = 9.0, 64
+    one = effect("adc_memory", step_dn=step, period_codes=period, at_code=at, along=along)
+    before = white(sd, 1024, mean)
+    made = apply(one, before)
+    first, second, slope = _of_a_sawtooth(before.mean() + BLACK_DN, before.std(), period, at)
+    carried = made - before
+    n = before.size
+    assert abs(carried.mean() - step * first) < Z_MAX * abs(step) / np.sqrt(n)
+    assert abs(carried.var() - step**2 * (second - first**2)) < Z_MAX * step**2 / np.sqrt(n)
+    shifted = carried[lag[0] :, lag[1] :]
+    own = before[: before.shape[0] - lag[0], : before.shape[1] - lag[1]]
+    covariance = float(((own - own.mean()) * shifted).mean())
+    assert abs(covariance - step * sd**2 * slope) < Z_MAX * abs(step) * sd / np.sqrt(n)
+    for other in [(0, 1), (1, 0), (1, 1), (0, 2), (2, 0)]:
+        if other != lag:
+            assert abs(correlation(made, *other)) < Z_MAX * 1.5 / 1024

@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-Against = Literal["signal_dn", "light", "exposure_time_s", "lag_pixels"]
+Against = Literal["signal_dn", "light", "exposure_time_s", "lag_pixels", "code_before"]
 
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """A statistic of one channel over the exposures (or over lags).
+    """A statistic of one channel over the exposures (or over lags, or codes).
 
     Attributes
     ----------

@@ -49,6 +49,7 @@ STATISTICS: dict[str, tuple[str, ...]] = {
     "periodic_noise": ("spectral_peak", "spectrum", "peak"),
     "bistable_pattern": ("spectral_peak", "spectrum", "peak", "phase", "alternation"),
     "readout_memory": (*_CORRELATION, "lag"),
+    "adc_memory": ("carry_over", *_CORRELATION),
     "tap_mismatch": ("half_seam", "parity", "seam", "tap"),
     "channel_imbalance": ("channel_ratio", "green", "imbalance"),
     "impulse": ("one_off", "impulse", "outlier", "spike", "skew", "kurtosis"),

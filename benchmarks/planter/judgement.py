@@ -33,6 +33,7 @@ COMPARED: dict[str, tuple[str, ...]] = {
     "periodic_noise": ("amplitude_dn", "frequency"),
     "bistable_pattern": ("amplitude_dn", "frequency"),
     "readout_memory": ("fraction", "lag_pixels"),
+    "adc_memory": ("step_dn", "period_codes", "at_code"),
     "tap_mismatch": ("gain_percent",),
     "channel_imbalance": ("gain_percent",),
     "impulse": ("per_megapixel_frame",),
@@ -51,6 +52,7 @@ COMPARED: dict[str, tuple[str, ...]] = {
 }
 # Which side is called positive is a convention.
 UNSIGNED = frozenset({"tap_mismatch", "channel_imbalance", "nonlinearity"})
+CYCLIC = {"at_code": "period_codes"}
 EXACT = 1e-6  # relative: a number that is known without error
 OUTCOMES = ("right", "abstained", "misnamed", "missed", "crashed")
 
@@ -124,6 +126,9 @@ def _error(case: Case, kind: str, name: str, found: Mapping[str, Any]) -> float:
         truth = [min(max(value[0], low), high)]
     if kind in UNSIGNED:
         value, truth = [abs(v) for v in value], [abs(t) for t in truth]
+    if name in CYCLIC:  # the same in every period
+        period = (case.planted(kind) or {})[CYCLIC[name]]
+        value = [t + (v - t + period / 2) % period - period / 2 for v, t in zip(value, truth)]
     spread = spread * len(value) if len(spread) == 1 else spread or [0.0] * len(value)
     signs = (1, -1) if name == "frequency" else (1,)
     return min((_largest(value, [sign * t for t in truth], spread) for sign in signs), key=abs)

@@ -7,6 +7,8 @@ import numpy as np
 
 from planter.view import Image, Mechanism, View, normal
 
+COMPARATOR_DN = 0.3
+
 
 def dual_gain_mismatch(signal: Image, p: Mapping[str, Any], view: View) -> Image:
     """Misjudge the gain of the path that takes over above the switch."""
@@ -81,9 +83,36 @@ def readout_memory(signal: Image, p: Mapping[str, Any], view: View) -> Image:
     return out
 
 
+def residue(sample: Image, p: Mapping[str, Any], decided: Image | float = 0.0) -> Image:
+    """Return what a coarse decision leaves of a sample, -1/2 to 1/2 of its step.
+
+    `decided` is what the comparators add to it by themselves, DN.
+    """
+    period = p["period_codes"]
+    taken = np.floor((sample + decided - p["at_code"]) / period)
+    return (sample - p["at_code"]) / period - taken - 0.5
+
+
+def adc_memory(signal: Image, p: Mapping[str, Any], view: View) -> Image:
+    """Convert sample by sample: each has some of the residue that the one before has left.
+
+    What the one before had itself carried over is part of its residue; comparators are noisy. The
+    converter holds the end of a line until the next begins, of about the same level.
+    """
+    axis = 1 if p.get("along", "rows") == "rows" else 0
+    samples = np.moveaxis(signal + np.float32(view.case.black_level), axis, 0).copy()
+    decided = COMPARATOR_DN * normal(view.fresh("comparators"), samples.shape)
+    held = samples[-1].copy()
+    samples[0] += (p["step_dn"] * residue(held, p, decided[-1])).astype(np.float32)
+    for i in range(1, len(samples)):
+        before = residue(samples[i - 1], p, decided[i - 1])
+        samples[i] += (p["step_dn"] * before).astype(np.float32)
+    return np.moveaxis(samples, 0, axis) - np.float32(view.case.black_level)
+
+
 AMPLIFIERS: dict[str, Mechanism] = {
     "dual_gain_mismatch": dual_gain_mismatch,
     "tap_mismatch": tap_mismatch,
 }
 PIXELS: dict[str, Mechanism] = {"rts": rts}
-MEMORY: dict[str, Mechanism] = {"readout_memory": readout_memory}
+MEMORY: dict[str, Mechanism] = {"readout_memory": readout_memory, "adc_memory": adc_memory}

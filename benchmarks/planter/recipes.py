@@ -161,6 +161,19 @@ def _memory(rng: np.random.Generator, case: Case) -> dict[str, Any]:
     }
 
 
+def _residue(rng: np.random.Generator, case: Case) -> dict[str, Any]:
+    """Draw a period of which the noise of the brightest level covers a quarter or more."""
+    noise = np.sqrt(case.true_segments[-1].slope * top_dn(case))
+    periods = [p for p in (16, 32, 64, 128, 256) if p < 4 * noise] or [16]
+    period = int(rng.choice(periods))
+    return {
+        "period_codes": period,
+        "at_code": round(float(rng.uniform(0, period)), 2),
+        "along": str(rng.choice(["rows", "rows", "columns"])),
+        "_sign": int(rng.choice([-1, 1])),
+    }
+
+
 def _frequency(rng: np.random.Generator, case: Case) -> dict[str, Any]:
     del case
     u, w = rng.uniform(0.06, 0.44), rng.uniform(0.06, 0.44)
@@ -267,6 +280,13 @@ RECIPES: dict[str, Recipe] = {
     "pink_noise": Recipe(_none, _sigma(0.3)),
     "periodic_noise": Recipe(_frequency, _reads("amplitude_dn", 0.2)),
     "bistable_pattern": Recipe(_bistable, _reads("amplitude_dn", 0.2)),
+    "adc_memory": Recipe(
+        _residue,
+        lambda case, drawn, x: {"step_dn": 0.1 * read_dn(case) * x * drawn["_sign"]},
+        power=1,
+        most=30,
+        fits=_noisy,
+    ),
     "readout_memory": Recipe(_memory, _signed("fraction", 0.02), power=1, most=15),
     "tap_mismatch": Recipe(_taps, _signed("gain_percent", 0.2), power=1, most=50),
     "channel_imbalance": Recipe(

@@ -6,7 +6,6 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from dsis.compiled import kernel
 from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, Stage
 
 
@@ -18,13 +17,13 @@ class AdcMemory(Effect):
     codes and falls back by one step at c + n P; capacitors shared between samples, or not reset,
     keep a part of it. d is what the step makes of the next sample of the line, in DN: the
     correlation with it is negative where the noise straddles a step (d > 0) and slightly positive
-    between. The first samples of a line have nothing before them.
+    between. The first sample of a line has the last of it before it.
     """
 
     kind: Literal["adc_memory"] = "adc_memory"
     step_dn: Annotated[float, Field(gt=-100, lt=100, examples=[0.4])]
     period_codes: Annotated[int, Field(ge=4, le=32768, examples=[128])]
-    at_code: Annotated[float, Field(examples=[12.0])]
+    at_code: Annotated[float, Field(gt=-65536, lt=65536, examples=[12.0])]
     along: Literal["rows", "columns"] = "rows"
 
     stage: ClassVar[Stage] = Stage.READ_OUT
@@ -39,11 +38,9 @@ class AdcMemory(Effect):
             "pixel_variance",
             "row_variance",
             "column_variance",
-            "frame_variance",
             "correlation_0_1",
             "correlation_1_0",
             "spectral_peak",
-            "row_spectrum_peak",
         }
     )
     confounders: ClassVar[str] = (
@@ -53,11 +50,11 @@ class AdcMemory(Effect):
 
     def apply(self, image: Image, exposure: Exposure) -> Image:
         """Add the residue of the sample before."""
-        made = image.copy()
         first = np.float32(exposure.read_out.black_level_dn - self.at_code)
-        one, other = (image, made) if self.along == "rows" else (image.T, made.T)
-        _carry(one, first, np.float32(self.period_codes), np.float32(self.step_dn), other)
-        return made
+        before = np.roll(image, 1, axis=1 if self.along == "rows" else 0)
+        phase = (before + first) / np.float32(self.period_codes)
+        residue = phase - np.floor(phase) - np.float32(0.5)
+        return np.asarray(image + np.float32(self.step_dn) * residue)
 
     def reach_pixels(self) -> int:
         """Return how far away a pixel may matter."""
@@ -67,14 +64,3 @@ class AdcMemory(Effect):
         """Return nothing: it depends on where the codes of the steps lie to the black level."""
         del point
         return {}
-
-
-@kernel
-def _carry(
-    image: Image, first: np.float32, period: np.float32, step: np.float32, out: Image
-) -> None:
-    rows, columns = image.shape
-    for y in range(rows):
-        for x in range(1, columns):
-            phase = (image[y, x - 1] + first) / period
-            out[y, x] = image[y, x] + step * (phase - np.floor(phase) - np.float32(0.5))

@@ -8,7 +8,7 @@ through that code explains is taken off.
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
-from math import pi, sqrt
+from math import nan, pi, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,12 +26,12 @@ _FRAMES = 16  # of an exposure: a memory is the same in all
 _FOLDED = PERIODS[-1]
 _LEAST = 4.0  # times what means of lines take: what must be left of a wave, to say anything
 _KEPT = 2**13  # samples of a difference of frames that are kept one by one
-_PLACES = 32  # of a step in its period that are looked at
+_PLACES, _FINER = 32, 8  # of a step in its period that are looked at, and between two of them
 Array = NDArray[np.float64]
 Frame = NDArray[np.int32]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Samples:
     """Samples of one exposure, and what was read before each: a column each.
 
@@ -46,6 +46,8 @@ class Samples:
         Change of the sample before, DN.
     variance_dn2
         Of the change.
+    square_dn2
+        Sum of the squares of `before`.
     """
 
     one: Frame
@@ -53,6 +55,7 @@ class Samples:
     moved: Array
     before: Array
     variance_dn2: float
+    square_dn2: float
 
 
 @dataclass(frozen=True)
@@ -123,7 +126,7 @@ class CarryOver:
         if variance <= 0:
             return None
         codes = (part.astype(np.int32) & (_FOLDED - 1) for part in (one, other))
-        return Samples(*codes, rest / sqrt(variance), before, variance)
+        return Samples(*codes, rest / sqrt(variance), before, variance, square)
 
 
 class CarryOverSums:
@@ -173,23 +176,54 @@ class CarryOverSums:
         return found
 
 
-def sawtooth(samples: Sequence[Samples], period: int) -> Sawtooth:
-    """Return the sawtooth of a period that explains most, by least squares."""
-    best = Sawtooth(0.0, period, 0.0, 0.0)
-    for place in range(_PLACES):
-        at = period * place / _PLACES
-        phase = (np.arange(_FOLDED) - at) / period
-        residue = phase - np.floor(phase) - 0.5
-        top = bottom = 0.0
-        for own in samples:
-            apart = residue[own.one] - residue[own.other]
-            along = float(apart @ own.before) / float(own.before @ own.before)
-            apart -= along * own.before
-            top += float(apart @ own.moved) / sqrt(own.variance_dn2)
-            bottom += float(apart @ apart) / own.variance_dn2
-        if bottom > 0 and top**2 / bottom > best.chi2:
-            best = Sawtooth(top / bottom, period, at, top**2 / bottom)
+@cache
+def sawteeth(samples: tuple[Samples, ...]) -> tuple[Sawtooth, ...]:
+    """Return for each of `PERIODS` the sawtooth that explains most, by least squares."""
+    found = []
+    for period in PERIODS:
+        best, coarse = Sawtooth(0.0, period, 0.0, 0.0), period / _PLACES
+        for at in coarse * np.arange(_PLACES):
+            best = _better(samples, best, float(at))
+        for at in best.at_code + coarse / _FINER * np.arange(1 - _FINER, _FINER):
+            best = _better(samples, best, float(at) % period)
+        found.append(best)
+    return tuple(found)
+
+
+def _better(samples: Sequence[Samples], best: Sawtooth, at: float) -> Sawtooth:
+    """Return the better of a sawtooth and that of its period which falls at `at`."""
+    phase = (np.arange(_FOLDED) - at) / best.period
+    residue = phase - np.floor(phase) - 0.5
+    top = bottom = 0.0
+    for own in samples:
+        square, moved, before = _against(residue, own.one, own.other, own.moved, own.before)
+        top += moved / sqrt(own.variance_dn2)
+        bottom += (square - before**2 / own.square_dn2) / own.variance_dn2
+    if bottom > 0 and top**2 / bottom > best.chi2:
+        return Sawtooth(top / bottom, best.period, at, top**2 / bottom)
     return best
+
+
+def profile(samples: Sequence[Samples], period: int, parts: int) -> tuple[Array, Array]:
+    """Return what samples have from the codes before them, over a period, and its error, DN.
+
+    By least squares over equal parts of the period: (part,), about their mean; nan where codes did
+    not occur.
+    """
+    normal, score = np.zeros((parts, parts)), np.zeros(parts)
+    for own in samples:
+        one, other = (code % period * parts // period for code in (own.one, own.other))
+        apart = np.zeros((one.size, parts))
+        np.add.at(apart, (np.arange(one.size), one), 1.0)
+        np.add.at(apart, (np.arange(one.size), other), -1.0)
+        along = own.before @ apart / own.square_dn2
+        apart -= own.before[:, np.newaxis] * along
+        normal += apart.T @ apart / own.variance_dn2
+        score += apart.T @ own.moved / sqrt(own.variance_dn2)
+    inverse = np.linalg.pinv(normal, rcond=1e-6, hermitian=True)
+    errors = np.sqrt(np.maximum(np.diag(inverse), 0.0))
+    met = np.diag(normal) > 0
+    return np.where(met, inverse @ score, nan), np.where(met, errors, nan)
 
 
 @cache
@@ -203,6 +237,20 @@ def _waves() -> tuple[Array, Array]:
 def _doubled() -> Array:
     """Return cosines of twice the angle: (period, code)."""
     return np.asarray(2 * _waves()[0] ** 2 - 1)
+
+
+@kernel
+def _against(
+    residue: Array, one: Frame, other: Frame, moved: Array, before: Array
+) -> tuple[float, float, float]:
+    """Return the sums of a residue's change squared, times what moved, and what moved before."""
+    square = along = through = 0.0
+    for i in range(one.size):
+        apart = residue[one[i]] - residue[other[i]]
+        square += apart * apart
+        along += apart * moved[i]
+        through += apart * before[i]
+    return square, along, through
 
 
 @kernel

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from analysis.mismatch.bank.carryover import PERIODS, sawtooth
+from analysis.mismatch.bank.carryover import sawteeth
 from analysis.mismatch.candidates.candidate import Candidate, Proposal, proposals
 from analysis.mismatch.clues import Clues, alike
 
@@ -76,13 +76,9 @@ def _memory(clues: Clues) -> Sequence[Proposal]:
 
 def _converter(clues: Clues) -> Sequence[Proposal]:
     """Propose the residues, of either direction, that explain most of what samples carry over."""
-    sawteeth = [
-        (axis, sawtooth(own, period))
-        for axis, own in clues.seen.carried.items()
-        for period in PERIODS
-    ]
+    tried = [(axis, one) for axis, own in clues.seen.carried.items() for one in sawteeth(own)]
     found: list[Proposal] = []
-    for axis, own in sorted(sawteeth, key=lambda one: -one[1].chi2)[:_RESIDUES]:
+    for axis, own in sorted(tried, key=lambda one: -one[1].chi2)[:_RESIDUES]:
         found += proposals(
             "adc_memory",
             ["step_dn", "at_code"],
@@ -117,6 +113,6 @@ CANDIDATES = (
          "correlation_2_0"),
         _memory,
     ),
-    Candidate("adc_memory", ("carry_over",), _converter),
+    Candidate("adc_memory", ("carry_over", _ALONG_ROWS, _ALONG_COLUMNS), _converter),
     Candidate("image_lag", ("frame_correlation",), _lag),
 )  # fmt: skip

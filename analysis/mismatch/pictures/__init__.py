@@ -5,11 +5,13 @@ from collections.abc import Sequence
 import numpy as np
 import scipy.stats
 
+from analysis.mismatch.bank.carryover import AXES
 from analysis.mismatch.evidence import Evidence
 from analysis.mismatch.locate import FAMILY, shares
 from analysis.mismatch.model import in_threads
 from analysis.mismatch.observe import Observation, observe
 from analysis.mismatch.pictures.album import Album
+from analysis.mismatch.pictures.carried import carried
 from analysis.mismatch.pictures.curves import curves
 from analysis.mismatch.pictures.frames import codes, line_spectra, series, spectra
 from analysis.mismatch.pictures.maps import NOISY, map_name, maps, shown_in
@@ -49,7 +51,8 @@ def evidence_of(
     shown = shown_in([base, final], least)
     names = {map_name(NOISY), *(one.map for one in shown.values())}
     return Evidence(
-        curves=curves(base, final if named else None),
+        curves=curves(base, final if named else None)
+        | carried(_carrying(base), seen, *([one for _, one in some] for some in (before, after))),
         maps=maps(layout, names, seen, before[0][1], after[0][1] if after else None),
         shown_in=shown,
         spectra=spectra(album, first[:1], later[:1]),
@@ -71,6 +74,21 @@ def evidence_of(
         familywise_level=FAMILY,
         seconds=seconds,
     )
+
+
+def _carrying(base: State) -> list[str]:
+    """Return the axes along which samples follow the code before them."""
+    if all(m.statistic != "carry_over" for m in base.mismatches):
+        return []
+    z = {
+        axis: max(
+            abs(float(base.departures[i]))
+            for i, key in enumerate(base.null.keys)
+            if key.statistic == "carry_over" and key.detail.startswith(axis)
+        )
+        for axis in AXES
+    }
+    return [axis for axis in AXES if z[axis] > threshold_z(base)] or [max(AXES, key=z.__getitem__)]
 
 
 def threshold_z(state: State) -> float:

@@ -70,6 +70,7 @@ EVIDENCE: dict[str, Callable[[Look, Parameters], Evidence]] = {
     "periodic_noise": temporal.wave,
     "bistable_pattern": temporal.wave,
     "readout_memory": _memory,
+    "adc_memory": temporal.carried,
     "tap_mismatch": lambda look, p: maps.along(
         look, second_tap(_view(look), p.get("regions", "left_right")), "gain", "offset"
     ),

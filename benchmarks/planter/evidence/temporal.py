@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from planter.evidence.look import Evidence, Look
+from planter.readout import residue
 
 Parameters = Mapping[str, Any]
 
@@ -68,6 +69,20 @@ def lags(look: Look, *steps: tuple[int, int]) -> Evidence:
 def _covariance(z: np.ndarray, down: int, right: int) -> float:
     height, width = z.shape[1] - down, z.shape[2] - right
     return float(np.mean(z[:, :height, :width] * z[:, down:, right:], dtype=float))
+
+
+def carried(look: Look, p: Parameters) -> Evidence:
+    """Return the covariance of samples with the residue of the code before, by exposure."""
+    down, right = (0, 1) if p.get("along", "rows") == "rows" else (1, 0)
+
+    def value(e: int) -> float:
+        codes, z = look.stacks[e], look.residuals[e]
+        left = residue(codes, p)
+        left -= left.mean(0)
+        height, width = z.shape[1] - down, z.shape[2] - right
+        return float(np.mean(left[:, :height, :width] * z[:, down:, right:], dtype=float))
+
+    return Evidence(np.array([value(e) for e in look.exposures()]))
 
 
 def next_frame(look: Look) -> Evidence:

@@ -19,6 +19,7 @@ AXIS = {
     "light": "light, as recorded",
     "exposure_time_s": "exposure time, s",
     "lag_pixels": "lag, pixels",
+    "code_before": "code of the sample before, within the period",
 }
 _WIDE = 20.0  # largest over smallest from which on an axis is logarithmic
 
@@ -190,7 +191,7 @@ def _abscissa(axes: Axes, curves: Sequence[Curve]) -> None:
     x = np.concatenate([curve.x for curve in curves])
     x = x[np.isfinite(x)]
     positive = x[x > 0]
-    if against == "lag_pixels" or positive.size < 2:
+    if against in ("lag_pixels", "code_before") or positive.size < 2:
         return
     # The dark stands on the straight part about 0.
     start = float(np.quantile(positive, 0.1)) if x.min() <= 0 else float(positive.min())

@@ -1,0 +1,156 @@
+"""A converter of steps carries its residue over: seen, told from what couples in proportion, named.
+
+The residue is planted by the planter, sample by sample, with comparators that are noisy: another
+law than the one that is fitted.
+"""
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
+
+import numpy as np
+import pytest
+import scipy.stats
+from numpy.typing import NDArray
+from planter import Case, Choice, draw_case, plant
+from planter.case import Effect as Planted
+
+from analysis.mismatch import Finding, find_mismatch
+from analysis.mismatch.bank.carryover import (
+    AXES,
+    CarryOver,
+    CarryOverSums,
+    Samples,
+    profile,
+    sawteeth,
+)
+from dsis.camera import read_camera
+from dsis.recording import read_recording
+
+Frames = NDArray[np.float64]
+LEVELS = ((15.0, 3.0), (139.0, 7.0), (460.0, 12.0), (900.0, 16.0))  # mean and noise, DN
+SHAPE = (6, 60, 80)
+PERIOD, STEP_DN, AT = 64, 1.5, 11.0
+RIVALS = ("readout_memory", "crosstalk", "spatial_filtering", "row_noise", "pink_noise")
+
+
+def _white(seed: int) -> list[Frames]:
+    rng = np.random.default_rng(seed)
+    return [mean + sd * rng.standard_normal(SHAPE) for mean, sd in LEVELS]
+
+
+def _carrying(frames: Frames) -> Frames:
+    """Return frames whose samples have the residue of the sample to their left."""
+    made = frames.copy()
+    phase = (frames[:, :, :-1] - AT) / PERIOD
+    made[:, :, 1:] += STEP_DN * (phase - np.floor(phase) - 0.5)
+    return made
+
+
+def _observed(levels: list[Frames]) -> tuple[dict[str, tuple[float, float]], list[Samples]]:
+    sums, samples = CarryOverSums(), []
+    for frames in levels:
+        own = CarryOver(keep=True)
+        assert len(list(own.watching(np.rint(frames)))) == len(frames)
+        sums.add(own)
+        kept = own.samples("rows")
+        assert kept is not None
+        samples.append(kept)
+    return sums.numbers(), samples
+
+
+def test_white_noise_carries_nothing_over() -> None:
+    z = []
+    for seed in range(60):
+        numbers, _ = _observed(_white(seed))
+        z.append([value / error for value, error in numbers.values()])
+    spread = np.array(z)
+    known = np.isfinite(spread).all(0)
+    assert known.sum() >= 16  # of 32: long waves are lines over the codes that noise covers
+    assert 0.85 < spread[:, known].std() < 1.1
+    assert scipy.stats.kstest(spread[:, known][:, 0], "norm").pvalue > 1e-3
+
+
+@pytest.mark.parametrize("share", [0.2, -0.2])
+def test_memory_in_proportion_is_none_of_the_code(share: float) -> None:
+    levels = []
+    for frames, (mean, _) in zip(_white(7), LEVELS, strict=True):
+        made = frames.copy()
+        made[:, :, 1:] += share * (frames[:, :, :-1] - mean)
+        levels.append(made)
+    numbers, _ = _observed(levels)
+    assert max(abs(v / e) for v, e in numbers.values() if np.isfinite(v)) < 4.5
+
+
+def test_lines_and_frames_that_move_are_none_either() -> None:
+    rng = np.random.default_rng(3)
+    levels = [
+        frames * (1 + 0.01 * rng.standard_normal((SHAPE[0], 1, 1)))
+        + sd * rng.standard_normal((SHAPE[0], SHAPE[1], 1))
+        for frames, (_, sd) in zip(_white(8), LEVELS, strict=True)
+    ]
+    numbers, _ = _observed(levels)
+    assert max(abs(v / e) for v, e in numbers.values() if np.isfinite(v)) < 4.5
+
+
+def test_a_residue_is_found_with_its_period_step_and_place() -> None:
+    numbers, samples = _observed([_carrying(frames) for frames in _white(9)])
+    z = {name: abs(v / e) for name, (v, e) in numbers.items() if np.isfinite(v)}
+    assert max(z.values()) > 10
+    assert max(v for name, v in z.items() if "along columns" in name) < 4.5
+    best = max(sawteeth(tuple(samples)), key=lambda one: one.chi2)
+    assert best.period == PERIOD
+    assert abs((best.at_code - AT + PERIOD / 2) % PERIOD - PERIOD / 2) <= PERIOD / 32
+    assert best.step_dn == pytest.approx(STEP_DN, rel=0.15)
+
+
+def test_the_profile_is_the_sawtooth() -> None:
+    _, samples = _observed([_carrying(frames) for frames in _white(10)])
+    parts = 16
+    seen, error = profile(samples, PERIOD, parts)
+    middles = (np.arange(parts) + 0.5) * PERIOD / parts - 0.5
+    phase = (middles - AT) / PERIOD
+    expected = STEP_DN * (phase - np.floor(phase) - 0.5)
+    away = np.abs((middles - AT + PERIOD / 2) % PERIOD - PERIOD / 2) > PERIOD / parts
+    rest = ((seen - seen[away].mean()) - (expected - expected[away].mean()))[away]
+    assert np.abs(rest / error[away]).max() < 4
+    assert np.ptp(seen[away]) > 0.8 * STEP_DN
+
+
+def test_frames_of_one_kind_say_nothing() -> None:
+    own = CarryOver(keep=True)
+    list(own.watching([np.full((8, 8), 100.0)] * 4))
+    assert all(own.samples(axis) is None for axis in AXES)
+    sums = CarryOverSums()
+    sums.add(own)
+    assert all(np.isnan(value) for value, _ in sums.numbers().values())
+
+
+def _found(folder: Path, cfa: str, *vocabulary: str) -> tuple[Case, Finding]:
+    choice = Choice(cfa=cfa, segments=1, bit_depth=12, light=True, times="darks")
+    case = draw_case(3, "small", choice)
+    planted = {"period_codes": 64, "at_code": 20.0, "step_dn": 1.5, "along": "rows"}
+    case = case.having(Planted("adc_memory", planted))
+    plant(folder, case)
+    camera, recording = read_camera(folder / "camera.toml"), read_recording(folder)
+    return case, find_mismatch(camera, recording, seed=5, vocabulary=frozenset(vocabulary))
+
+
+@pytest.mark.parametrize("cfa", ["MONO", "RGGB"])
+def test_it_is_named_with_its_numbers(tmp_path: Path, cfa: str) -> None:
+    _, found = _found(tmp_path, cfa, "adc_memory", *RIVALS)
+    assert [e.effect for e in found.omitted_physics] == ["adc_memory"]
+    own = found.omitted_physics[0]
+    assert own.parameters["period_codes"].value == 64
+    for name, truth in (("step_dn", 1.5), ("at_code", 20.0)):
+        parameter = own.parameters[name]
+        assert abs(parameter.value - truth) < 4 * parameter.standard_error  # type: ignore[operator] # fitted
+    assert own.heldout_gain.ci95[0] > 0
+    assert found.evidence is None or "carry_over along rows" in found.evidence.curves
+
+
+def test_without_a_word_for_it_nothing_else_is_named(tmp_path: Path) -> None:
+    _, found = _found(tmp_path, "MONO", *RIVALS)
+    assert not found.omitted_physics
+    assert any(m.statistic == "carry_over" for m in found.unexplained)

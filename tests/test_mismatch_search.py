@@ -10,7 +10,8 @@ import pytest
 
 from analysis.mismatch import name
 from analysis.mismatch.contradicted import Denial
-from analysis.mismatch.name import Named, Search
+from analysis.mismatch.name import Search
+from analysis.mismatch.named import Named
 from analysis.mismatch.polish import largest
 from analysis.mismatch.rank import alike, ties
 from analysis.mismatch.recalibrate import _moved

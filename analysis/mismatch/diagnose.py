@@ -19,7 +19,8 @@ from analysis.mismatch.finding import (
     Verdict,
 )
 from analysis.mismatch.instance import kind_of
-from analysis.mismatch.name import Named, Search
+from analysis.mismatch.name import Search
+from analysis.mismatch.named import Named
 from analysis.mismatch.observe import observe
 from analysis.mismatch.parameters import parameter_errors
 from analysis.mismatch.pictures import Album, evidence_of
@@ -161,6 +162,11 @@ def _proven(
         nats = gained[worst.name].gain.nats_per_frame
         why = f"gains {nats:.3g} nats per locked frame, no more than chance"
         final = search.drop(final, worst, why)
+        if not judged and final.mismatches:  # what it hid is looked for
+            named = {one.name for one in search.named}
+            final = search.further(final)
+            if named != {one.name for one in search.named}:
+                final = search.settle(final)
 
 
 def _finding(

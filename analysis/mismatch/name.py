@@ -1,7 +1,7 @@
 """Which physics explains the mismatches: add the best effect, fit all again, look again."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +10,7 @@ from analysis.mismatch.candidates import CANDIDATES, Proposal
 from analysis.mismatch.contradicted import contradicted, refuted
 from analysis.mismatch.feigned import of_another
 from analysis.mismatch.instance import LINES, Frequency, frequency_of, instance, same_line
+from analysis.mismatch.named import Named, camera_without, renewed
 from analysis.mismatch.observe import Frames
 from analysis.mismatch.phase import aliases, keeps_phase, strongest
 from analysis.mismatch.polish import polish, with_effects
@@ -34,38 +35,8 @@ _PHASES = {
 }
 _SPIKY = 10.0  # standard errors from which tails bend the variances
 _TAILS = frozenset({"kurtosis", "kurtosis_within_pixels", "one_off_outliers"})
+_LITTLE = "it would explain"
 _RESOLVED = 0.7  # share of what an effect touches that it must explain
-
-
-@dataclass(frozen=True)
-class Named:
-    """An effect taken in.
-
-    Attributes
-    ----------
-    kind
-        Its name; `dual_gain` is a second read-out segment.
-    proposal
-        The effect with its free parameters; None for `dual_gain`.
-    errors
-        Standard errors of the parameters.
-    gain
-        Log-likelihood of the bank's numbers that it is worth beside the others.
-    rivals
-        Other effects tried in its place: kind, and by how much they were worse.
-    """
-
-    kind: str
-    proposal: Proposal | None
-    errors: dict[str, float]
-    gain: float
-    rivals: tuple[tuple[str, float], ...]
-    switch_dn: float = float("nan")
-
-    @property
-    def name(self) -> str:
-        """Its kind, and of a line its frequency: a sensor may have several."""
-        return instance(self.kind, None if self.proposal is None else self.proposal.effect)
 
 
 @dataclass
@@ -89,7 +60,39 @@ class Search:
 
     def run(self) -> State:
         """Return the final state."""
-        state = self.base
+        return self.further(self.base)
+
+    def further(self, state: State) -> State:
+        """Return the final state of a search that goes on from one.
+
+        What was dropped had hidden something: it is looked for once more. An effect that explained
+        some of what it changes, while others were missing, may come back.
+        """
+        for last in (False, True):
+            known = len(self.named)
+            state = self._sought(state)
+            if len(self.named) == known:
+                break
+            state = self._polished(state)
+            taken = list(self.named)
+            state = self._pruned(state)
+            kept = {one.name for one in self.named}
+            dropped = [one for one in taken if one.name not in kept]
+            if last or not dropped or not state.mismatches:
+                break
+            for one in dropped:
+                self._forgive(one)
+        return state
+
+    def _forgive(self, named: Named) -> None:
+        """Let an effect be proposed again that explained too little of what it changes."""
+        if self.refused.get(named.name, "").startswith(_LITTLE):
+            del self.refused[named.name]
+            line = frequency_of(None if named.proposal is None else named.proposal.effect)
+            self.settled = [one for one in self.settled if one[1] != line]
+
+    def _sought(self, state: State) -> State:
+        """Return the state with every effect that the search takes in."""
         while state.mismatches and len(self.named) < _MOST_EFFECTS:
             added = self._best(state)
             if added is None:
@@ -100,7 +103,7 @@ class Search:
             self.ties = []  # what was undecided on the way is explained
             self.doubted = {}
         self.refused |= self.doubted
-        return self._pruned(self._polished(state))
+        return state
 
     def _take(self, named: Named) -> None:
         self.named.append(named)
@@ -119,11 +122,11 @@ class Search:
         mine = [(n, n.proposal) for n in self.named if n.proposal is not None]
         if not mine:
             return state
-        bare = _without(state.camera, [p.effect for _, p in mine], self.camera)
+        bare = camera_without(state.camera, [p.effect for _, p in mine], self.camera)
         effects, errors = settled(state, bare, [p for _, p in mine])
         fitted = iter(zip(effects, errors, strict=True))
         self.named = [
-            n if n.proposal is None else _renewed(n, n.proposal, *next(fitted)) for n in self.named
+            n if n.proposal is None else renewed(n, n.proposal, *next(fitted)) for n in self.named
         ]
         camera = with_effects(bare, effects)
         return state if camera is None else State.of(self.setting, camera, self.step)
@@ -132,7 +135,7 @@ class Search:
         """Return a state's camera without one of the effects named."""
         if named.proposal is None:
             return state.camera.model_copy(update={"noise": self.base.camera.noise})
-        return _without(state.camera, [named.proposal.effect], self.camera)
+        return camera_without(state.camera, [named.proposal.effect], self.camera)
 
     def fitted_without(self, state: State, named: Named) -> Camera:
         """Return the camera without one of the effects named, its base numbers fitted once more.
@@ -296,7 +299,7 @@ class Search:
         mine = [(n, n.proposal) for n in self.named if n.proposal is not None]
         if not mine:
             return state
-        bare = _without(state.camera, [p.effect for _, p in mine], self.camera)
+        bare = camera_without(state.camera, [p.effect for _, p in mine], self.camera)
         sparse = replicates_for(self.setting, [p.effect for _, p in mine])
         predictor = state.predictor(max(self.setting.polishing, sparse))
         polished = polish(predictor, bare, [p for _, p in mine], rounds=2)
@@ -304,7 +307,7 @@ class Search:
             return state
         fitted = iter(zip(polished.effects, polished.errors, strict=True))
         self.named = [
-            n if n.proposal is None else _renewed(n, n.proposal, *next(fitted)) for n in self.named
+            n if n.proposal is None else renewed(n, n.proposal, *next(fitted)) for n in self.named
         ]
         camera = with_effects(bare, polished.effects)
         return state if camera is None else State.of(self.setting, camera, self.step)
@@ -367,24 +370,5 @@ class Search:
         if predictor.worth(mean) < LEAST_GAIN:
             return share, "the others explain what it would explain"
         if share < _RESOLVED:
-            return share, f"it would explain {max(share, 0):.0%} of what it changes"
+            return share, f"{_LITTLE} {max(share, 0):.0%} of what it changes"
         return None
-
-
-def _renewed(named: Named, proposal: Proposal, effect: Effect, errors: dict[str, float]) -> Named:
-    return replace(
-        named,
-        proposal=Proposal(effect, proposal.free, proposal.signed),
-        errors=errors,
-    )
-
-
-def _without(camera: Camera, effects: Sequence[Effect], given: Camera) -> Camera:
-    """Return a camera without some of its effects; those that the user's camera has stay."""
-    left = list(camera.effect)
-    for effect in effects:
-        for i in range(len(left) - 1, len(given.effect) - 1, -1):
-            if left[i] == effect:
-                del left[i]
-                break
-    return camera.model_copy(update={"effect": tuple(left)})

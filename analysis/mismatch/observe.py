@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from analysis.mismatch.bank.bands import Bands
 from analysis.mismatch.bank.bulk import Bulk
-from analysis.mismatch.bank.carryover import AXES, CarryOver, CarryOverSums, Samples
+from analysis.mismatch.bank.carryover import CarryOver, CarryOverSums, Samples
 from analysis.mismatch.bank.coherent import Peak, SpectrumSums
 from analysis.mismatch.bank.common import common
 from analysis.mismatch.bank.local import local_scalars, variances, widened
@@ -160,7 +160,6 @@ def observe(
     sums: dict[str, _Channel] = {}
     shared: dict[str, Mapping[str, Number]] = {}
     bands = Bands(layout.rows, layout.sites)
-    carried: dict[str, list[Samples]] = {axis: [] for axis in AXES}
     memory = CarryOverSums()
     for exposure in layout.uniform:
         many, after = Bulk.of(layout, exposure.name), CarryOver(keep=keep)
@@ -169,10 +168,7 @@ def observe(
             watch(exposure.name, measured)
         frames = len(exposure.numbers)
         still = {name for name in measured.channels if (exposure.name, name) in layout.still}
-        if not still:
-            memory.add(after)
-            for axis, own in carried.items():
-                own += [one] if (one := after.samples(axis)) is not None else []
+        memory.add(after, still=bool(still))
         if len(measured.channels) > 1 and not still:
             signals = {name: layout.signal_dn[exposure.name, name] for name in measured.channels}
             shared[exposure.name] = common(measured.channels, signals, frames, layout.sites)
@@ -223,7 +219,7 @@ def observe(
         images if keep else {},
         shared,
         local,
-        {axis: tuple(own) for axis, own in carried.items()},
+        memory.samples,
     )
 
 

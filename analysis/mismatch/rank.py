@@ -22,6 +22,7 @@ _COSINE = 0.5  # of what two predictions change, from which they change the same
 _ALIKE = 0.05  # relative difference of parameters up to which a proposal is an earlier one
 _SPARSE = 4  # times as many simulations
 _BY_FRAME = frozenset({"frame_variance"})
+_BY_SIGN = frozenset({"bistable_pattern"})  # of two frames half show nothing, half show it twice
 _FAR_OFF, _LITTLE = 8.0, 0.3  # departures, and the share of one that is little
 _SHARED = 0.1  # share of an effect's change that may lie where the model moved since
 
@@ -59,7 +60,7 @@ class Memory:
 def replicates_for(setting: Setting, effects: Iterable[Effect]) -> int:
     """Return how many simulations tell what effects change.
 
-    Of one number a frame, few frames of few simulations may hold next to nothing.
+    Of one number or sign a frame, few frames of few simulations may hold next to nothing.
     """
     if any(_sparse(effect) for effect in effects):
         return min(_SPARSE * setting.replicates, setting.drafts)
@@ -67,7 +68,7 @@ def replicates_for(setting: Setting, effects: Iterable[Effect]) -> int:
 
 
 def _sparse(effect: Effect) -> bool:
-    return effect.measures == _BY_FRAME
+    return effect.measures == _BY_FRAME or effect.kind in _BY_SIGN
 
 
 def _near(one: Effect, other: Effect) -> bool:

@@ -128,7 +128,9 @@ def _error(case: Case, kind: str, name: str, found: Mapping[str, Any]) -> float:
         value, truth = [abs(v) for v in value], [abs(t) for t in truth]
     if name in CYCLIC:  # the same in every period
         period = (case.planted(kind) or {})[CYCLIC[name]]
-        value = [t + (v - t + period / 2) % period - period / 2 for v, t in zip(value, truth)]
+        half = period / 2
+        apart = [(v - t + half) % period - half for v, t in zip(value, truth, strict=True)]
+        value = [t + d for t, d in zip(truth, apart, strict=True)]
     spread = spread * len(value) if len(spread) == 1 else spread or [0.0] * len(value)
     signs = (1, -1) if name == "frequency" else (1,)
     return min((_largest(value, [sign * t for t in truth], spread) for sign in signs), key=abs)

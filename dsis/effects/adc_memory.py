@@ -12,12 +12,12 @@ from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, Stage
 class AdcMemory(Effect):
     """A conversion carries over some of the residue that the one before left in the converter.
 
-    v'(i) = v(i) + d (frac((v(i - 1) + black - c) / P) - 1/2). Converters of several steps (pipeline,
-    sub-ranging) take a coarse decision off the sample and amplify the residue, which rises over P
-    codes and falls back by one step at c + n P; capacitors shared between samples, or not reset,
-    keep a part of it. d is what the step makes of the next sample of the line, in DN: the
-    correlation with it is negative where the noise straddles a step (d > 0) and slightly positive
-    between. The first sample of a line has the last of it before it.
+    v'(i) = v(i) + d (frac((v(i - 1) + black - c) / P) - 1/2). Converters of several steps
+    (pipeline, sub-ranging) take a coarse decision off the sample and amplify the residue, which
+    rises over P codes and falls back by one step at c + n P; capacitors shared between samples, or
+    not reset, keep a part of it. d is what the step makes of the next sample of the line, in DN:
+    the correlation with it is negative where the noise straddles a step (d > 0) and slightly
+    positive between. The first sample of a line has the last of it before it.
     """
 
     kind: Literal["adc_memory"] = "adc_memory"

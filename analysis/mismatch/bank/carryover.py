@@ -125,22 +125,32 @@ class CarryOver:
         variance = float(rest.var())
         if variance <= 0:
             return None
-        codes = (part.astype(np.int32) & (_FOLDED - 1) for part in (one, other))
-        return Samples(*codes, rest / sqrt(variance), before, variance, square)
+        first, second = (part.astype(np.int32) & (_FOLDED - 1) for part in (one, other))
+        return Samples(first, second, rest / sqrt(variance), before, variance, square)
 
 
 class CarryOverSums:
-    """Amplitudes of the waves over all exposures, by weighted least squares, DN."""
+    """Amplitudes of the waves over all exposures, by weighted least squares, DN.
+
+    Attributes
+    ----------
+    samples
+        Those that exposures have kept, by axis.
+    """
 
     def __init__(self) -> None:
+        self.samples: dict[str, tuple[Samples, ...]] = dict.fromkeys(AXES, ())
         shape = (len(PERIODS), len(PHASES))
         self.top = {axis: np.zeros(shape) for axis in AXES}
         self.bottom = {axis: np.zeros(shape) for axis in AXES}
 
-    def add(self, own: CarryOver) -> None:
-        """Take one exposure."""
-        if own.frames < 2:
+    def add(self, own: CarryOver, *, still: bool = False) -> None:
+        """Take one exposure; frames that are `still` say nothing."""
+        if own.frames < 2 or still:
             return
+        for axis in AXES:
+            kept = own.samples(axis)
+            self.samples[axis] += (kept,) if kept is not None else ()
         # n - 1 differences of successive frames, which share frames, say as much as fewer apart.
         weight = (2 * own.frames - 2) / (3 * own.frames - 4)
         waves = _waves()

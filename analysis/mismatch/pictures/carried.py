@@ -24,7 +24,7 @@ def carried(
     Over the period of the residue that explains most of what was recorded; `after` is empty where
     nothing was named.
     """
-    found = {}
+    found: dict[str, tuple[Curve, ...]] = {}
     for axis in axes:
         own = seen.carried.get(axis, ())
         if not own:

@@ -110,6 +110,12 @@ def test_uneven_light_tilts_about_the_centre_and_moves_it() -> None:
     np.testing.assert_allclose(image[[0, -1], 200], [1.06, 0.94], atol=2e-3)
     np.testing.assert_allclose(image[150, [0, -1]], [0.96, 1.04], atol=2e-3)
     np.testing.assert_allclose(image.mean(), 1, atol=1e-6)
+    bows = {"bow_down_percent": 6.0, "bow_right_percent": -3.0}
+    image = apply(effect("shading", falloff_percent=0.0, **bows), np.ones((301, 401)))
+    np.testing.assert_allclose(image[150, 200], 1 - 0.02 + 0.01, atol=1e-4)
+    np.testing.assert_allclose(image[[0, -1], 200], 1 + 0.04 + 0.01, atol=1e-3)
+    np.testing.assert_allclose(image[150, [0, -1]], 1 - 0.02 - 0.02, atol=1e-3)
+    np.testing.assert_allclose(image.mean(), 1, atol=1e-5)
     # A part of a sensor that falls off about its centre: about another centre, with a tilt.
     whole = apply(effect("shading", falloff_percent=20.0), np.ones((600, 800)))
     part = whole[:300, :400]

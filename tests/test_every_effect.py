@@ -57,6 +57,7 @@ STRONG: dict[str, tuple[dict[str, object], ...]] = {
     "shading": (
         {"falloff_percent": 90.0},
         {"falloff_percent": 20.0, "tilt_down_percent": 30.0, "tilt_right_percent": -20.0},
+        {"falloff_percent": 0.0, "bow_down_percent": 30.0, "bow_right_percent": -20.0},
     ),
     "spatial_filtering": ({"fraction": 0.2}, {"fraction": 0.04}),
     "tap_mismatch": (

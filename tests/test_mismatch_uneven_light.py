@@ -1,4 +1,4 @@
-"""Light that is uneven: a fall to the corners, a tilt, or both; no amplifier, no glow."""
+"""Light that is uneven: a fall to the corners, tilts, bows; no amplifier, no glow."""
 
 import pytest
 
@@ -7,7 +7,14 @@ from analysis.mismatch.diagnose import VOCABULARY
 from dsis.effects import registry
 from mismatch_recordings import camera, recorded
 
-FALL, DOWN, RIGHT = 2.0, -1.5, 1.0
+FALL, DOWN, RIGHT, BOW = 2.0, -1.5, 1.0, 1.5
+NUMBERS = (
+    "falloff_percent",
+    "tilt_down_percent",
+    "tilt_right_percent",
+    "bow_down_percent",
+    "bow_right_percent",
+)
 
 
 def _shading(**percent: float) -> object:
@@ -20,6 +27,7 @@ def _shading(**percent: float) -> object:
         {"falloff_percent": FALL},
         {"tilt_down_percent": DOWN},
         {"falloff_percent": FALL, "tilt_down_percent": DOWN, "tilt_right_percent": RIGHT},
+        {"tilt_down_percent": DOWN, "bow_down_percent": BOW},
     ],
 )
 def test_uneven_light_is_named_with_its_numbers(percent: dict[str, float]) -> None:
@@ -28,7 +36,7 @@ def test_uneven_light_is_named_with_its_numbers(percent: dict[str, float]) -> No
     (named,) = found.omitted_physics
     assert named.effect == "shading"
     assert not found.unexplained
-    for name in ("falloff_percent", "tilt_down_percent", "tilt_right_percent"):
+    for name in NUMBERS:
         fitted = named.parameters[name]
         assert isinstance(fitted.value, float)
         off = abs(fitted.value - percent.get(name, 0.0))

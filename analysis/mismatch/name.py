@@ -302,7 +302,9 @@ class Search:
         bare = camera_without(state.camera, [p.effect for _, p in mine], self.camera)
         sparse = replicates_for(self.setting, [p.effect for _, p in mine])
         predictor = state.predictor(max(self.setting.polishing, sparse))
-        polished = polish(predictor, bare, [p for _, p in mine], rounds=2)
+        # Of a large recording each simulation tells much and costs much: `settle` steps once more.
+        rounds = 2 if self.setting.replicates > 1 else 1
+        polished = polish(predictor, bare, [p for _, p in mine], rounds=rounds)
         if polished is None:
             return state
         fitted = iter(zip(polished.effects, polished.errors, strict=True))

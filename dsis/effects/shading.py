@@ -12,17 +12,21 @@ from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, Stage
 class Shading(Effect):
     """A fixed smooth fall-off of light: to the corners, and to one side where light is uneven.
 
-    S'(y, x) = S(y, x) max(1 - f r^2 / R^2 + a y / Y + b x / X, 0), from the sensor's centre: r the
-    distance and R the corner's, Y and X half the height and width. On a whole sensor the mean falls
-    by f S / 3, for the mean of r^2 / R^2 is 1/3; tilts a, down, and b, to the right, leave it where
-    light ends nowhere. A lamp beside the axis gives both, and so does a part of a sensor: its
-    centre is another.
+    S'(y, x) = S(y, x) max(1 - f r^2 / R^2 + a v + b u + c (v^2 - 1/3) + d (u^2 - 1/3), 0), from the
+    sensor's centre: r the distance and R the corner's, v = y / Y and u = x / X, Y and X half the
+    height and width. On a whole sensor the mean falls by f S / 3, for the mean of r^2 / R^2 is 1/3;
+    tilts a, down, and b, to the right, leave it where light ends nowhere, and so do bows c and d,
+    which rise to both ends where they are positive. A lamp beside the axis gives a fall and a tilt,
+    and so does a part of a sensor, whose centre is another; an integrating sphere or a lamp behind
+    a slit, bows.
     """
 
     kind: Literal["shading"] = "shading"
     falloff_percent: Annotated[float, Field(ge=0, le=100, examples=[4.0])]
     tilt_down_percent: Annotated[float, Field(ge=-100, le=100)] = 0.0
     tilt_right_percent: Annotated[float, Field(ge=-100, le=100)] = 0.0
+    bow_down_percent: Annotated[float, Field(ge=-100, le=100)] = 0.0
+    bow_right_percent: Annotated[float, Field(ge=-100, le=100)] = 0.0
 
     stage: ClassVar[Stage] = Stage.LIGHT
     reference: ClassVar[str] = "EMVA Standard 1288, release 3.1 (homogeneity of the light)"
@@ -46,8 +50,11 @@ class Shading(Effect):
         y = exposure.grid.row_numbers() - (rows - 1) / 2
         x = exposure.grid.column_numbers() - (columns - 1) / 2
         fall = self.falloff_percent / 100 / ((rows / 2) ** 2 + (columns / 2) ** 2)
-        down = 1 - fall * y**2 + self.tilt_down_percent / 100 * y / (rows / 2)
-        across = -fall * x**2 + self.tilt_right_percent / 100 * x / (columns / 2)
+        v, u = y / (rows / 2), x / (columns / 2)
+        down = 1 - fall * y**2 + self.tilt_down_percent / 100 * v
+        across = -fall * x**2 + self.tilt_right_percent / 100 * u
+        down += self.bow_down_percent / 100 * (v**2 - 1 / 3)
+        across += self.bow_right_percent / 100 * (u**2 - 1 / 3)
         light = down.astype(np.float32) + across.astype(np.float32)
         if down.min() + across.min() < 0:
             light = np.maximum(light, np.float32(0))
@@ -56,13 +63,16 @@ class Shading(Effect):
     def contributions(self, point: OperatingPoint) -> Mapping[str, float]:
         """Return what mean and shot noise lose, and the variance of the whole sensor's light."""
         f, h2, w2 = self.falloff_percent / 100, point.rows**2, point.columns**2
-        lost = f * (h2 + w2 - 2) / (3 * (h2 + w2))
-        surface = ((h2 - 1) * (h2 - 4) + (w2 - 1) * (w2 - 4)) / 180 / ((h2 + w2) / 4) ** 2
+        down, right = self.bow_down_percent / 100, self.bow_right_percent / 100
+        lost = f * (h2 + w2 - 2) / (3 * (h2 + w2)) + down / (3 * h2) + right / (3 * w2)
+        bows = ((down - f * h2 / (h2 + w2)) ** 2 * (h2 - 1) * (h2 - 4) / h2**2) + (
+            (right - f * w2 / (h2 + w2)) ** 2 * (w2 - 1) * (w2 - 4) / w2**2
+        )
         tilts = ((self.tilt_down_percent / 100) ** 2 * (h2 - 1) / h2 / 3) + (
             (self.tilt_right_percent / 100) ** 2 * (w2 - 1) / w2 / 3
         )
         return {
             "level": -lost * point.signal_dn,
             "pixel_variance": -lost * point.shot_variance_dn2,
-            "fixed_smooth_variance": (surface * f**2 + tilts) * point.signal_dn**2,
+            "fixed_smooth_variance": (bows * 4 / 45 + tilts) * point.signal_dn**2,
         }

@@ -25,6 +25,7 @@ _BEFORE = {"rows": (0, 1), "columns": (1, 0)}
 _FRAMES = 16  # of an exposure: a memory is the same in all
 _FOLDED = PERIODS[-1]
 _LEAST = 4.0  # times what means of lines take: what must be left of a wave, to say anything
+_SAMPLES = 2**16  # of a difference, roughly: every so many lines are looked at
 _KEPT = 2**13  # samples of a difference of frames that are kept one by one
 _PLACES, _FINER = 32, 8  # of a step in its period that are looked at, and between two of them
 Array = NDArray[np.float64]
@@ -105,12 +106,13 @@ class CarryOver:
         for k, axis in enumerate(AXES):
             still = moved - moved.mean(1 - k, keepdims=True)  # whole lines move for other reasons
             down, right = _BEFORE[axis]
-            _add(one, other, still, down, right, self.by_code[axis], self.squares[axis])
+            every = max(one.size // _SAMPLES, 1) | 1  # odd: no colour is left out
+            _add(one, other, still, down, right, every, self.by_code[axis], self.squares[axis])
             if self.keep:
                 rows, columns = one.shape[0] - down, one.shape[1] - right
                 parts = (one, other, still[down:, right:], still)
                 flat = [part[:rows, :columns].reshape(-1) for part in parts]
-                step = max(flat[0].size // _KEPT, 1) | 1  # odd: no colour is left out
+                step = max(flat[0].size // _KEPT, 1) | 1
                 self.kept[axis].append(np.stack([part[::step] for part in flat]).astype(float))
 
     def samples(self, axis: str) -> Samples | None:
@@ -270,13 +272,14 @@ def _add(
     moved: NDArray[np.float32],
     down: int,
     right: int,
+    every: int,
     by_code: Array,
     squares: Array,
 ) -> None:
     rows, columns = one.shape
     mask = by_code.shape[1] - 1
     count = square = product = before = 0.0
-    for y in range(down, rows):
+    for y in range(down, rows, every):
         for x in range(right, columns):
             a, b = one[y - down, x - right], other[y - down, x - right]
             d, own = float(moved[y, x]), float(moved[y - down, x - right])

@@ -13,7 +13,10 @@ from analysis.mismatch.clues import Clues, alike
 from analysis.mismatch.layout import Place
 
 Array = NDArray[np.float64]
-_SURFACES = ("falloff_percent", "tilt_down_percent", "tilt_right_percent")
+_FALL = "falloff_percent"
+_TILTS = ("tilt_down_percent", "tilt_right_percent")
+_BOWS = ("bow_down_percent", "bow_right_percent")
+_ROUND, _BOWED = (_FALL, *_TILTS), (*_TILTS, *_BOWS)
 _CLEAR = 3.0  # standard errors from which a tilt is worth a trial
 _JUMP = 0.15  # z of the step where halves meet, of that of their means: some 0.4 of two amplifiers
 _SMOOTH = ("fixed_smooth_variance", "fixed_smooth_tilt", "fixed_smooth_falloff")
@@ -39,27 +42,38 @@ def _prnu(clues: Clues) -> Sequence[Proposal]:
 
 
 def _shading(clues: Clues) -> Sequence[Proposal]:
-    """Start from the surface that fits the gain: a fall to the corners, a tilt, or both."""
-    images = clues.image("gain")
-    if not images:
+    """Start from the surface that fits the gain: a fall to the corners, tilts, bows."""
+    if not clues.image("gain"):
         return _of_strength(clues)
-    values, errors = np.zeros(3), np.zeros(3)
+    round_, clear = _fitted(clues, _ROUND)
+    leaning = [name for name in _TILTS if name in clear]
+    found: list[Proposal] = []
+    for names in ([_FALL], leaning, [_FALL, *leaning] if leaning else []):
+        found += _of_light(round_, names)
+    bowed, clear = _fitted(clues, _BOWED, max(round_[_FALL], 0.0))
+    if clear & set(_BOWS):  # beyond what a fall to the corners is
+        bowed, clear = _fitted(clues, _BOWED)
+        found += _of_light(bowed, [name for name in _BOWED if name in clear])
+    return found
+
+
+def _fitted(
+    clues: Clues, names: Sequence[str], fall_percent: float = 0.0
+) -> tuple[dict[str, float], set[str]]:
+    """Return what the gain has of each surface beyond a fall, per cent, and which are clear."""
+    values, errors = np.zeros(len(names)), np.zeros(len(names))
+    images = clues.image("gain")
     for channel, (image, noise) in images.items():
-        surfaces = _surfaces(image.shape)
+        surfaces, had = _surfaces(image.shape, names), _had(clues, image.shape, fall_percent)
         inverse = np.linalg.inv(surfaces @ surfaces.T)
         scale = 100 / clues.scale("gain", channel) / len(images)
-        values += scale * (inverse @ surfaces @ (image - image.mean()).ravel())
-        values -= _had(clues) / len(images)
+        rest = scale * (image - image.mean()).ravel() - had / len(images)
+        values += inverse @ surfaces @ rest
         errors = np.hypot(errors, scale * noise * np.sqrt(np.diag(inverse)))
-    own = dict(zip(_SURFACES, values.tolist(), strict=True))
-    clear = {name for name, error in zip(_SURFACES, errors, strict=True)
+    own = dict(zip(names, values.tolist(), strict=True))
+    clear = {name for name, error in zip(names, errors, strict=True)
              if abs(own[name]) > _CLEAR * error}  # fmt: skip
-    fall, *tilts = _SURFACES
-    found: list[Proposal] = []
-    leaning = [name for name in tilts if name in clear]
-    for names in ([fall], leaning, [fall, *leaning] if leaning else []):
-        found += _of_light(own, names)
-    return found
+    return own, clear
 
 
 def _of_strength(clues: Clues) -> Sequence[Proposal]:
@@ -67,32 +81,35 @@ def _of_strength(clues: Clues) -> Sequence[Proposal]:
     variance, _ = clues.amplitude("fixed_smooth_variance", _squared(clues))
     if variance <= 0:
         return []
-    spread = float(_surfaces((clues.layout.rows, clues.layout.columns))[0].var())
-    return _of_light({_SURFACES[0]: 100 * sqrt(variance / spread)}, _SURFACES[:1])
+    spread = float(_surfaces((clues.layout.rows, clues.layout.columns), (_FALL,)).var())
+    return _of_light({_FALL: 100 * sqrt(variance / spread)}, (_FALL,))
 
 
-def _had(clues: Clues) -> Array:
-    """Return what the camera's own shading does to the light, per cent of each surface."""
+def _had(clues: Clues, shape: tuple[int, ...], fall_percent: float) -> Array:
+    """Return what the camera's own shading, and a fall besides, do to the light, per cent."""
+    names = (_FALL, *_BOWED)
     own = [e.model_dump() for e in clues.camera.effect if e.kind == "shading"]
-    return np.array([sum(effect[name] for effect in own) for name in _SURFACES], float)
+    values = np.array([sum(effect[name] for effect in own) for name in names], float)
+    values[0] += fall_percent
+    return np.asarray(values @ _surfaces(shape, names))
 
 
 def _of_light(own: Mapping[str, float], names: Sequence[str]) -> list[Proposal]:
     """Return the proposal with some of the surfaces, none where a fall is a rise."""
-    fall, *tilts = _SURFACES
-    if not names or (fall in names and own[fall] <= 0):
+    if not names or (_FALL in names and own[_FALL] <= 0):
         return []
-    start = {fall: 0.0, **{name: float(np.clip(own[name], -90, 90)) for name in names}}
-    return proposals("shading", names, [n for n in names if n in tilts], **start)
+    start = {_FALL: 0.0, **{name: float(np.clip(own[name], -90, 90)) for name in names}}
+    return proposals("shading", names, [n for n in names if n != _FALL], **start)
 
 
-def _surfaces(shape: tuple[int, ...]) -> Array:
+def _surfaces(shape: tuple[int, ...], names: Sequence[str]) -> Array:
     """Return what shading does to a unit of light for 1 of each number: (surface, pixel)."""
     n, m = shape
     y, x = ((np.arange(size) - (size - 1) / 2) / (size / 2) for size in shape)
     y = y[:, None]
     fall = -((n * y) ** 2 + (m * x) ** 2) / (n**2 + m**2)
-    made = np.stack([np.broadcast_to(one, shape).ravel() for one in (fall, y, x)])
+    every = dict(zip((_FALL, *_BOWED), (fall, y, x, y**2, x**2), strict=True))
+    made = np.stack([np.broadcast_to(every[name], shape).ravel() for name in names])
     return np.asarray(made - made.mean(1, keepdims=True))
 
 

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from analysis.mismatch.candidates import CANDIDATES
 from analysis.mismatch.explain import because, explained
+from analysis.mismatch.feigned import heated
 from analysis.mismatch.finding import (
     Alternative,
     Change,
@@ -100,6 +101,9 @@ def find_mismatch(
         search.setting = replace(setting, nulls=setting.drafts)
         final = _undenied(search, final)  # all frames may deny what some showed
     final, gains = _proven(search, search.settle(final), trial, judged=large)
+    if not large and (denied := _heated(search, final, whole, step)) is not None:
+        final = search.further(search.drop(final, *denied))
+        final, gains = _proven(search, search.settle(final), trial, judged=large)
     proof = trial.proof(search.base, final, step, source)
     evidence = evidence_of(search.base, final, album, split)
     if not large:
@@ -119,6 +123,17 @@ def _of_all_frames(
     """
     layout, seen = trial.numbers.whole
     return State.of(replace(setting, layout=layout, seen=seen), camera, step)
+
+
+def _heated(
+    search: Search, final: State, whole: State, step: Callable[[], None]
+) -> tuple[Named, str] | None:
+    """Return jumping pixels that others deny, which stand out in all frames together; None: not."""
+    jumping = next((one for one in search.named if one.kind == "rts"), None)
+    if jumping is None:
+        return None
+    denial = heated(State.of(whole.setting, final.camera, step), jumping.kind)
+    return None if denial is None else (jumping, denial.why)
 
 
 def _searched(search: Search, source: Source) -> State:

@@ -82,6 +82,17 @@ def test_line_patterns_are_constant_along_their_lines(kind: str, axis: int) -> N
     assert stats.kstest(image.mean(axis), stats.norm(0, 5).cdf).pvalue > P_MIN
 
 
+@pytest.mark.parametrize(("kind", "axis"), [("row_prnu", 1), ("column_prnu", 0)])
+def test_gains_of_lines_are_constant_along_them_and_grow_with_the_signal(
+    kind: str, axis: int
+) -> None:
+    one = effect(kind, sigma_percent=2.0)
+    gains = apply(one, flat(1.0, 1024)) - 1
+    assert np.ptp(gains, axis=axis).max() == 0
+    assert stats.kstest(gains.mean(axis), stats.norm(0, 0.02).cdf).pvalue > P_MIN
+    np.testing.assert_allclose(apply(one, flat(3000, 1024)) / 3000 - 1, gains, atol=1e-6)
+
+
 def test_dsnu_is_an_offset_and_prnu_a_gain() -> None:
     offsets = apply(effect("dsnu", sigma_dn=4.0), flat(0.0))
     np.testing.assert_allclose(

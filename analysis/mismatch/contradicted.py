@@ -14,7 +14,6 @@ from dsis.camera import Camera
 Array = NDArray[np.float64]
 _LEAST_SHARE = 0.5  # of what an effect predicts, that a recording must show
 _SURE = 2.0  # standard errors below it: 3.5 below what the right effect shows
-_OPPOSED = 4.0  # standard deviations beyond nothing, the other way
 _CLEAR = 3.0  # standard deviations: a predicted change that can be seen at all
 
 
@@ -36,36 +35,7 @@ def contradicted(state: State, predictor: Predictor, kind: str, without: Camera)
     difference of the halves, but has no step where they meet; an amplifier glows in the dark too.
     """
     mean = predictor.mean(without)
-    denial = _denied(state, predictor, kind, mean, state.null.mean, state.null.sd)
-    return denial or _opposed(state, kind, mean)
-
-
-def _opposed(state: State, kind: str, without: Array) -> Denial | None:
-    """Return how an effect is denied by a single exposure that shows the opposite; None: by none.
-
-    Memory of the sample before correlates neighbours alike at all signals; a converter that carries
-    its residue over does so at most signals, and the other way where codes step.
-    """
-    if kind not in CANDIDATES:
-        return None
-    null = state.null
-    known = null.known & np.isfinite(without) & np.isfinite(state.vector.values)
-    change = np.where(known, null.mean - np.nan_to_num(without), 0.0) / null.sd
-    left = np.where(known, state.vector.values - null.mean, 0.0) / null.sd
-    shown = (change + left) * np.sign(change)
-    found = [
-        Denial(
-            float(shown[i] / abs(change[i])),
-            f"the recording shows the opposite of what it predicts for {key.exposure} in: "
-            f"{statistic_words(key.statistic)}",
-        )
-        for i, key in enumerate(state.vector.keys)
-        if key.exposure
-        and key.statistic in CANDIDATES[kind].calls
-        and abs(change[i]) > _CLEAR
-        and shown[i] < -_OPPOSED
-    ]
-    return min(found, key=lambda denial: denial.share, default=None)
+    return _denied(state, predictor, kind, mean, state.null.mean, state.null.sd)
 
 
 def refuted(state: State, predictor: Predictor, kind: str, mean: Array) -> Denial | None:

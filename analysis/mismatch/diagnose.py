@@ -178,9 +178,9 @@ def _proven(
         why = f"gains {nats:.3g} nats per locked frame, no more than chance"
         final = search.drop(final, worst, why)
         if not judged and final.mismatches:  # what it hid is looked for
-            named = {one.name for one in search.named}
+            named = list(search.named)
             final = search.further(final)
-            if named != {one.name for one in search.named}:
+            if named != search.named:
                 final = search.settle(final)
 
 

@@ -12,7 +12,8 @@ from dsis.measures.spikes import variance_of_quartiles
 
 Array = NDArray[np.float64]
 _MAPS = {"dsnu": ("offset", "offset alone"), "prnu": ("gain", "gain alone")}
-_AXES = {"row_fpn": "rows", "column_fpn": "columns"}
+_AXES = {"row_fpn": "rows", "column_fpn": "columns", "row_prnu": "rows", "column_prnu": "columns"}
+_GROWING = frozenset({"row_prnu", "column_prnu"})
 _CLEAR = 5.0  # standard errors of what stands out with exposure time
 _SHAPES = 2  # a step and a comb
 _MOST = 0.5  # of a pattern's variance, that something else may feign
@@ -91,7 +92,8 @@ def stepped(state: State, kind: str) -> Denial | None:
     whole, rest = 0.0, 0.0
     images = state.setting.seen.images
     for (channel, name), (image, noise) in images.items():
-        if name != ("offset alone" if (channel, "offset alone") in images else "offset"):
+        own_map = "gain" if kind in _GROWING else "offset"
+        if name != (f"{own_map} alone" if (channel, f"{own_map} alone") in images else own_map):
             continue
         means = (image - image.mean()).mean(1 if axis == "rows" else 0) / noise
         own = beyond_smooth(means)

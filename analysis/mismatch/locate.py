@@ -29,6 +29,7 @@ _FLOORS = {
     "kurtosis_within_pixels": 3e-3,
     "variance_spread": 1e-2,
     "code_imbalance": 2e-3,
+    "carry_over": 1e-2,
     "channel_ratio": 5e-5,
     "level": 1e-3,
 }

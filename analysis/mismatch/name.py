@@ -1,6 +1,6 @@
 """Which physics explains the mismatches: add the best effect, fit all again, look again."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -68,6 +68,7 @@ class Search:
         What was dropped had hidden something: it is looked for once more. An effect that explained
         some of what it changes, while others were missing, may come back.
         """
+        forgiven: dict[str, str] = {}
         for last in (False, True):
             known = len(self.named)
             state = self._sought(state)
@@ -80,16 +81,20 @@ class Search:
             dropped = [one for one in taken if one.name not in kept]
             if last or not dropped or not state.mismatches:
                 break
-            for one in dropped:
-                self._forgive(one)
+            forgiven |= self._forgiven(dropped)
+        left = forgiven.keys() - {one.name for one in self.named}
+        self.refused |= self.doubted | {name: forgiven[name] for name in sorted(left)}
         return state
 
-    def _forgive(self, named: Named) -> None:
-        """Let an effect be proposed again that explained too little of what it changes."""
-        if self.refused.get(named.name, "").startswith(_LITTLE):
-            del self.refused[named.name]
-            line = frequency_of(None if named.proposal is None else named.proposal.effect)
-            self.settled = [one for one in self.settled if one[1] != line]
+    def _forgiven(self, dropped: Sequence[Named]) -> dict[str, str]:
+        """Let effects be proposed again that explained too little of what they change, and why."""
+        found = {}
+        for one in dropped:
+            if self.refused.get(one.name, "").startswith(_LITTLE):
+                found[one.name] = self.refused.pop(one.name)
+                line = frequency_of(None if one.proposal is None else one.proposal.effect)
+                self.settled = [own for own in self.settled if own != (one.kind, line)]
+        return found
 
     def _sought(self, state: State) -> State:
         """Return the state with every effect that the search takes in."""
@@ -102,7 +107,6 @@ class Search:
         if not state.mismatches:
             self.ties = []  # what was undecided on the way is explained
             self.doubted = {}
-        self.refused |= self.doubted
         return state
 
     def _take(self, named: Named) -> None:

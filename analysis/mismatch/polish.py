@@ -17,6 +17,7 @@ Array = NDArray[np.float64]
 STEP = 0.12  # of the logarithm, for the derivative
 _LARGEST = 1.2  # step of a logarithm
 _FREQUENCIES, _CYCLES = frozenset({"cycles_per_frame"}), 0.3  # largest step of those
+_CYCLIC = {"at_code": "period_codes"}
 _SMALL = 0.05  # gain of log-likelihood below which another round is in vain
 Free = tuple[int, str, bool]
 """Number of an effect, name of its parameter, whether it may be negative."""
@@ -186,7 +187,7 @@ def moved(
     effect = effects[which]
     value = float(getattr(effect, name))
     if signed:
-        by = step if as_is else (abs(value) or 1.0) * step
+        by = step if as_is else _size(effect, name) * step
         new = value + by
     else:
         by = step
@@ -196,6 +197,14 @@ def moved(
     except ValidationError:
         return None
     return (*effects[:which], changed, *effects[which + 1 :]), by
+
+
+def _size(effect: Effect, name: str) -> float:
+    """Return what a step of a parameter that may be negative is a share of."""
+    period = _CYCLIC.get(name)
+    if period is not None:  # where zero lies says nothing
+        return float(getattr(effect, period)) / 4
+    return abs(float(getattr(effect, name))) or 1.0
 
 
 def with_effects(camera: Camera, effects: Sequence[Effect]) -> Camera | None:

@@ -28,7 +28,17 @@ _MOVES_Z, _MOVES_SHARE = 6.0, 1e-3  # of the variance: less does not show elsewh
 _LARGEST = 0.998  # quantile from which on gradients count alike: few edges are no law
 # What the mean frame of a scene holds already; simulated once more it would be there twice.
 _IN_THE_PICTURE = frozenset(
-    {"shading", "prnu", "channel_imbalance", "tap_mismatch", "dsnu", "row_fpn", "column_fpn"}
+    {
+        "shading",
+        "prnu",
+        "channel_imbalance",
+        "tap_mismatch",
+        "dsnu",
+        "row_fpn",
+        "column_fpn",
+        "row_prnu",
+        "column_prnu",
+    }
 )
 
 

@@ -55,6 +55,8 @@ EFFECTS = {
     "prnu": "PRNU",
     "row_fpn": "fixed row pattern",
     "column_fpn": "fixed column pattern",
+    "row_prnu": "fixed gains of rows",
+    "column_prnu": "fixed gains of columns",
     "adc_dnl": "ADC non-linearity from code to code",
     "adc_memory": "memory of the ADC's residue",
     "dual_gain": "dual-gain read-out",

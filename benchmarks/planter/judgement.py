@@ -16,6 +16,8 @@ COMPARED: dict[str, tuple[str, ...]] = {
     "read_noise_spread": ("log_sigma",),
     "rts": ("pixel_fraction", "amplitude_dn"),
     "prnu": ("sigma_percent",),
+    "row_prnu": ("sigma_percent",),
+    "column_prnu": ("sigma_percent",),
     "shading": ("falloff_percent",),
     "dark_current": ("dn_per_s",),
     "hot_pixels": ("pixel_fraction", "mean_dn_per_s"),

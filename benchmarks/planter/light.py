@@ -63,6 +63,18 @@ def prnu(signal: Image, p: Mapping[str, Any], view: View) -> Image:
     return signal * (1 + np.float32(p["sigma_percent"] / 100) * gains)
 
 
+def row_prnu(signal: Image, p: Mapping[str, Any], view: View) -> Image:
+    """Give every row a gain."""
+    gains = normal(view.of_sensor("row_prnu"), (view.case.rows, 1))
+    return signal * (1 + np.float32(p["sigma_percent"] / 100) * gains)
+
+
+def column_prnu(signal: Image, p: Mapping[str, Any], view: View) -> Image:
+    """Give every column a gain."""
+    gains = normal(view.of_sensor("column_prnu"), (1, view.case.columns))
+    return signal * (1 + np.float32(p["sigma_percent"] / 100) * gains)
+
+
 def flicker(signal: Image, p: Mapping[str, Any], view: View) -> Image:
     """Scale the frame's light."""
     return signal * np.float32(1 + p["sigma_percent"] / 100 * view.fresh("flicker").normal())
@@ -116,6 +128,8 @@ LIGHT: dict[str, Mechanism] = {
     "channel_imbalance": channel_imbalance,
     "shading": shading,
     "prnu": prnu,
+    "row_prnu": row_prnu,
+    "column_prnu": column_prnu,
     "flicker": flicker,
     "line_flicker": line_flicker,
     "dark_current": dark_current,

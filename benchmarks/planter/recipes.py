@@ -250,6 +250,8 @@ RECIPES: dict[str, Recipe] = {
     "column_fpn": Recipe(_none, _sigma(0.1)),
     "dsnu": Recipe(_none, _sigma(0.3)),
     "prnu": Recipe(_none, _plain("sigma_percent", 0.5), most=10),
+    "row_prnu": Recipe(_none, _plain("sigma_percent", 0.1), most=20),
+    "column_prnu": Recipe(_none, _plain("sigma_percent", 0.1), most=20),
     "shading": Recipe(
         _one_of("law", "quadratic", "cos4"),
         _plain("falloff_percent", 1.0),

@@ -14,7 +14,9 @@ from dsis.errors import Fault, InputError
 from dsis.grid import PixelGrid
 
 MAPS = "maps.npz"
-REPLACED = frozenset({"dsnu", "prnu", "row_fpn", "column_fpn", "shading", "tap_mismatch"})
+REPLACED = frozenset(
+    {"dsnu", "prnu", "row_fpn", "column_fpn", "row_prnu", "column_prnu", "shading", "tap_mismatch"}
+)
 """Effects that draw a pattern which the maps hold as it was measured."""
 
 _DTYPE = np.dtype(np.float32)

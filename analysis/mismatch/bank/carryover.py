@@ -7,7 +7,7 @@ through that code explains is taken off.
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from math import nan, pi, sqrt
 
 import numpy as np
@@ -103,8 +103,9 @@ class CarryOver:
     def _take(self, one: Frame, other: Frame) -> None:
         moved = (one - other).astype(np.float32)
         self.size = {"rows": one.shape[1], "columns": one.shape[0]}
-        for k, axis in enumerate(AXES):
-            still = moved - moved.mean(1 - k, keepdims=True)  # whole lines move for other reasons
+        # Whole lines move for other reasons.
+        still = moved - moved.mean(1, keepdims=True) - moved.mean(0) + moved.mean()
+        for axis in AXES:
             down, right = _BEFORE[axis]
             every = max(one.size // _SAMPLES, 1) | 1  # odd: no colour is left out
             _add(one, other, still, down, right, every, self.by_code[axis], self.squares[axis])
@@ -188,7 +189,7 @@ class CarryOverSums:
         return found
 
 
-@cache
+@lru_cache(maxsize=4)
 def sawteeth(samples: tuple[Samples, ...]) -> tuple[Sawtooth, ...]:
     """Return for each of `PERIODS` the sawtooth that explains most, by least squares."""
     found = []

@@ -9,7 +9,7 @@ from analysis.mismatch.candidates.candidate import Candidate, Proposal, proposal
 from analysis.mismatch.clues import Clues, alike
 
 _ALONG_ROWS, _ALONG_COLUMNS = "correlation_0_1", "correlation_1_0"
-_RESIDUES = 3  # that are tried: of few levels, periods are much alike
+_AS_LIKELY = 8.0  # of chi-squared, odds of 50: of few levels, periods may be alike
 _NEAR = (_ALONG_ROWS, _ALONG_COLUMNS, "line_correlation", "pixel_variance")
 
 
@@ -77,8 +77,11 @@ def _memory(clues: Clues) -> Sequence[Proposal]:
 def _converter(clues: Clues) -> Sequence[Proposal]:
     """Propose the residues, of either direction, that explain most of what samples carry over."""
     tried = [(axis, one) for axis, own in clues.seen.carried.items() for one in sawteeth(own)]
+    best = max((one.chi2 for _, one in tried), default=0.0)
     found: list[Proposal] = []
-    for axis, own in sorted(tried, key=lambda one: -one[1].chi2)[:_RESIDUES]:
+    for axis, own in tried:
+        if own.chi2 <= 0 or own.chi2 < best - _AS_LIKELY:
+            continue
         found += proposals(
             "adc_memory",
             ["step_dn", "at_code"],

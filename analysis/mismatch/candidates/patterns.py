@@ -34,11 +34,14 @@ def _squared(clues: Clues) -> Callable[[Place], float]:
     return lambda place: clues.signal(place) ** 2
 
 
-def _prnu(clues: Clues) -> Sequence[Proposal]:
-    variance, _ = clues.amplitude("fixed_pixel_variance", _squared(clues))
-    if variance <= 0:
-        return []
-    return proposals("prnu", ["sigma_percent"], sigma_percent=100 * sqrt(variance))
+def _gains(kind: str, statistic: str) -> Candidate:
+    def propose(clues: Clues) -> Sequence[Proposal]:
+        variance, _ = clues.amplitude(statistic, _squared(clues))
+        if variance <= 0:
+            return []
+        return proposals(kind, ["sigma_percent"], sigma_percent=min(100 * sqrt(variance), 90.0))
+
+    return Candidate(kind, (statistic,), propose)
 
 
 def _shading(clues: Clues) -> Sequence[Proposal]:
@@ -50,21 +53,18 @@ def _shading(clues: Clues) -> Sequence[Proposal]:
     found: list[Proposal] = []
     for names in ([_FALL], leaning, [_FALL, *leaning] if leaning else []):
         found += _of_light(round_, names)
-    bowed, clear = _fitted(clues, _BOWED, max(round_[_FALL], 0.0))
-    if clear & set(_BOWS):  # beyond what a fall to the corners is
-        bowed, clear = _fitted(clues, _BOWED)
+    bowed, clear = _fitted(clues, _BOWED)
+    if any(name in clear and bowed[name] > 0 for name in _BOWS):  # no fall rises to the ends
         found += _of_light(bowed, [name for name in _BOWED if name in clear])
     return found
 
 
-def _fitted(
-    clues: Clues, names: Sequence[str], fall_percent: float = 0.0
-) -> tuple[dict[str, float], set[str]]:
-    """Return what the gain has of each surface beyond a fall, per cent, and which are clear."""
+def _fitted(clues: Clues, names: Sequence[str]) -> tuple[dict[str, float], set[str]]:
+    """Return what the gain has of each surface, per cent, and which are clear."""
     values, errors = np.zeros(len(names)), np.zeros(len(names))
     images = clues.image("gain")
     for channel, (image, noise) in images.items():
-        surfaces, had = _surfaces(image.shape, names), _had(clues, image.shape, fall_percent)
+        surfaces, had = _surfaces(image.shape, names), _had(clues, image.shape)
         inverse = np.linalg.inv(surfaces @ surfaces.T)
         scale = 100 / clues.scale("gain", channel) / len(images)
         rest = scale * (image - image.mean()).ravel() - had / len(images)
@@ -85,12 +85,11 @@ def _of_strength(clues: Clues) -> Sequence[Proposal]:
     return _of_light({_FALL: 100 * sqrt(variance / spread)}, (_FALL,))
 
 
-def _had(clues: Clues, shape: tuple[int, ...], fall_percent: float) -> Array:
-    """Return what the camera's own shading, and a fall besides, do to the light, per cent."""
+def _had(clues: Clues, shape: tuple[int, ...]) -> Array:
+    """Return what the camera's own shading does to the light, per cent."""
     names = (_FALL, *_BOWED)
     own = [e.model_dump() for e in clues.camera.effect if e.kind == "shading"]
     values = np.array([sum(effect[name] for effect in own) for name in names], float)
-    values[0] += fall_percent
     return np.asarray(values @ _surfaces(shape, names))
 
 
@@ -247,7 +246,9 @@ CANDIDATES = (
     _constant("dsnu", "fixed_pixel_variance"),
     _constant("row_fpn", "fixed_row_variance"),
     _constant("column_fpn", "fixed_column_variance"),
-    Candidate("prnu", ("fixed_pixel_variance",), _prnu),
+    _gains("prnu", "fixed_pixel_variance"),
+    _gains("row_prnu", "fixed_row_variance"),
+    _gains("column_prnu", "fixed_column_variance"),
     Candidate("shading", _SMOOTH, _shading),
     Candidate("tap_mismatch", ("half_seam", "parity", "channel_ratio", *_SMOOTH), _taps),
     Candidate("channel_imbalance", ("channel_ratio",), _imbalance),

@@ -48,6 +48,8 @@ EVIDENCE: dict[str, Callable[[Look, Parameters], Evidence]] = {
     "column_noise": lambda look, _: temporal.columns(look),
     "row_fpn": lambda look, _: maps.lines(look, 1),
     "column_fpn": lambda look, _: maps.lines(look, 0),
+    "row_prnu": lambda look, _: maps.lines(look, 1, "gain", "offset"),
+    "column_prnu": lambda look, _: maps.lines(look, 0, "gain", "offset"),
     "dsnu": lambda look, _: maps.pixels(look, "offset", "gain"),
     "prnu": lambda look, _: maps.pixels(look, "gain", "offset"),
     "shading": lambda look, p: maps.along(

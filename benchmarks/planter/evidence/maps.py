@@ -45,9 +45,9 @@ def pixels(look: Look, wanted: str, *free: str) -> Evidence:
     return _of(look, wanted, free, lambda m: np.var(m - m.mean(0) - m.mean(1)[:, None]))
 
 
-def lines(look: Look, axis: int) -> Evidence:
-    """Return the variance of fixed offsets of lines; axis 1 means rows."""
-    return _of(look, "offset", ("gain",), lambda m: np.var(m.mean(axis)))
+def lines(look: Look, axis: int, wanted: str = "offset", free: str = "gain") -> Evidence:
+    """Return the variance of fixed offsets, or gains, of lines; axis 1 means rows."""
+    return _of(look, wanted, (free,), lambda m: np.var(m.mean(axis)))
 
 
 def outliers(look: Look, wanted: str, *free: str) -> Evidence:

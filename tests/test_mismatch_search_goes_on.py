@@ -1,0 +1,130 @@
+"""What a dropped effect had hidden is looked for once more, and nothing known is lost thereby."""
+
+from types import SimpleNamespace as Stub
+from typing import Any
+
+import pytest
+
+import analysis.mismatch.name as search_module
+from analysis.mismatch.diagnose import _proven
+from analysis.mismatch.name import Search
+from analysis.mismatch.named import Named
+
+OPEN = Stub(mismatches=["something"])
+
+
+def _named(kind: str, **errors: float) -> Named:
+    return Named(kind, None, errors, 1.0, ())
+
+
+class Scripted(Search):
+    """A search that takes what a script says, and prunes `wrong` for a given reason."""
+
+    def _best(self, _state: Any) -> Any:
+        self.seen.append(self._left())
+        self.doubted = {}
+        for kind in self.script:
+            if kind in self._left():
+                if kind in self.doubts and any(n.kind == "wrong" for n in self.named):
+                    self.doubted = {kind: "denied beside the wrong one"}
+                    continue
+                return _named(kind), None
+        return None
+
+    def _take(self, named: Named) -> None:
+        self.named.append(named)
+
+    def _polished(self, state: Any) -> Any:
+        return state
+
+    def _pruned(self, state: Any) -> Any:
+        for one in [n for n in self.named if n.kind == "wrong" and not self.pruned]:
+            self.named.remove(one)
+            self.refused["wrong"] = self.why
+            self.pruned = True
+        return state
+
+
+def _search(monkeypatch: pytest.MonkeyPatch, why: str, *script: str, **more: Any) -> Scripted:
+    monkeypatch.setattr(search_module, "State", Stub(of=lambda *_, **__: OPEN))
+    setting: Any = Stub(drafts=16, layout=None)
+    base: Any = OPEN
+    camera: Any = None
+    made = Scripted(setting, camera, base, frozenset(script), step=lambda: None)
+    made.script, made.seen, made.pruned = script, [], False  # type: ignore[attr-defined] # its own
+    made.why, made.doubts = why, more.get("doubts", ())  # type: ignore[attr-defined] # its own
+    return made
+
+
+def test_what_was_doubted_beside_a_wrong_effect_is_tried_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    search = _search(monkeypatch, "denied", "wrong", "right", doubts=("right",))
+    search.run()
+    assert [n.kind for n in search.named] == ["right"]
+    assert search.refused == {"wrong": "denied"}
+
+
+def test_an_effect_that_explained_too_little_may_come_back(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    search = _search(monkeypatch, "it would explain 60% of what it changes", "wrong", "other")
+    search.run()
+    assert sorted(n.kind for n in search.named) == ["other", "wrong"]
+    assert search.refused == {}
+
+
+def test_an_effect_that_was_denied_does_not_come_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    search = _search(monkeypatch, "the recording shows 0% of it", "wrong", "other")
+    search.run()
+    assert [n.kind for n in search.named] == ["other"]
+    assert list(search.refused) == ["wrong"]
+
+
+class Proving:
+    """A search of which one effect is weak; what it finds then renews the other's numbers."""
+
+    def __init__(self, after: list[Named]) -> None:
+        self.named, self.after = [_named("kept", x=1.0), _named("weak")], after
+        self.calls: list[str] = []
+
+    def fitted_without(self, *_: Any) -> None:
+        return None
+
+    def denied(self, _state: Any) -> None:
+        return None
+
+    def drop(self, _state: Any, named: Named, _why: str) -> Any:
+        self.named.remove(named)
+        return OPEN
+
+    def further(self, state: Any) -> Any:
+        self.named = self.after
+        self.calls.append("further")
+        return state
+
+    def settle(self, state: Any) -> Any:
+        self.calls.append("settle")
+        return state
+
+
+@pytest.mark.parametrize(
+    ("after", "calls"),
+    [
+        ([_named("kept", x=1.0)], ["further"]),
+        ([_named("kept", x=99.0)], ["further", "settle"]),
+        ([_named("kept", x=1.0), _named("found")], ["further", "settle"]),
+    ],
+)
+def test_numbers_are_settled_where_the_search_has_touched_them(
+    after: list[Named], calls: list[str]
+) -> None:
+    search: Any = Proving(after)
+    gains = Stub(
+        gains=lambda _state, without: {
+            name: Stub(certain=name != "weak", gain=Stub(nats_per_frame=1.0)) for name in without
+        }
+    )
+    trial: Any = gains
+    _proven(search, OPEN, trial, judged=False)
+    assert search.calls == calls

@@ -83,22 +83,32 @@ def test_memory_in_proportion_is_none_of_the_code(share: float) -> None:
     assert max(abs(v / e) for v, e in numbers.values() if np.isfinite(v)) < 4.5
 
 
-def test_lines_and_frames_that_move_are_none_either() -> None:
-    rng = np.random.default_rng(3)
-    levels = [
-        frames * (1 + 0.01 * rng.standard_normal((SHAPE[0], 1, 1)))
-        + sd * rng.standard_normal((SHAPE[0], SHAPE[1], 1))
-        for frames, (_, sd) in zip(_white(8), LEVELS, strict=True)
-    ]
-    numbers, _ = _observed(levels)
-    # A line's own move spoils the squares, not the mean: their scatter is wider than white noise's.
-    assert max(abs(v / e) for v, e in numbers.values() if np.isfinite(v)) < 6
+@pytest.mark.parametrize("shape", [(6, 60, 80), (4, 60, 400), (4, 200, 100)])
+@pytest.mark.parametrize("share", [1.0, 3.0])
+def test_lines_and_frames_that_move_are_none_either(
+    shape: tuple[int, int, int], share: float
+) -> None:
+    """Row noise as strong as the pixels' or stronger, and light that flickers by 3 %."""
+    z = []
+    for seed in range(6):
+        rng = np.random.default_rng([seed, *shape])
+        levels = [
+            mean * (1 + 0.03 * rng.standard_normal((shape[0], 1, 1)))
+            + sd * rng.standard_normal(shape)
+            + share * sd * rng.standard_normal((*shape[:2], 1))
+            for mean, sd in LEVELS
+        ]
+        numbers, _ = _observed(levels)
+        z += [value / error for value, error in numbers.values() if np.isfinite(value)]
+    assert len(z) > 100
+    assert np.std(z) < 1.1
+    assert np.max(np.abs(z)) < 4.5
 
 
 def test_a_residue_is_found_with_its_period_step_and_place() -> None:
     numbers, samples = _observed([_carrying(frames) for frames in _white(9)])
     z = {name: abs(v / e) for name, (v, e) in numbers.items() if np.isfinite(v)}
-    assert max(z.values()) > 10
+    assert max(z.values()) > 8
     assert max(v for name, v in z.items() if "along columns" in name) < 4.5
     best = max(sawteeth(tuple(samples)), key=lambda one: one.chi2)
     assert best.period == PERIOD

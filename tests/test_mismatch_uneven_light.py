@@ -1,10 +1,19 @@
 """Light that is uneven: a fall to the corners, tilts, bows; no amplifier, no glow."""
 
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
+
 import pytest
+from planter import Choice, draw_case, plant
+from planter.case import Effect as Planted
 
 from analysis.mismatch import find_mismatch
 from analysis.mismatch.diagnose import VOCABULARY
+from dsis.camera import read_camera
 from dsis.effects import registry
+from dsis.recording import read_recording
 from mismatch_recordings import camera, recorded
 
 FALL, DOWN, RIGHT, BOW = 2.0, -1.5, 1.0, 1.5
@@ -49,3 +58,21 @@ def test_two_amplifiers_that_have_no_word_are_no_tilt_of_the_light() -> None:
     found = find_mismatch(camera(), recorded(camera(taps), 9), seed=1, vocabulary=words)
     assert not found.omitted_physics
     assert found.verdict == "unexplained"
+
+
+def test_the_fall_of_a_lens_is_a_fall_and_no_bow(tmp_path: Path) -> None:
+    """cos^4 has more than r^2, which two bows would fit better: they are not proposed."""
+    choice = Choice(cfa="MONO", segments=1, light=True, times="darks")
+    planted = Planted("shading", {"falloff_percent": 20.0, "law": "cos4"})
+    plant(tmp_path, draw_case(5, "small", choice).having(planted))
+    found = find_mismatch(
+        read_camera(tmp_path / "camera.toml"),
+        read_recording(tmp_path),
+        seed=1,
+        vocabulary=frozenset({"shading", "prnu", "tap_mismatch", "amp_glow"}),
+    )
+    (named,) = found.omitted_physics
+    assert named.effect == "shading"
+    values = {name: parameter.value for name, parameter in named.parameters.items()}
+    assert 16 < values["falloff_percent"] < 24  # type: ignore[operator] # one number
+    assert values["bow_down_percent"] == values["bow_right_percent"] == 0

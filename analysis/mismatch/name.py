@@ -27,7 +27,7 @@ from dsis.effects import Effect
 Array = NDArray[np.float64]
 Step = Callable[[], None]
 LEAST_GAIN = 2.0  # of log-likelihood, for an effect to be taken in where something is located
-_MOST_EFFECTS = 10  # some may have to go again
+_MOST_EFFECTS = 14  # some may have to go again
 _MOST_LINES = 3  # further ones stay unexplained, located
 _PHASES = {
     "periodic_noise": "the pattern's phase is the same in all frames but for its sign",

@@ -162,9 +162,3 @@ def test_it_is_named_with_its_numbers(tmp_path: Path, cfa: str) -> None:
         parameter = own.parameters[name]
         assert abs(parameter.value - truth) < 4 * parameter.standard_error  # type: ignore[operator] # fitted
     assert own.heldout_gain.ci95[0] > 0
-
-
-def test_without_a_word_for_it_nothing_else_is_named(tmp_path: Path) -> None:
-    _, found = _found(tmp_path, "MONO", *RIVALS)
-    assert not found.omitted_physics
-    assert {"correlation_0_1", "level"} <= {m.statistic for m in found.unexplained}

@@ -1,6 +1,6 @@
 """Effects that the very statistics which call for them deny."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from dsis.camera import Camera
 Array = NDArray[np.float64]
 _LEAST_SHARE = 0.5  # of what an effect predicts, that a recording must show
 _SURE = 2.0  # standard errors below it: 3.5 below what the right effect shows
+ALONE = " alone"
 _CLEAR = 3.0  # standard deviations: a predicted change that can be seen at all
 
 
@@ -59,7 +60,12 @@ def _denied(
     left = np.where(known, state.vector.values - np.nan_to_num(mean), 0.0) / sd
     darks = {e.name for e in state.setting.layout.exposures if e.kind == "dark"}
     groups: dict[tuple[str, str, str, bool], list[int]] = {}
+    maps = {key: bool(clear[i]) for i, key in enumerate(state.vector.keys) if known[i]}
     for i, key in enumerate(state.vector.keys):
+        # As if there were no other, a map has what is another's: of an effect that the map itself
+        # does not show it says nothing.
+        if not maps.get(replace(key, scope=key.scope.removesuffix(ALONE)), True):
+            continue
         if clear[i] and key.statistic in CANDIDATES[kind].calls:
             dark = key.exposure in darks
             groups.setdefault((key.statistic, key.scope, key.detail, dark), []).append(i)

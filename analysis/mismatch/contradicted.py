@@ -14,7 +14,7 @@ from dsis.camera import Camera
 Array = NDArray[np.float64]
 _LEAST_SHARE = 0.5  # of what an effect predicts, that a recording must show
 _SURE = 2.0  # standard errors below it: 3.5 below what the right effect shows
-ALONE = " alone"
+_ALONE = " alone"
 _CLEAR = 3.0  # standard deviations: a predicted change that can be seen at all
 
 
@@ -64,7 +64,7 @@ def _denied(
     for i, key in enumerate(state.vector.keys):
         # As if there were no other, a map has what is another's: of an effect that the map itself
         # does not show it says nothing.
-        if not maps.get(replace(key, scope=key.scope.removesuffix(ALONE)), True):
+        if not maps.get(replace(key, scope=key.scope.removesuffix(_ALONE)), True):
             continue
         if clear[i] and key.statistic in CANDIDATES[kind].calls:
             dark = key.exposure in darks

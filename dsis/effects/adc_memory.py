@@ -1,12 +1,11 @@
 """Memory of the converter: a conversion carries over the residue of the one before."""
 
-from collections.abc import Mapping
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
 
-from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, Stage
+from dsis.effects.effect import Effect, Exposure, Image, Stage
 
 
 class AdcMemory(Effect):
@@ -59,8 +58,3 @@ class AdcMemory(Effect):
     def reach_pixels(self) -> int:
         """Return how far away a pixel may matter."""
         return 1
-
-    def contributions(self, point: OperatingPoint) -> Mapping[str, float]:
-        """Return nothing: it depends on where the codes of the steps lie to the black level."""
-        del point
-        return {}

@@ -30,12 +30,11 @@ class RowPrnu(Effect):
     def apply(self, image: Image, exposure: Exposure) -> Image:
         """Multiply each row by its gain."""
         gains = exposure.sensor.rows("row_prnu", exposure.grid)
-        factors = np.float32(1) + np.float32(self.sigma_percent / 100) * gains
-        return image * factors.reshape((-1,) + (1,) * (image.ndim - 1))
+        return image * _factors(gains, self.sigma_percent, (-1,) + (1,) * (image.ndim - 1))
 
     def contributions(self, point: OperatingPoint) -> Mapping[str, float]:
         """Return (sigma S)^2 for the fixed row variance."""
-        return {"fixed_row_variance": (self.sigma_percent / 100 * point.signal_dn) ** 2}
+        return {"fixed_row_variance": _spread_dn2(self.sigma_percent, point)}
 
 
 class ColumnPrnu(Effect):
@@ -59,9 +58,16 @@ class ColumnPrnu(Effect):
     def apply(self, image: Image, exposure: Exposure) -> Image:
         """Multiply each column by its gain."""
         gains = exposure.sensor.columns("column_prnu", exposure.grid)
-        factors = np.float32(1) + np.float32(self.sigma_percent / 100) * gains
-        return image * factors.reshape((1, -1) + (1,) * (image.ndim - 2))
+        return image * _factors(gains, self.sigma_percent, (1, -1) + (1,) * (image.ndim - 2))
 
     def contributions(self, point: OperatingPoint) -> Mapping[str, float]:
         """Return (sigma S)^2 for the fixed column variance."""
-        return {"fixed_column_variance": (self.sigma_percent / 100 * point.signal_dn) ** 2}
+        return {"fixed_column_variance": _spread_dn2(self.sigma_percent, point)}
+
+
+def _factors(gains: Image, sigma_percent: float, shape: tuple[int, ...]) -> Image:
+    return (np.float32(1) + np.float32(sigma_percent / 100) * gains).reshape(shape)
+
+
+def _spread_dn2(sigma_percent: float, point: OperatingPoint) -> float:
+    return (sigma_percent / 100 * point.signal_dn) ** 2

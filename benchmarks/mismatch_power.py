@@ -54,7 +54,8 @@ def judged(task: dict[str, Any]) -> dict[str, Any]:
     folder = Path(task["work"]) / f"power-{kind}-{task['z']}-{task['number']}"
     try:
         plant(folder, planting.case)
-        values = diagnose(folder, finder=task["finder"], seed=task["number"])
+        words = [] if task["locate_only"] else None
+        values = diagnose(folder, finder=task["finder"], seed=task["number"], vocabulary=words)
     finally:
         shutil.rmtree(folder, ignore_errors=True)
     suits, placed = located(planting.case, kind, values.get("mismatches", []))
@@ -118,12 +119,18 @@ def main() -> None:
     parser.add_argument("--repeats", type=int, default=3, help="cases per effect and strength")
     parser.add_argument("--only", nargs="*", choices=sorted(KINDS), help="these effects")
     parser.add_argument("--strengths", type=float, nargs="*", default=STRENGTHS)
+    parser.add_argument("--locate-only", action="store_true", help="name nothing, which is faster")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--work", type=Path, default=Path(gettempdir()) / "dsis-power")
     parser.add_argument("--finder", default=FINDER)
     options = parser.parse_args()
-    common = {"work": str(options.work), "seed": options.seed, "finder": options.finder}
+    common = {
+        "work": str(options.work),
+        "seed": options.seed,
+        "finder": options.finder,
+        "locate_only": options.locate_only,
+    }
     tasks = {
         f"{kind}-{z:g}-{options.seed}-{i}": {**common, "kind": kind, "z": z, "number": i}
         for kind in options.only or sorted(KINDS)

@@ -176,6 +176,14 @@ def test_command_writes_a_model_that_simulates(
     assert mean[:, 12:].mean() / mean[:, :12].mean() == pytest.approx(1.5, abs=5 * 1.5 * 0.005)
 
 
+def test_locating_only_looks_for_no_physics(
+    recording: Path, model: Path, searches: list[dict[str, Any]], tmp_path: Path
+) -> None:
+    out = str(tmp_path / "out")
+    assert main(["mismatch", str(model), str(recording), "-o", out, "--locate-only"]) == 0
+    assert searches[0]["vocabulary"] == frozenset()
+
+
 @pytest.mark.parametrize("finding", [FOUND, NOTHING])
 def test_status_is_0_whatever_is_found(
     finding: Finding,

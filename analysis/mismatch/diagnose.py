@@ -40,6 +40,7 @@ from dsis.recording import Recording
 Progress = Callable[[int, int, str], None]
 VOCABULARY = frozenset({*CANDIDATES, "dual_gain"})
 _NEAR = 8.0  # of log-likelihood: a rival worth naming a recording that would decide
+_LOCATED = "No physics was looked for: it is only said where recording and model differ."
 _LARGE = 2.5e7  # samples from which fewer simulations must do
 
 
@@ -81,6 +82,7 @@ def find_mismatch(
     setting = Setting(layout, seen, split.interpolated, seed, jobs, *counts)
     base = State.of(setting, camera, step)
     words = VOCABULARY if vocabulary is None else vocabulary & VOCABULARY
+    remarks = remarks if words else (*remarks, _LOCATED)
 
     def frames_of(name: str) -> Iterator[NDArray[np.uint16]]:
         return source.frames(name, numbers[name])

@@ -38,6 +38,7 @@ def diagnose_recordings(
     seed: int = 0,
     jobs: int = 1,
     without: Sequence[str] = (),
+    locate_only: bool = False,
     scheduler: str | None = None,
     progress: Progress | None = None,
 ) -> tuple[Diagnosis, ...]:
@@ -60,6 +61,8 @@ def diagnose_recordings(
         Address of a Dask scheduler whose workers see the same files; see `dsis.workers`.
     without
         Effects that must not be named.
+    locate_only
+        Whether to say where they differ, and to look for no physics.
     progress
         Told (done, total, doing).
 
@@ -69,7 +72,7 @@ def diagnose_recordings(
         A file, an option or `out` cannot be used: all faults of files and options at once.
     """
     camera, opened = _read(camera_file, recordings, _unknown(without))
-    allowed = VOCABULARY - set(without) if without else None
+    allowed = VOCABULARY - set(VOCABULARY if locate_only else without)
     maps = _maps(camera_file)
     folders = _folders(opened, out)
     found: dict[str, Finding] = {}
@@ -94,7 +97,7 @@ def _found(
     camera: Camera,
     recordings: Mapping[str, Recording],
     how: tuple[int, int, str | None],
-    allowed: frozenset[str] | None,
+    allowed: frozenset[str],
     progress: Progress | None,
 ) -> Iterator[tuple[str, Finding]]:
     """Yield the finding of each recording: one by one, or side by side in processes.
@@ -126,7 +129,7 @@ def _found(
 
 
 def _finding(
-    camera: Camera, seed: int, allowed: frozenset[str] | None, named: tuple[str, Recording]
+    camera: Camera, seed: int, allowed: frozenset[str], named: tuple[str, Recording]
 ) -> Finding:
     return find_mismatch(camera, named[1], seed=seed, vocabulary=allowed)
 

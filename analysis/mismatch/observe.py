@@ -20,6 +20,7 @@ from analysis.mismatch.bank.parts import Parts, parts
 from analysis.mismatch.bank.persistent import VarianceSums
 from analysis.mismatch.bank.scalars import NAMES, UNKNOWN, Number, scalars
 from analysis.mismatch.bank.together import together
+from analysis.mismatch.bank.waves import Waves, WaveSums
 from analysis.mismatch.layout import Layout, Place
 from analysis.mismatch.scenes import Local
 from dsis.measures import Accumulator, Channel, Measured
@@ -139,6 +140,48 @@ class _Channel:
         self.spectra.add(channel, frames, variance_dn2, signal_dn)
 
 
+class _Whole:
+    """Sums over exposures of what all channels of the sensor show together."""
+
+    def __init__(self, layout: Layout, *, keep: bool) -> None:
+        self.layout, self.keep = layout, keep
+        self.mosaic = len(layout.sites) > 1
+        self.shape, self.step = (layout.rows, layout.columns), 1 + self.mosaic
+        self.common: dict[str, Mapping[str, Number]] = {}
+        self.bands = Bands(layout.rows, layout.sites)
+        self.waves = WaveSums(self.shape, self.step)
+        self.memory = CarryOverSums()
+
+    def measured(
+        self, exposure: str, frames: int, seen: Iterable[NDArray[np.generic]], *, still: bool
+    ) -> Measured:
+        """Return the measures of an exposure's frames; take what moves in them, unless `still`."""
+        lines, after = Waves(self.shape, self.step), CarryOver(keep=self.keep)
+        found = measure(self.layout, after.watching(lines.watching(seen)))
+        self.memory.add(after, still=still)
+        if not still:
+            places = {name: (exposure, name) for name in found.channels}
+            expected = {name: self.layout.variance_dn2[place] for name, place in places.items()}
+            self.waves.add(lines, found.channels, expected)
+            if self.mosaic:
+                signals = {name: self.layout.signal_dn[place] for name, place in places.items()}
+                sites = self.layout.sites
+                self.common[exposure] = common(found.channels, signals, frames, sites)
+                self.bands.add(found.channels, expected, signals, frames)
+        return found
+
+    def numbers(self) -> dict[str, Number]:
+        """Return spectra and memories of the whole sensor."""
+        own = self.bands.numbers() if self.mosaic else {}
+        return {**own, **self.memory.numbers(), "spectral_peak": self.waves.number()}
+
+    def peaks(self) -> dict[str, Peak]:
+        """Return where its spectra are largest, by kind."""
+        own = self.bands.peaks() if self.mosaic else {}
+        peak = self.waves.peak()
+        return own if peak is None else {**own, "spectrum": peak}
+
+
 def observe(
     layout: Layout, frames_of: Frames, watch: Watcher | None = None, *, keep: bool = False
 ) -> Observation:
@@ -158,22 +201,14 @@ def observe(
     levels: dict[Place, Level] = {}
     found: dict[Place, Mapping[str, Number]] = {}
     sums: dict[str, _Channel] = {}
-    shared: dict[str, Mapping[str, Number]] = {}
-    bands = Bands(layout.rows, layout.sites)
-    memory = CarryOverSums()
+    whole = _Whole(layout, keep=keep)
     for exposure in layout.uniform:
-        many, after = Bulk.of(layout, exposure.name), CarryOver(keep=keep)
-        measured = measure(layout, after.watching(many.watching(frames_of(exposure.name))))
+        many, frames = Bulk.of(layout, exposure.name), len(exposure.numbers)
+        still = {name for name in layout.channels if (exposure.name, name) in layout.still}
+        seen = many.watching(frames_of(exposure.name))
+        measured = whole.measured(exposure.name, frames, seen, still=bool(still))
         if watch is not None:
             watch(exposure.name, measured)
-        frames = len(exposure.numbers)
-        still = {name for name in measured.channels if (exposure.name, name) in layout.still}
-        memory.add(after, still=bool(still))
-        if len(measured.channels) > 1 and not still:
-            signals = {name: layout.signal_dn[exposure.name, name] for name in measured.channels}
-            shared[exposure.name] = common(measured.channels, signals, frames, layout.sites)
-            expected = {name: layout.variance_dn2[exposure.name, name] for name in signals}
-            bands.add(measured.channels, expected, signals, frames)
         for name, channel in measured.channels.items():
             place = (exposure.name, name)
             level = _level(channel, frames)
@@ -192,35 +227,36 @@ def observe(
             found[place] = scalars(channel, frames)
             variance, signal = layout.variance_dn2[place], layout.signal_dn[place]
             sums[name].add(exposure.name, channel, frames, variance, signal)
-    local = _scenes(layout, frames_of, watch, found, shared)
+    local = _scenes(layout, frames_of, watch, found, whole.common)
     maps, images = _maps(layout, sums)
-    spectra = {name: own.spectra for name, own in sums.items()}
-    if len(spectra) > 1:  # what all channels of a mosaic show
-        spectra[""] = SpectrumSums.merged(list(spectra.values()))
-    pooled = {name: own.variances.numbers() for name, own in sums.items()}
-    found_peaks = {
-        (name, kind): peak for name, own in spectra.items() for kind, peak in own.peaks()
-    }
-    found_pooled = {
-        name: {**pooled.get(name, {}), **own.numbers()} for name, own in spectra.items()
-    }
-    if len(layout.sites) > 1:
-        found_peaks |= {("", kind): peak for kind, peak in bands.peaks().items()}
-        found_pooled.setdefault("", {}).update(bands.numbers())
-    found_pooled.setdefault("" if len(layout.sites) > 1 else layout.channels[0], {}).update(
-        memory.numbers()
-    )
+    pooled, peaks = _pooled(sums, whole)
     return Observation(
         levels,
         found,
         maps,
-        found_pooled,
-        found_peaks,
+        pooled,
+        peaks,
         images if keep else {},
-        shared,
+        whole.common,
         local,
-        memory.samples,
+        whole.memory.samples,
     )
+
+
+def _pooled(
+    sums: Mapping[str, _Channel], whole: _Whole
+) -> tuple[dict[str, Mapping[str, Number]], dict[tuple[str, str], Peak]]:
+    """Return spectra and persistent variances, and where spectra are largest; "": a mosaic's."""
+    spectra = {name: own.spectra for name, own in sums.items()}
+    if len(spectra) > 1:  # what all channels of a mosaic show
+        spectra[""] = SpectrumSums.merged(list(spectra.values()))
+    persistent = {name: own.variances.numbers() for name, own in sums.items()}
+    pooled = {name: {**persistent.get(name, {}), **own.numbers()} for name, own in spectra.items()}
+    peaks = {(name, kind): peak for name, own in spectra.items() for kind, peak in own.peaks()}
+    all_of_it = "" if whole.mosaic else whole.layout.channels[0]
+    pooled.setdefault(all_of_it, {}).update(whole.numbers())
+    peaks |= {(all_of_it, kind): peak for kind, peak in whole.peaks().items()}
+    return dict(pooled), peaks
 
 
 def _scenes(

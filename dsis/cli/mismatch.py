@@ -24,6 +24,8 @@ def add_mismatch(add: Add) -> None:
     sub.add_argument(
         "--without", nargs="+", action="extend", default=[], metavar="EFFECT", help=without
     )
+    only = "say where they differ and stop: no physics is looked for"
+    sub.add_argument("--locate-only", action="store_true", help=only)
     add_jobs(sub)
     add_scheduler(sub)
     add_seed(sub, "default: 0")
@@ -42,6 +44,7 @@ def mismatch(options: argparse.Namespace) -> None:
             seed=options.seed or 0,
             jobs=options.jobs,
             without=options.without,
+            locate_only=options.locate_only,
             scheduler=options.scheduler,
             progress=progress,
         )

@@ -135,8 +135,8 @@ class SpectrumSums:
         """Return the line about a bin off the axes, between bins."""
         n, m = self.shape
         inner = power[1:, 1:]
-        fx = _frequency(x + _within_bin(inner[y - 1], x - 1), m)
-        fy = _frequency(y + _within_bin(inner[:, x - 1], y - 1), n)
+        fx = frequency(x + _within_bin(inner[y - 1], x - 1), m)
+        fy = frequency(y + _within_bin(inner[:, x - 1], y - 1), n)
         fy -= float(fy > 1 / 2)
         return Peak(float(fx), float(fy), float(power[y, x]))
 
@@ -165,9 +165,7 @@ class SpectrumSums:
 
     def _white(self) -> float:
         """Return the power of a bin of white noise: from the median, that lines do not raise."""
-        degrees = max(round(self.degrees("")), 1)
-        middle = float(gammaincinv(degrees, 0.5)) / degrees
-        return float(np.median(self.power[1:, 1:])) / middle
+        return white_level(self.power[1:, 1:], max(round(self.degrees("")), 1))
 
     def row_peak(self, key: str) -> Peak | None:
         """Return where the spectrum of row means is largest."""
@@ -255,10 +253,10 @@ def largest_line(power: Array, degrees: float) -> Number:
 def line_top(power: Array) -> tuple[float, float, float]:
     """Return cycles a frame of the largest of half bins, what is beyond it, and its power."""
     place = int(power[2:].argmax())
-    return place / 2 + 1, _top(power[2:], place) / 2, float(power[place + 2])
+    return place / 2 + 1, top(power[2:], place) / 2, float(power[place + 2])
 
 
-def _top(power: Array, place: int) -> float:
+def top(power: Array, place: int) -> float:
     """Return where the parabola through a bin and its neighbours is highest, -0.5 to 0.5."""
     if not 0 < place < power.size - 1:
         return 0.0
@@ -280,7 +278,7 @@ def _largest(
     """
     if inner.size < _LEAST_BINS:
         return UNKNOWN
-    white = float(np.median(inner)) * degrees / float(gammaincinv(degrees, 0.5))
+    white = white_level(inner, degrees)
     if not white > 0:
         return UNKNOWN
     shape = inner.shape
@@ -292,6 +290,11 @@ def _largest(
         for (high, wide), power in parts
     )
     return score_of_log(least), 1.0
+
+
+def white_level(power: Array, degrees: float) -> float:
+    """Return the power of a bin of white noise, Gamma(degrees): by the median, without lines."""
+    return float(np.median(power)) * degrees / float(gammaincinv(degrees, 0.5))
 
 
 def _summed(power: Array, block: tuple[int, int]) -> Array:
@@ -310,8 +313,8 @@ def _within_bin(power: Array, place: int) -> float:
     return side * larger / (excess + larger) if excess > 0 else 0.0
 
 
-def _frequency(at: float, size: int) -> float:
-    """Return cycles per pixel; what nearly alternates from pixel to pixel does so exactly."""
+def frequency(at: float, size: int) -> float:
+    """Return cycles per pixel of cycles in all; what nearly alternates by pixel does so exactly."""
     return 0.5 if abs(at - size / 2) < _ALTERNATES else at / size
 
 

@@ -1,0 +1,181 @@
+"""Sinusoids over the whole sensor: temporal power at the frequencies of bins and halfway between.
+
+A sinusoid that lies between bins loses up to 1 - (2 / pi)^4 = 84 % of its power in each of them;
+half the difference of neighbouring bins' amplitudes has the power of one bin in white noise, and
+loses 34 % at most of a sinusoid that lies there. Of a mosaic all colours are taken in phase, so
+that channels add by amplitude, not by power, and a frequency has no aliases.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping
+
+import numpy as np
+import scipy.fft
+from numpy.typing import NDArray
+
+from analysis.mismatch.bank.coherent import Peak, frequency, top, white_level
+from analysis.mismatch.bank.lines import log_chance
+from analysis.mismatch.bank.scalars import UNKNOWN, Number, score_of_log
+from dsis.compiled import kernel
+from dsis.measures import Channel
+
+Array = NDArray[np.float64]
+Image = NDArray[np.float32]
+
+
+class Waves:
+    """Amplitudes of the frames of one exposure, less the first, summed on bins and between them.
+
+    Parameters
+    ----------
+    shape
+        Rows and columns of the sensor.
+    step
+        Of a channel's pixels: 1, or 2 on a mosaic.
+    """
+
+    def __init__(self, shape: tuple[int, int], step: int) -> None:
+        rows, columns = shape
+        self.shape, self.step = shape, step
+        self.power = np.zeros((2, 2, rows, columns // 2 + 1))
+        self.total = np.zeros(self.power.shape[2:], np.complex128)
+        self.frames = 0
+
+    def watching(self, frames: Iterable[NDArray[np.generic]]) -> Iterator[NDArray[np.generic]]:
+        """Yield frames (row, column) as they come, and take their spectra."""
+        first: Image | None = None
+        for frame in frames:
+            image = np.asarray(frame, np.float32)
+            first = image if first is None else first
+            if self.frames:
+                self._take(image - first)
+            self.frames += 1
+            yield frame
+
+    def _take(self, difference: Image) -> None:
+        for y in range(self.step):
+            for x in range(self.step):
+                own = difference[y :: self.step, x :: self.step]
+                own -= own.mean(dtype=np.float64)
+        transform = scipy.fft.rfft2(difference, overwrite_x=True)
+        self.total += transform
+        _add(transform, self.power)
+
+    def temporal(self) -> Array:
+        """Return the power over time: (half a bin down, half a bin right, row, column // 2 + 1).
+
+        White noise has its variance in every bin. Needs two frames.
+        """
+        still = np.zeros_like(self.power)
+        _add(self.total, still)
+        rows, columns = self.shape
+        power = self.power - still / self.frames
+        return np.asarray(np.maximum(power, 0.0) / (rows * columns * (self.frames - 1)))
+
+
+class WaveSums:
+    """Power of waves over all exposures, white noise scaled to 1; amplitudes constant in DN."""
+
+    def __init__(self, shape: tuple[int, int], step: int) -> None:
+        self.shape, self.step = shape, step
+        rows, columns = shape
+        self.power = np.zeros((2, 2, rows, columns // 2 + 1))
+        self.weight = self.squares = 0.0
+
+    def add(
+        self, waves: Waves, channels: Mapping[str, Channel], variance_dn2: Mapping[str, float]
+    ) -> None:
+        """Take one exposure; the variance that is expected of each channel weighs it."""
+        sizes = [c.mean_frame.size for c in channels.values()]
+        own = [c.estimates["pixel_variance"].value for c in channels.values()]
+        white = float(np.average(own, weights=sizes))
+        if waves.frames < 2 or not white > 0:
+            return
+        expected = float(np.average([variance_dn2[name] for name in channels], weights=sizes))
+        seen = waves.frames - 1
+        weight = seen / expected
+        self.power += weight * waves.temporal() / white
+        self.weight += weight
+        self.squares += weight**2 / seen
+
+    def number(self) -> Number:
+        """Return the normal score of the largest power, on bins or between them."""
+        parts = [part for part in self._parts() if part.size]
+        if not self.weight or not parts:
+            return UNKNOWN
+        degrees = max(round(self.weight**2 / self.squares), 1)
+        white = white_level(parts[0], degrees)
+        if not white > 0:
+            return UNKNOWN
+        least = min(log_chance(float(p.max()) / white, 1, p.size, degrees) for p in parts)
+        return score_of_log(least), 1.0
+
+    def peak(self) -> Peak | None:
+        """Return where the power is largest: cycles per pixel of a plane, power as one shows it."""
+        if not self.weight:
+            return None
+        rows, columns = self.shape
+        fine = np.zeros((2 * rows, 2 * self.power.shape[3]))
+        for down in (0, 1):
+            for right in (0, 1):
+                fine[down::2, right::2] = self.power[down, right]
+        fine[~self._looked_at()] = 0.0
+        y, x = (int(i) for i in np.unravel_index(int(fine.argmax()), fine.shape))
+        around = np.pad(fine, 1)
+        across = x / 2 + top(around[y + 1], x + 1) / 2
+        along = y / 2 + top(around[:, x + 1], y + 1) / 2
+        fx = frequency(across, columns)
+        fy = frequency(along, rows)
+        fy -= float(fy > 1 / 2)
+        power = 1 + (float(fine[y, x]) / self.weight - 1) / self.step**2
+        return Peak(self.step * fx, self.step * fy, power)
+
+    def _parts(self) -> list[Array]:
+        """Return the powers that are looked at, by where they lie in the bins."""
+        looked_at = self._looked_at()
+        rows, columns = self.shape
+        if rows % 2 == 0 and columns % 2 == 0:  # what alternates along both axes: has its own
+            looked_at[rows - 1 : rows + 2, columns - 1 : columns + 2] = False
+        return [
+            self.power[down, right][looked_at[down::2, right::2]]
+            for down in (0, 1)
+            for right in (0, 1)
+        ]
+
+    def _looked_at(self) -> NDArray[np.bool_]:
+        """Return which half bins (2 rows, columns + 2) hold waves of their own.
+
+        The axes hold what rows, columns and frames have in common, of each colour of a mosaic. Half
+        a bin from them there is no wave that is not on them as well.
+        """
+        rows, columns = self.shape
+        found = np.ones((2 * rows, 2 * self.power.shape[3]), np.bool_)
+        found[[0, 1, -1]] = False
+        found[:, [0, 1]] = False
+        found[:, columns + 1 :] = False  # beyond half a cycle per pixel
+        if columns % 2 == 0:
+            # At half a cycle each wave stands twice, as its own conjugate; on rows of bins only.
+            found[1::2, columns] = False
+            found[rows + 1 :, columns] = False
+        if self.step == 2:
+            found[rows - 1 : rows + 2] = False
+            found[:, columns - 1 :] = False
+        return found
+
+
+@kernel
+def _add(transform: NDArray[np.complexfloating], power: Array) -> None:
+    """Add the power of bins, and of neighbours' differences: down, right, both."""
+    rows, columns = transform.shape
+    for y in range(rows):
+        here, below = transform[y], transform[(y + 1) % rows]
+        for x in range(columns):
+            a, c = np.complex128(here[x]), np.complex128(below[x])
+            d = a - c
+            power[0, 0, y, x] += a.real * a.real + a.imag * a.imag
+            power[1, 0, y, x] += (d.real * d.real + d.imag * d.imag) / 2
+            if x + 1 < columns:
+                b = np.complex128(here[x + 1])
+                e = a - b
+                f = d - b + np.complex128(below[x + 1])
+                power[0, 1, y, x] += (e.real * e.real + e.imag * e.imag) / 2
+                power[1, 1, y, x] += (f.real * f.real + f.imag * f.imag) / 4

@@ -1,0 +1,153 @@
+"""Waves over the whole sensor, on bins and between them: found, placed, as rare as they say."""
+
+from math import sqrt
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from scipy.stats import norm
+
+from analysis.mismatch.bank.waves import Waves, WaveSums
+from dsis.cfa import Cfa
+from dsis.measures import measure_exposure
+
+Array = NDArray[np.float64]
+ROWS, COLUMNS, FRAMES = 48, 64, 8
+SURE = 5.0  # standard errors
+HALFWAY = 8 / np.pi**2  # of its power a wave keeps that lies halfway between bins
+ALL = {"MONO": 1.0, "R": 1.0, "Gr": 1.0, "Gb": 1.0, "B": 1.0}
+
+
+def summed(stacks: list[Array], cfa: Cfa, shape: tuple[int, int] = (ROWS, COLUMNS)) -> WaveSums:
+    step = 1 if cfa is Cfa.MONO else 2
+    sums = WaveSums(shape, step)
+    for stack in stacks:
+        waves = Waves(shape, step)
+        measured = measure_exposure(waves.watching(stack), cfa, 0.0, 65535.0)
+        sums.add(waves, measured.channels, ALL)
+    return sums
+
+
+def noise(rng: np.random.Generator, shape: tuple[int, int] = (ROWS, COLUMNS)) -> Array:
+    return 1000 + rng.normal(0, 1, (FRAMES, *shape))
+
+
+def wave(rng: np.random.Generator, fx: float, fy: float, power: float) -> Array:
+    """Return a wave of a power in a bin, white noise at 1, its phase free."""
+    y, x = np.mgrid[:ROWS, :COLUMNS]
+    phases = rng.uniform(0, 2 * np.pi, (FRAMES, 1, 1))
+    amplitude = 2 * sqrt(power / (ROWS * COLUMNS))
+    return amplitude * np.sin(2 * np.pi * (fx * x + fy * y) + phases)
+
+
+def direct(stack: Array, down: float, right: float, cfa: Cfa) -> float:
+    """Return the power over time at a frequency in bins, by its definition."""
+    image = stack.copy()
+    step = 1 if cfa is Cfa.MONO else 2
+    for y in range(step):
+        for x in range(step):
+            image[:, y::step, x::step] -= image[:, y::step, x::step].mean((1, 2), keepdims=True)
+    image -= image.mean(0)
+    y, x = np.mgrid[:ROWS, :COLUMNS]
+    carrier = np.exp(-2j * np.pi * (down * y / ROWS + right * x / COLUMNS))
+    return float((np.abs((image * carrier).sum((1, 2))) ** 2).sum()) / (image[1:].size)
+
+
+@pytest.mark.parametrize("cfa", [Cfa.MONO, Cfa.GRBG])
+def test_power_on_bins_is_that_of_the_definition(cfa: Cfa) -> None:
+    stack = np.round(noise(np.random.default_rng(1)) * 4)
+    waves = Waves((ROWS, COLUMNS), 1 if cfa is Cfa.MONO else 2)
+    list(waves.watching(stack))
+    power = waves.temporal()
+    for down, right in ((3, 5), (40, 17), (24, 31), (7, 32)):
+        assert power[0, 0, down, right] == pytest.approx(direct(stack, down, right, cfa), rel=1e-4)
+
+
+@pytest.mark.parametrize(("down", "right"), [(0, 0), (1, 0), (0, 1), (1, 1)])
+def test_a_wave_halfway_between_bins_keeps_most_of_its_power(down: int, right: int) -> None:
+    rng = np.random.default_rng(2)
+    place = (9 + down / 2, 11 + right / 2)
+    own = 1e4 * wave(rng, place[1] / COLUMNS, place[0] / ROWS, 1.0)
+    waves = Waves((ROWS, COLUMNS), 1)
+    list(waves.watching(own))
+    kept = waves.temporal()[down, right, 9, 11] / direct(own, *place, Cfa.MONO)
+    assert kept == pytest.approx(HALFWAY ** (down + right), rel=0.01)
+
+
+@pytest.mark.parametrize("cfa", [Cfa.MONO, Cfa.RGGB])
+def test_white_noise_has_one_everywhere_and_rare_peaks_rarely(cfa: Cfa) -> None:
+    rng = np.random.default_rng(3)
+    many = [summed([noise(rng), noise(rng)], cfa) for _ in range(40)]
+    parts = [part.mean() for one in many for part in (one.power[:, :, 3:-3, 3:-3] / one.weight)]
+    assert np.mean(parts) == pytest.approx(1, abs=0.01)
+    scores = np.array([one.number()[0] for one in many])
+    for score in (0.5, 1.0, 2.0):  # bins and three kinds of places between them are tried at once
+        rare = min(4 * norm.sf(score), 1.0)
+        assert (scores > score).mean() < rare + SURE * sqrt(rare * (1 - rare) / 40) + 1e-9
+
+
+@settings(max_examples=12, deadline=None)
+@given(
+    across=st.floats(4, 27),
+    down=st.floats(4, 19),
+    sign=st.sampled_from([1, -1]),
+    mosaic=st.booleans(),
+    seed=st.integers(0, 2**16),
+)
+def test_a_wave_is_found_where_it_is(
+    across: float, down: float, sign: int, mosaic: bool, seed: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    own = wave(rng, across / COLUMNS, sign * down / ROWS, 12.0)
+    sums = summed([noise(rng) + own], Cfa.RGGB if mosaic else Cfa.MONO)
+    assert sums.number()[0] > SURE
+    peak = sums.peak()
+    assert peak is not None
+    found = np.array([peak.fx * COLUMNS, peak.fy * ROWS]) / sums.step
+    assert found[0] == pytest.approx(across, abs=0.4)
+    # Of a mosaic a plane's frequencies go beyond half a cycle per pixel, and are not folded.
+    assert found[1] == pytest.approx(sign * down, abs=0.4)
+
+
+def test_a_mosaic_sees_a_wave_as_clearly_as_a_mono_sensor() -> None:
+    """Its channels add by amplitude: each alone has a quarter of the power."""
+    rng = np.random.default_rng(4)
+    own = noise(rng) + wave(rng, 0.21, 0.13, 8.0)
+    mono, mosaic = (summed([own], cfa).number()[0] for cfa in (Cfa.MONO, Cfa.GBRG))
+    assert mosaic == pytest.approx(mono, abs=0.5)
+
+
+def test_what_rows_columns_colours_and_frames_share_is_no_wave() -> None:
+    rng = np.random.default_rng(5)
+    stack = noise(rng)
+    stack += rng.normal(0, 1, (FRAMES, ROWS, 1)) + rng.normal(0, 1, (FRAMES, 1, COLUMNS))
+    stack[:, ::2, ::2] += rng.normal(0, 3, (FRAMES, 1, 1))  # one colour's light
+    stack[:, ::2] += rng.normal(0, 1, (FRAMES, 1, COLUMNS))  # columns of two colours
+    assert summed([stack], Cfa.RGGB).number()[0] < SURE
+
+
+def test_a_checkerboard_has_a_number_of_its_own() -> None:
+    rng = np.random.default_rng(6)
+    board = (-1.0) ** np.add.outer(np.arange(ROWS), np.arange(COLUMNS))
+    stack = noise(rng) + 0.3 * rng.choice([-1, 1], (FRAMES, 1, 1)) * board
+    sums = summed([stack], Cfa.MONO)
+    assert sums.number()[0] < SURE
+    peak = sums.peak()
+    assert peak is not None
+    assert (peak.fx, abs(peak.fy)) == (0.5, 0.5)
+
+
+@pytest.mark.parametrize("shape", [(5, 7), (8, 9), (9, 8), (6, 6)])
+@pytest.mark.parametrize("cfa", [Cfa.MONO, Cfa.RGGB])
+def test_small_and_odd_sensors_have_a_number_or_none(shape: tuple[int, int], cfa: Cfa) -> None:
+    rng = np.random.default_rng(7)
+    value, sd = summed([noise(rng, shape)], cfa, shape).number()
+    assert np.isnan(value) or (value < SURE and sd == 1.0)
+
+
+def test_frames_without_noise_say_nothing() -> None:
+    sums = summed([np.full((3, ROWS, COLUMNS), 7.0)], Cfa.MONO)
+    assert np.isnan(sums.number()[0])
+    assert sums.peak() is None

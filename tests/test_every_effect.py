@@ -60,6 +60,10 @@ STRONG: dict[str, tuple[dict[str, object], ...]] = {
         {"falloff_percent": 0.0, "bow_down_percent": 30.0, "bow_right_percent": -20.0},
     ),
     "spatial_filtering": ({"fraction": 0.2}, {"fraction": 0.04}),
+    "line_settling": (
+        {"gain_percent": 40.0, "edge": "bottom", "length_pixels": 4.0},
+        {"offset_dn": 300.0, "edge": "right"},
+    ),
     "tap_mismatch": (
         {"gain_percent": 40.0, "regions": "even_odd_columns"},
         {"gain_percent": 40.0, "regions": "even_odd_rows"},

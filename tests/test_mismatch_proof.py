@@ -164,6 +164,7 @@ PLANTED = {
     "shading": {"falloff_percent": 0.4},
     "spatial_filtering": {"fraction": 0.015},
     "tap_mismatch": {"gain_percent": 0.18},
+    "line_settling": {"gain_percent": 0.6, "offset_dn": -1.0, "length_pixels": 6.0},
 }
 """Strengths at some 20 standard deviations of the statistic that isolates each effect."""
 

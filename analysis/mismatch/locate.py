@@ -22,6 +22,7 @@ SUMS = 0.2  # of it, for other sums over exposures or channels
 _ROOTS = 2e-3  # of a ratio: 0.6 % of the finer mean square
 _PATTERNS = frozenset(f"fixed_{part}_variance" for part in ("pixel", "row", "column", "smooth"))
 _NO_PATTERN = 1.02  # cube root of a ratio of mean squares: 6 % above noise alone
+_EDGE = 16  # lines at an edge: a decay is seen there
 _FLOORS = {
     "pixel_variance": 1e-3,
     "skewness": 1e-3,
@@ -158,8 +159,8 @@ def _where(
         kind=kinds.pop() if len(kinds) == 1 else None,
         channel=channel,
         signal_dn=(round(min(signals), 3), round(max(signals), 3)) if signals else None,
-        rows=_middle(keys[top], "rows", layout.rows),
-        columns=_middle(keys[top], "columns", layout.columns),
+        rows=_lines(keys[top], "rows", layout.rows),
+        columns=_lines(keys[top], "columns", layout.columns),
         spatial_frequency=_frequency(layout, seen, statistic, keys[top]),
         pixels=_pixels(layout, seen, keys[top]),
         exposure_time_s=(min(times), max(times))
@@ -168,9 +169,13 @@ def _where(
     )
 
 
-def _middle(key: Key, axis: str, size: int) -> tuple[int, int] | None:
-    if key.statistic == "half_seam" and key.detail.startswith(axis):
+def _lines(key: Key, axis: str, size: int) -> tuple[int, int] | None:
+    if not key.detail.startswith(axis):
+        return None
+    if key.statistic == "half_seam":
         return size // 2 - 1, size // 2
+    if key.statistic == "fixed_edge":
+        return (0, _EDGE) if "first" in key.detail else (size - 1 - _EDGE, size - 1)
     return None
 
 

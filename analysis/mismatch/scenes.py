@@ -38,6 +38,7 @@ _IN_THE_PICTURE = frozenset(
         "column_fpn",
         "row_prnu",
         "column_prnu",
+        "line_settling",
     }
 )
 

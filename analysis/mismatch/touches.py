@@ -33,6 +33,7 @@ _FOLLOWS = {
     "column_spectrum_peak": frozenset({"column_variance"}),
     "row_spectrum_peak": frozenset({"row_spectrum_peak", "row_variance"}),
     "half_seam": _FIXED | _LINES,
+    "fixed_edge": _FIXED | _LINES,
     "fixed_smooth_tilt": _FIXED | _LINES,
     "fixed_smooth_falloff": _FIXED | _LINES,
     "parity": _FIXED | _LINES,

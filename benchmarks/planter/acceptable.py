@@ -53,6 +53,7 @@ STATISTICS: dict[str, tuple[str, ...]] = {
     "readout_memory": (*_CORRELATION, "lag"),
     "adc_memory": ("carry_over", *_CORRELATION),
     "tap_mismatch": ("half_seam", "parity", "seam", "tap"),
+    "line_settling": ("fixed_edge", "fixed_row", "fixed_column", "fixed_smooth", "smooth"),
     "channel_imbalance": ("channel_ratio", "green", "imbalance"),
     "impulse": ("one_off", "impulse", "outlier", "spike", "skew", "kurtosis"),
 }

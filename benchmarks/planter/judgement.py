@@ -37,6 +37,7 @@ COMPARED: dict[str, tuple[str, ...]] = {
     "readout_memory": ("fraction", "lag_pixels"),
     "adc_memory": ("step_dn", "period_codes", "at_code"),
     "tap_mismatch": ("gain_percent",),
+    "line_settling": ("offset_dn", "gain_percent", "length_pixels"),
     "channel_imbalance": ("gain_percent",),
     "impulse": ("per_megapixel_frame",),
     **dict.fromkeys(

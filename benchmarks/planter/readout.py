@@ -36,6 +36,22 @@ def tap_mismatch(signal: Image, p: Mapping[str, Any], view: View) -> Image:
     return signal * np.where(second, 1 + half, 1 - half).astype(np.float32)
 
 
+def settled(view: View, p: Mapping[str, Any]) -> np.ndarray:
+    """Return what is left of a start, 1 beside its edge: each further line keeps a share."""
+    edge, keeps = p.get("edge", "left"), np.exp(-1 / p["length_pixels"])
+    axis = 1 if edge in ("left", "right") else 0
+    left = np.cumprod(np.r_[1.0, np.full(view.shape[axis] - 1, keeps)])
+    left = left[::-1] if edge in ("right", "bottom") else left
+    return np.broadcast_to(left if axis else left[:, None], view.shape)
+
+
+def line_settling(signal: Image, p: Mapping[str, Any], view: View) -> Image:
+    """Read lines before the amplifier has come to rest: its gain and its offset are still off."""
+    left = settled(view, p)
+    gain = (1 + p["gain_percent"] / 100 * left).astype(np.float32)
+    return signal * gain + (p["offset_dn"] * left).astype(np.float32)
+
+
 def read(signal: Image, view: View) -> Image:
     """Add the read noise: Gaussian, or Student's t; alike in all pixels, or not."""
     deviation = np.sqrt(view.segment_map(lambda segment: segment.intercept))
@@ -113,6 +129,7 @@ def adc_memory(signal: Image, p: Mapping[str, Any], view: View) -> Image:
 AMPLIFIERS: dict[str, Mechanism] = {
     "dual_gain_mismatch": dual_gain_mismatch,
     "tap_mismatch": tap_mismatch,
+    "line_settling": line_settling,
 }
 PIXELS: dict[str, Mechanism] = {"rts": rts}
 MEMORY: dict[str, Mechanism] = {"readout_memory": readout_memory, "adc_memory": adc_memory}

@@ -195,6 +195,25 @@ def _taps(rng: np.random.Generator, case: Case) -> dict[str, Any]:
     return {"regions": str(rng.choice(regions)), **_sign(rng, case)}
 
 
+def _settling(rng: np.random.Generator, case: Case) -> dict[str, Any]:
+    """Draw an edge, a length, and whether it is the gain or the offset that is late."""
+    edge = str(rng.choice(["left", "right", "top", "bottom"]))
+    length = round(float(rng.uniform(2, 10)), 2)
+    return {
+        "edge": edge,
+        "length_pixels": length,
+        "_gain": bool(rng.random() < 0.5),
+        **_sign(rng, case),
+    }
+
+
+def _unsettled(case: Case, drawn: Drawn, x: float) -> dict[str, Any]:
+    size = x * drawn["_sign"]
+    if drawn["_gain"]:
+        return {"gain_percent": min(0.2 * size, 90.0), "offset_dn": 0.0}
+    return {"gain_percent": 0.0, "offset_dn": 0.1 * read_dn(case) * size}
+
+
 def _well(case: Case, drawn: Drawn, x: float) -> dict[str, Any]:
     """Return a full well that comes nearer to the brightest flat's mean as x grows."""
     del drawn
@@ -291,6 +310,7 @@ RECIPES: dict[str, Recipe] = {
     ),
     "readout_memory": Recipe(_memory, _signed("fraction", 0.02), power=1, most=15),
     "tap_mismatch": Recipe(_taps, _signed("gain_percent", 0.2), power=1, most=50),
+    "line_settling": Recipe(_settling, _unsettled, power=1, most=50),
     "channel_imbalance": Recipe(
         _sign, _signed("gain_percent", 0.5), power=1, most=20, fits=_is_bayer
     ),

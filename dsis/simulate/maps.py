@@ -15,7 +15,17 @@ from dsis.grid import PixelGrid
 
 MAPS = "maps.npz"
 REPLACED = frozenset(
-    {"dsnu", "prnu", "row_fpn", "column_fpn", "row_prnu", "column_prnu", "shading", "tap_mismatch"}
+    {
+        "dsnu",
+        "prnu",
+        "row_fpn",
+        "column_fpn",
+        "row_prnu",
+        "column_prnu",
+        "shading",
+        "tap_mismatch",
+        "line_settling",
+    }
 )
 """Effects that draw a pattern which the maps hold as it was measured."""
 

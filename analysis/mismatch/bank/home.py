@@ -7,6 +7,7 @@ one side. What may have either sign (a step, a ratio of gains, a memory) is look
 from collections.abc import Mapping, Sequence
 
 from analysis.mismatch.bank.common import SIGNS
+from analysis.mismatch.bank.edges import names as edge_names
 from analysis.mismatch.bank.key import MOSAIC, Key
 from analysis.mismatch.bank.parts import STANDING_OUT
 from analysis.mismatch.bank.persistent import OUTSTANDING
@@ -21,7 +22,7 @@ READ_NOISE = "of read noise"
 PERSISTENT = "of read noise, in all exposures"
 LAG = 0.1  # share of one of many lags along a line, in that of another sum
 _TWO_SIDED = frozenset({"pixel_variance", "channel_ratio", "half_seam", "parity",
-                        "line_correlation", "carry_over", "fixed_smooth_tilt",
+                        "fixed_edge", "line_correlation", "carry_over", "fixed_smooth_tilt",
                         "fixed_smooth_falloff"})  # fmt: skip
 # Sums over exposures: statistic, how what it shows grows with the signal.
 SHAPED: Mapping[str, tuple[str, ...]] = {
@@ -53,6 +54,12 @@ _POOLED = frozenset(
         *(("fixed_smooth_variance", name, LOW) for name in ("gain", "time")),
         *((name, "gain", axis) for name in _STEPS for axis in _AXES),
         *(("half_seam", "gain", f"{axis}, {WHOLE}") for axis in _AXES),
+        *(
+            ("fixed_edge", name, edge.partition(" of ")[2])
+            for name in ("offset", "gain")
+            for axis in _AXES
+            for edge in edge_names(axis)
+        ),
         *(("fixed_smooth_tilt", "time", axis) for axis in _AXES),
         *(("fixed_smooth_falloff", name, "") for name in ("gain", "time")),
         *(("outlying_pixels", "time", f"{limit:g}") for limit in STANDING_OUT),
@@ -66,7 +73,8 @@ _POOLED = frozenset(
 )
 _SPECTRA = frozenset({"spectral_peak", "row_spectrum_peak", "column_spectrum_peak"})
 _SHARED = frozenset({"fixed_row_variance", "fixed_column_variance", "fixed_smooth_variance",
-                     "fixed_smooth_tilt", "fixed_smooth_falloff", "half_seam"})  # fmt: skip
+                     "fixed_smooth_tilt", "fixed_smooth_falloff", "fixed_edge",
+                     "half_seam"})  # fmt: skip
 
 
 def together_too(scope: str, detail: str) -> str:
@@ -88,6 +96,8 @@ def homes(keys: Sequence[Key], channels: Sequence[str]) -> list[float]:
         weight = float(own in wanted)
         if key.statistic == "line_correlation" and mosaic == (key.channel == ""):
             weight = LAG * (key.scope == summed)
+        if key.statistic == "fixed_edge":
+            weight *= LAG
         if key.statistic == "carry_over":
             weight = LAG
         if key.statistic == "pixel_variance" and key.detail.startswith(ABOVE):

@@ -7,6 +7,7 @@ from math import log, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.mismatch.bank.edges import edges
 from analysis.mismatch.bank.scalars import Number, ratio_root
 from analysis.mismatch.bank.seams import seams
 from analysis.mismatch.bank.surfaces import slopes, surfaces
@@ -76,6 +77,7 @@ def parts(image: Array, noise: float) -> Parts:
         "outlying_pixels": _outlying(scatter + mean_square**2, square, pixels.size),
         **_standing_out(pixels, square),
         **seams(by_row, by_column, lines),
+        **edges(by_row, by_column, lines),
     }
     return Parts(pixels, rows, columns, square, coefficients, numbers)
 

@@ -10,6 +10,7 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.mismatch.bank.edges import names as edge_names
 from analysis.mismatch.bank.parts import Parts, sure_of_lines
 from analysis.mismatch.bank.scalars import Number, ratio_root
 from analysis.mismatch.bank.seams import WHOLE
@@ -55,10 +56,12 @@ def together(
             bottom += moved.size - 1 - degree
         lines[axis] = sure_of_lines(top / bottom, square, bottom)
         found[f"{label} of {TOGETHER}"] = ratio_root(top / bottom / square, bottom, dof)
-    for seam in (f"{axis}{part}" for axis in ("rows", "columns") for part in ("", f", {WHOLE}")):
-        steps = [np.array([parts[n].numbers[f"half_seam of {seam}"][0]]) for n in names]
-        step = float(_mean(steps, [sharpness[n] for n in names])[0])
-        found[f"half_seam of {seam}, {TOGETHER}"] = (step, 1.0)
+    axes = ("rows", "columns")
+    steps = [f"half_seam of {axis}{part}" for axis in axes for part in ("", f", {WHOLE}")]
+    for one in (*steps, *(name for axis in axes for name in edge_names(axis))):
+        values = [np.array([parts[n].numbers[one][0]]) for n in names]
+        size = float(_mean(values, [sharpness[n] for n in names])[0])
+        found[f"{one}, {TOGETHER}"] = (size, 1.0)
     least = min(len(parts[name].coefficients) for name in names)
     surface = _mean(
         [parts[name].coefficients[:least, :least] for name in names],

@@ -17,7 +17,8 @@ Array = NDArray[np.float64]
 NOISY = "variance"
 UNITS = {"offset": "DN", "gain": "%", "time": "DN/s", NOISY: "variance over its mean"}
 # What no single exposure shows by itself: channels together may be clear, where each is not.
-_MAPS_ALONE = ("fixed_smooth_tilt", "fixed_smooth_falloff", "half_seam", "parity")
+_MAPS_ALONE = ("fixed_smooth_tilt", "fixed_smooth_falloff", "half_seam", "parity",
+               "fixed_edge")  # fmt: skip
 KINDS = (*MAPS, *(f"{name} alone" for name in ALONE))
 
 
@@ -43,6 +44,8 @@ def shown_in(states: Sequence[State], threshold_z: float) -> dict[str, Shown]:
 
 
 def _axis(key: Key) -> Literal["", "rows", "columns"]:
+    if key.statistic == "fixed_edge":
+        return "rows" if key.detail.startswith("rows") else "columns"
     return "rows" if key.detail == "rows" else "columns" if key.detail == "columns" else ""
 
 

@@ -10,7 +10,7 @@ from typing import Any
 from planter.evidence import codes, levels, maps, temporal
 from planter.evidence.look import Evidence, Look
 from planter.light import fall_off, glow
-from planter.readout import second_tap
+from planter.readout import second_tap, settled
 from planter.view import View
 
 Parameters = Mapping[str, Any]
@@ -75,6 +75,11 @@ EVIDENCE: dict[str, Callable[[Look, Parameters], Evidence]] = {
     "adc_memory": temporal.carried,
     "tap_mismatch": lambda look, p: maps.along(
         look, second_tap(_view(look), p.get("regions", "left_right")), "gain", "offset"
+    ),
+    "line_settling": lambda look, p: maps.along(
+        look,
+        settled(_view(look), p),
+        *(("gain", "offset") if p["gain_percent"] else ("offset", "gain")),
     ),
     "channel_imbalance": lambda look, _: levels.green_difference(look),
 }

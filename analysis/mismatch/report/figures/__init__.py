@@ -176,7 +176,7 @@ def _spectrum(m: Mismatch, name: str, evidence: Evidence) -> Iterator[Picture]:
 def _pattern(m: Mismatch, name: str, shown: Shown, evidence: Evidence) -> Iterator[Picture]:
     """Yield the picture of a fixed pattern: of lines their means, of a surface a smoothed map."""
     axis = AXES.get(name) or shown.axis
-    if axis and (name in AXES or name in GROUPS):
+    if axis and (name in AXES or name in GROUPS or name == "fixed_edge"):
         parts = _parts(m, shown.map, evidence)
         if parts:
             groups = GROUPS.get(name, "")

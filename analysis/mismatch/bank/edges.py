@@ -1,0 +1,50 @@
+"""Decays of a map from its edges: lines that begin, or end, before the read-out has settled."""
+
+from collections.abc import Iterator
+from functools import lru_cache
+from math import sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.mismatch.bank.scalars import UNKNOWN, Number
+from analysis.mismatch.bank.seams import beyond_smooth
+
+Array = NDArray[np.float64]
+ENDS = ("first", "last")
+REACHES = {"near": 2.5, "far": 10.0}  # pixels of the plane after which 1 / e is left
+_LEAST_LINES = 24  # fewer are a smooth surface
+
+
+def edges(by_row: Array, by_column: Array, squares: tuple[float, float]) -> dict[str, Number]:
+    """Return how line means decay from each edge, over two reaches, in their own noise.
+
+    Each is the coefficient of exp(-d / reach) beside smooth polynomials, over its error.
+    """
+    found: dict[str, Number] = {}
+    for axis, means, square, across in (
+        ("rows", by_row, squares[0], by_column.size),
+        ("columns", by_column, squares[1], by_row.size),
+    ):
+        sd = sqrt(square / across)
+        for name, shape in zip(names(axis), edge_shapes(means.size), strict=True):
+            clear = means.size >= _LEAST_LINES and sd > 0
+            found[name] = (float(shape @ means) / sd, 1.0) if clear else UNKNOWN
+    return found
+
+
+def names(axis: str) -> Iterator[str]:
+    """Yield the names of an axis' numbers, in the order of `edge_shapes`."""
+    for end in ENDS:
+        for reach in REACHES:
+            yield f"fixed_edge of {axis}, {end}, {reach}"
+
+
+@lru_cache(maxsize=64)
+def edge_shapes(size: int) -> Array:
+    """Return the decays from the first and the last line, less smooth polynomials, of norm 1."""
+    line = np.arange(size)
+    distances = (line, size - 1 - line)
+    shapes = np.array([np.exp(-d / reach) for d in distances for reach in REACHES.values()])
+    rest = beyond_smooth(shapes.T).T
+    return np.asarray(rest / np.linalg.norm(rest, axis=1, keepdims=True))

@@ -24,7 +24,7 @@ def summed(stacks: list[Array], cfa: Cfa, shape: tuple[int, int] = (ROWS, COLUMN
     step = 1 if cfa is Cfa.MONO else 2
     sums = WaveSums(shape, step)
     for stack in stacks:
-        waves = Waves(shape, step)
+        waves = Waves(shape)
         measured = measure_exposure(waves.watching(stack), cfa, 0.0, 65535.0)
         sums.add(waves, measured.channels, ALL)
     return sums
@@ -42,6 +42,12 @@ def wave(rng: np.random.Generator, fx: float, fy: float, power: float) -> Array:
     return amplitude * np.sin(2 * np.pi * (fx * x + fy * y) + phases)
 
 
+def temporal(waves: Waves) -> Array:
+    power = np.zeros((2, 2, ROWS, COLUMNS // 2 + 1))
+    waves.add_to(power, 1.0)
+    return power
+
+
 def direct(stack: Array, down: float, right: float, cfa: Cfa) -> float:
     """Return the power over time at a frequency in bins, by its definition."""
     image = stack.copy()
@@ -56,11 +62,12 @@ def direct(stack: Array, down: float, right: float, cfa: Cfa) -> float:
 
 
 @pytest.mark.parametrize("cfa", [Cfa.MONO, Cfa.GRBG])
-def test_power_on_bins_is_that_of_the_definition(cfa: Cfa) -> None:
-    stack = np.round(noise(np.random.default_rng(1)) * 4)
-    waves = Waves((ROWS, COLUMNS), 1 if cfa is Cfa.MONO else 2)
+@pytest.mark.parametrize("frames", [2, 3, FRAMES])
+def test_power_on_bins_is_that_of_the_definition(cfa: Cfa, frames: int) -> None:
+    stack = np.round(noise(np.random.default_rng(1)) * 4)[:frames]
+    waves = Waves((ROWS, COLUMNS))
     list(waves.watching(stack))
-    power = waves.temporal()
+    power = temporal(waves)
     for down, right in ((3, 5), (40, 17), (24, 31), (7, 32)):
         assert power[0, 0, down, right] == pytest.approx(direct(stack, down, right, cfa), rel=1e-4)
 
@@ -70,9 +77,9 @@ def test_a_wave_halfway_between_bins_keeps_most_of_its_power(down: int, right: i
     rng = np.random.default_rng(2)
     place = (9 + down / 2, 11 + right / 2)
     own = 1e4 * wave(rng, place[1] / COLUMNS, place[0] / ROWS, 1.0)
-    waves = Waves((ROWS, COLUMNS), 1)
+    waves = Waves((ROWS, COLUMNS))
     list(waves.watching(own))
-    kept = waves.temporal()[down, right, 9, 11] / direct(own, *place, Cfa.MONO)
+    kept = temporal(waves)[down, right, 9, 11] / direct(own, *place, Cfa.MONO)
     assert kept == pytest.approx(HALFWAY ** (down + right), rel=0.01)
 
 

@@ -146,17 +146,17 @@ class _Whole:
     def __init__(self, layout: Layout, *, keep: bool) -> None:
         self.layout, self.keep = layout, keep
         self.mosaic = len(layout.sites) > 1
-        self.shape, self.step = (layout.rows, layout.columns), 1 + self.mosaic
+        self.shape = (layout.rows, layout.columns)
         self.common: dict[str, Mapping[str, Number]] = {}
         self.bands = Bands(layout.rows, layout.sites)
-        self.waves = WaveSums(self.shape, self.step)
+        self.waves = WaveSums(self.shape, 1 + self.mosaic)
         self.memory = CarryOverSums()
 
     def measured(
         self, exposure: str, frames: int, seen: Iterable[NDArray[np.generic]], *, still: bool
     ) -> Measured:
         """Return the measures of an exposure's frames; take what moves in them, unless `still`."""
-        lines, after = Waves(self.shape, self.step), CarryOver(keep=self.keep)
+        lines, after = Waves(self.shape), CarryOver(keep=self.keep)
         found = measure(self.layout, after.watching(lines.watching(seen)))
         self.memory.add(after, still=still)
         if not still:

@@ -20,24 +20,17 @@ from dsis.measures import Channel
 
 Array = NDArray[np.float64]
 Image = NDArray[np.float32]
+Amplitudes = NDArray[np.complexfloating]
 
 
 class Waves:
-    """Amplitudes of the frames of one exposure, less the first, summed on bins and between them.
+    """Amplitudes of the frames of one exposure, less the first, summed on bins and between them."""
 
-    Parameters
-    ----------
-    shape
-        Rows and columns of the sensor.
-    step
-        Of a channel's pixels: 1, or 2 on a mosaic.
-    """
-
-    def __init__(self, shape: tuple[int, int], step: int) -> None:
+    def __init__(self, shape: tuple[int, int]) -> None:
         rows, columns = shape
-        self.shape, self.step = shape, step
-        self.power = np.zeros((2, 2, rows, columns // 2 + 1))
-        self.total = np.zeros(self.power.shape[2:], np.complex128)
+        self.pixels, self.half = rows * columns, (rows, columns // 2 + 1)
+        self.power: Array | None = None  # of two frames the second's amplitudes say it all
+        self.total: Amplitudes
         self.frames = 0
 
     def watching(self, frames: Iterable[NDArray[np.generic]]) -> Iterator[NDArray[np.generic]]:
@@ -47,33 +40,44 @@ class Waves:
             image = np.asarray(frame, np.float32)
             first = image if first is None else first
             if self.frames:
-                self._take(image - first)
+                self._take(scipy.fft.rfft2(image - first, overwrite_x=True))
             self.frames += 1
             yield frame
 
-    def _take(self, difference: Image) -> None:
-        for y in range(self.step):
-            for x in range(self.step):
-                own = difference[y :: self.step, x :: self.step]
-                own -= own.mean(dtype=np.float64)
-        transform = scipy.fft.rfft2(difference, overwrite_x=True)
+    def _take(self, transform: Amplitudes) -> None:
+        if self.frames == 1:
+            self.total = transform
+            return
+        if self.power is None:
+            self.power = np.zeros((2, 2, *self.half))
+            _add(self.total, 1.0, self.power)
+            self.total = self.total.astype(np.complex128)
         self.total += transform
-        _add(transform, self.power)
+        _add(transform, 1.0, self.power)
 
-    def temporal(self) -> Array:
-        """Return the power over time: (half a bin down, half a bin right, row, column // 2 + 1).
+    def add_to(self, power: Array, weight: float) -> None:
+        """Add the power over time, in units in which white noise has its variance in every bin.
 
-        White noise has its variance in every bin. Needs two frames.
+        `power`: (half a bin down, half a bin right, row, column // 2 + 1). Needs two frames.
         """
-        still = np.zeros_like(self.power)
-        _add(self.total, still)
-        rows, columns = self.shape
-        power = self.power - still / self.frames
-        return np.asarray(np.maximum(power, 0.0) / (rows * columns * (self.frames - 1)))
+        per_bin = weight / (self.pixels * (self.frames - 1))
+        if self.power is None:
+            _add(self.total, per_bin / 2, power)
+        else:
+            power += per_bin * self.power
+            _add(self.total, -per_bin / self.frames, power)
 
 
 class WaveSums:
-    """Power of waves over all exposures, white noise scaled to 1; amplitudes constant in DN."""
+    """Power of waves over all exposures, white noise scaled to 1; amplitudes constant in DN.
+
+    Parameters
+    ----------
+    shape
+        Rows and columns of the sensor.
+    step
+        Of a channel's pixels: 1, or 2 on a mosaic, whose rows and columns are even then.
+    """
 
     def __init__(self, shape: tuple[int, int], step: int) -> None:
         self.shape, self.step = shape, step
@@ -93,7 +97,7 @@ class WaveSums:
         expected = float(np.average([variance_dn2[name] for name in channels], weights=sizes))
         seen = waves.frames - 1
         weight = seen / expected
-        self.power += weight * waves.temporal() / white
+        waves.add_to(self.power, weight / white)
         self.weight += weight
         self.squares += weight**2 / seen
 
@@ -144,8 +148,8 @@ class WaveSums:
     def _looked_at(self) -> NDArray[np.bool_]:
         """Return which half bins (2 rows, columns + 2) hold waves of their own.
 
-        The axes hold what rows, columns and frames have in common, of each colour of a mosaic. Half
-        a bin from them there is no wave that is not on them as well.
+        The axes hold what rows, columns and frames have in common, of each colour of a mosaic: half
+        a bin from them the same is seen.
         """
         rows, columns = self.shape
         found = np.ones((2 * rows, 2 * self.power.shape[3]), np.bool_)
@@ -163,19 +167,21 @@ class WaveSums:
 
 
 @kernel
-def _add(transform: NDArray[np.complexfloating], power: Array) -> None:
-    """Add the power of bins, and of neighbours' differences: down, right, both."""
+def _add(transform: NDArray[np.complexfloating], weight: float, power: Array) -> None:
+    """Add the weighted power of bins, and of neighbours' differences: down, right, both."""
     rows, columns = transform.shape
+    down, right, both = weight / 2, weight / 2, weight / 4
     for y in range(rows):
         here, below = transform[y], transform[(y + 1) % rows]
+        b, d = np.complex128(here[0]), np.complex128(below[0])
         for x in range(columns):
-            a, c = np.complex128(here[x]), np.complex128(below[x])
-            d = a - c
-            power[0, 0, y, x] += a.real * a.real + a.imag * a.imag
-            power[1, 0, y, x] += (d.real * d.real + d.imag * d.imag) / 2
+            a, c = b, d
+            e = a - c
+            power[0, 0, y, x] += weight * (a.real * a.real + a.imag * a.imag)
+            power[1, 0, y, x] += down * (e.real * e.real + e.imag * e.imag)
             if x + 1 < columns:
-                b = np.complex128(here[x + 1])
-                e = a - b
-                f = d - b + np.complex128(below[x + 1])
-                power[0, 1, y, x] += (e.real * e.real + e.imag * e.imag) / 2
-                power[1, 1, y, x] += (f.real * f.real + f.imag * f.imag) / 4
+                b, d = np.complex128(here[x + 1]), np.complex128(below[x + 1])
+                f = a - b
+                g = e - b + d
+                power[0, 1, y, x] += right * (f.real * f.real + f.imag * f.imag)
+                power[1, 1, y, x] += both * (g.real * g.real + g.imag * g.imag)

@@ -158,3 +158,12 @@ def test_frames_without_noise_say_nothing() -> None:
     sums = summed([np.full((3, ROWS, COLUMNS), 7.0)], Cfa.MONO)
     assert np.isnan(sums.number()[0])
     assert sums.peak() is None
+
+
+@pytest.mark.parametrize("fy", [0.25, 0.13])
+def test_a_wave_that_alternates_along_a_row_does_so_exactly(fy: float) -> None:
+    rng = np.random.default_rng(8)
+    peak = summed([noise(rng) + wave(rng, 0.5, fy, 12.0)], Cfa.MONO).peak()
+    assert peak is not None
+    assert peak.fx == 0.5
+    assert abs(peak.fy) * ROWS == pytest.approx(fy * ROWS, abs=0.4)

@@ -3,8 +3,10 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.mismatch.bank.edges import edge_shapes
 from analysis.mismatch.bank.seams import SMOOTH_DEGREE, beyond_smooth, seam_shapes
 from analysis.mismatch.contradicted import Denial
+from analysis.mismatch.edged import STATISTIC, edged
 from analysis.mismatch.state import State
 from analysis.mismatch.uneven import uneven
 from dsis.effects import Effect
@@ -15,7 +17,7 @@ _MAPS = {"dsnu": ("offset", "offset alone"), "prnu": ("gain", "gain alone")}
 _AXES = {"row_fpn": "rows", "column_fpn": "columns", "row_prnu": "rows", "column_prnu": "columns"}
 _GROWING = frozenset({"row_prnu", "column_prnu"})
 _CLEAR = 5.0  # standard errors of what stands out with exposure time
-_SHAPES = 2  # a step and a comb
+_SHAPED = frozenset({"half_seam", "parity", STATISTIC})
 _MOST = 0.5  # of a pattern's variance, that something else may feign
 
 
@@ -29,6 +31,7 @@ def of_another(state: State, effect: Effect, without: Array) -> Denial | None:
         feigned(state, kind, without)
         or outlying(state, kind)
         or stepped(state, kind)
+        or edged(state, kind)
         or heated(state, kind)
         or uneven(state, effect)
     )
@@ -80,14 +83,14 @@ def feigned(state: State, kind: str, without: Array) -> Denial | None:
 
 
 def stepped(state: State, kind: str) -> Denial | None:
-    """Return how white line deviations are denied by a step or a comb of lines; None: not.
+    """Return how white line deviations are denied by a step, a comb or a decay; None: not.
 
-    Two amplifiers, left and right or line by line, make lines differ too. Where their step or comb
-    is left unexplained, and makes half of what the lines differ by beyond smooth surfaces, lines
-    may be alike but for that.
+    Two amplifiers, left and right or line by line, make lines differ too, and so does a read-out
+    that settles. Where a step, a comb or a decay from an edge is left unexplained, and they make
+    half of what the lines differ by beyond smooth surfaces, lines may be alike but for that.
     """
     axis = _AXES.get(kind)
-    if axis is None or not any(m.statistic in ("half_seam", "parity") for m in state.mismatches):
+    if axis is None or not any(m.statistic in _SHAPED for m in state.mismatches):
         return None
     whole, rest = 0.0, 0.0
     images = state.setting.seen.images
@@ -97,15 +100,18 @@ def stepped(state: State, kind: str) -> Denial | None:
             continue
         means = (image - image.mean()).mean(1 if axis == "rows" else 0) / noise
         own = beyond_smooth(means)
-        shapes = np.stack(seam_shapes(means.size))
-        without = own - shapes.T @ (shapes @ own)
+        shapes = np.vstack([*seam_shapes(means.size), edge_shapes(means.size)])
+        without = own - shapes.T @ np.linalg.lstsq(shapes.T, own, rcond=None)[0]
         across = image.size / means.size
         free = means.size - 1 - SMOOTH_DEGREE
         whole += float(own @ own) * across - free
-        rest += float(without @ without) * across - (free - _SHAPES)
+        rest += float(without @ without) * across - (free - len(shapes))
     if whole <= 0 or rest >= _MOST * whole:
         return None
-    return Denial(rest / whole, "halves, or even and odd lines, differ as a whole and feign it")
+    return Denial(
+        rest / whole,
+        "halves, even and odd lines, or lines at an edge differ as a whole and feign it",
+    )
 
 
 def heated(state: State, kind: str) -> Denial | None:

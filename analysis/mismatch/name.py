@@ -345,6 +345,7 @@ class Search:
         A few simulated recordings may show next to nothing of what one number a frame does: what
         they judge badly is judged once more by as many as a null takes.
         """
+        predictor.ready(self.without(state, named) for named in self.named)
         found = []
         for named in self.named:
             verdict = judged(state, predictor, named)

@@ -56,11 +56,7 @@ def polish(
 
     `camera` holds what stays as it is; the effects of `start` are added to it.
     """
-    free = [
-        (i, name, name in proposal.signed)
-        for i, proposal in enumerate(start)
-        for name in proposal.free
-    ]
+    free = free_of(start)
     effects = tuple(p.effect for p in start)
     built = with_effects(camera, effects)
     if built is None:
@@ -82,6 +78,18 @@ def polish(
         scale = 1.0 if signed else abs(float(getattr(effects[i], name)))
         by_effect[i][name] = float(error * scale)
     return Polished(effects, best, mean, by_effect)
+
+
+def free_of(start: Sequence[Proposal]) -> list[Free]:
+    """Return the free parameters of proposals, in order."""
+    return [(i, name, name in p.signed) for i, p in enumerate(start) for name in p.free]
+
+
+def needed(camera: Camera, start: Sequence[Proposal]) -> list[Camera | None]:
+    """Return the cameras that the first round of a polish asks for."""
+    effects = tuple(p.effect for p in start)
+    moved = [other for other, _ in shifted(camera, effects, free_of(start))]
+    return [with_effects(camera, effects), *moved]
 
 
 def _newton(
@@ -106,9 +114,11 @@ def jacobian(
     mean: Array,
 ) -> Array:
     """Return how the predicted numbers move with each free parameter: (number, parameter)."""
+    beside = list(shifted(camera, effects, free))
+    predictor.ready(other for other, _ in beside)
     columns = [
         np.zeros_like(mean) if other is None else (predictor.mean(other) - mean) / step
-        for other, step in shifted(camera, effects, free)
+        for other, step in beside
     ]
     return np.stack(columns, 1)
 

@@ -6,6 +6,7 @@ of its own: no effect of the vocabulary is exactly what a sensor does.
 """
 
 from collections import Counter
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -68,6 +69,10 @@ class Predictor:
         self.simulations, self.reference, self.replicates = simulations, reference, replicates
         self.forms = form_errors(reference.vector.keys)
         self.base = simulations.of(reference.camera, replicates)
+
+    def ready(self, cameras: Iterable[Camera | None]) -> None:
+        """Simulate side by side, as far as there are threads, what will be asked for one by one."""
+        self.simulations.ready([own for own in cameras if own is not None], self.replicates)
 
     def changes(self, camera: Camera) -> Array:
         """Return what a camera changes in each replicate: (replicate, number); nan where unknown.

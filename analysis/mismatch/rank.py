@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from analysis.mismatch.candidates import CANDIDATES, Proposal
 from analysis.mismatch.instance import Frequency, frequency_of, instance, same_line
 from analysis.mismatch.model import in_threads
-from analysis.mismatch.polish import Polished, polish, with_effects
+from analysis.mismatch.polish import Polished, needed, polish, with_effects
 from analysis.mismatch.state import Setting, State
 from dsis.effects import Effect
 
@@ -17,6 +17,7 @@ Array = NDArray[np.float64]
 _MOST = 4  # kinds that are fitted, after all were tried as proposed
 _FAR = 15.0  # of log-likelihood behind the best as proposed: fitting does not make up for it
 _SHARE = 0.03  # or that share of what the best gains
+_ROUNDS = 2  # of a fit, where each simulation takes long
 _TIE = 3.0  # of log-likelihood: odds below 20 do not tell two effects apart
 _COSINE = 0.5  # of what two predictions change, from which they change the same
 _ALIKE = 0.05  # relative difference of parameters up to which a proposal is an earlier one
@@ -116,13 +117,15 @@ def ranked(
     tried = _tried(state, kinds, memory, step, settled, apart, possible)
     best = max((value for value, _, _ in tried), default=0.0)
     far = max(_FAR, _SHARE * (best - before))
+    chosen = _chosen(tried, best - far)
+    predictor.ready(c for _, own in chosen for c in needed(state.camera, [own]))
     found: list[tuple[str, Proposal, Polished]] = []
-    for value, kind, proposal in tried:
-        kinds_so_far = {one[0] for one in found}
-        if value < best - far or (len(kinds_so_far) >= _MOST and kind not in kinds_so_far):
-            continue
+    for kind, proposal in chosen:
         own = state.predictor(replicates_for(state.setting, [proposal.effect]))
-        polished = polish(own, state.camera, [proposal], rounds=1 + len(proposal.free))
+        rounds = 1 + len(proposal.free)
+        if state.setting.replicates == 1:  # of a large recording steps are long and sure
+            rounds = min(rounds, _ROUNDS)
+        polished = polish(own, state.camera, [proposal], rounds=rounds)
         if polished is not None and not any(alike(state, polished.mean, one) for one in apart):
             found.append((kind, proposal, polished))
         step()
@@ -133,6 +136,18 @@ def ranked(
         for kind, start, own in found
     ]
     return sorted(fitted, key=lambda one: -one.gain)
+
+
+def _chosen(
+    tried: Sequence[tuple[float, str, Proposal]], least: float
+) -> list[tuple[str, Proposal]]:
+    """Return the proposals that are fitted: of few kinds, none far behind the best."""
+    found: list[tuple[str, Proposal]] = []
+    for value, kind, proposal in tried:
+        kinds = {one[0] for one in found}
+        if value >= least and (len(kinds) < _MOST or kind in kinds):
+            found.append((kind, proposal))
+    return found
 
 
 def _others(state: State, means: Sequence[Array]) -> NDArray[np.bool_]:

@@ -1,13 +1,13 @@
 """Numbers of simulated recordings, by camera: each recording is simulated once."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.layout import Layout
-from analysis.mismatch.model import Model, simulate
+from analysis.mismatch.model import Model, in_threads, simulate
 from analysis.mismatch.observe import Observation
 from dsis.camera import Camera
 
@@ -40,6 +40,26 @@ class Simulations:
     def keep(self, camera: Camera, numbers: Sequence[Array]) -> None:
         """Take numbers of a camera's first replicates that were found elsewhere."""
         self.kept[camera.model_dump_json()] = list(numbers)
+
+    def ready(self, cameras: Iterable[Camera], replicates: int) -> None:
+        """Simulate side by side what will be asked for: few recordings of each of many cameras."""
+        wanted = {camera.model_dump_json(): camera for camera in cameras}
+        missing = [
+            (key, number)
+            for key in wanted
+            for number in range(len(self.kept.get(key, ())), replicates)
+        ]
+        if self.jobs < 2 or len(missing) < 2:
+            return
+
+        def made(one: tuple[str, int]) -> Array:
+            key, number = one
+            model = self.model.with_camera(wanted[key])
+            (seen,) = simulate(model, self.layout, [number], self.seed, 1)
+            return self.numbers_of(seen)
+
+        for (key, _), numbers in zip(missing, in_threads(made, missing, self.jobs), strict=True):
+            self.kept[key] = [*self.kept.get(key, ()), numbers]
 
     def of(self, camera: Camera, replicates: int) -> Array:
         """Return the numbers of a camera's first replicates: (replicate, number)."""

@@ -16,7 +16,15 @@ import scipy.stats
 from numpy.typing import NDArray
 
 from analysis.mismatch.candidates import Proposal
-from analysis.mismatch.polish import Free, largest, moved, precisions, shifted, with_effects
+from analysis.mismatch.polish import (
+    Free,
+    free_of,
+    largest,
+    moved,
+    precisions,
+    shifted,
+    with_effects,
+)
 from analysis.mismatch.predict import Predictor
 from analysis.mismatch.state import State
 from dsis.camera import Camera
@@ -49,9 +57,7 @@ def settled(
         Effects as fitted, and which parameters are free.
     """
     effects = tuple(p.effect for p in proposals)
-    free: list[Free] = [
-        (i, name, name in p.signed) for i, p in enumerate(proposals) for name in p.free
-    ]
+    free = free_of(proposals)
     errors: tuple[dict[str, float], ...] = tuple({} for _ in proposals)
     if not free:
         return effects, errors
@@ -89,7 +95,8 @@ def _information(
     Sensors are added until their scatter is little beside the slopes, or as many as of a draft.
     """
     replicates = max(state.setting.replicates, _LEAST_SENSORS)
-    most = min(state.setting.drafts, len(state.simulated))
+    large = state.setting.replicates < _LEAST_SENSORS  # each simulation tells much and takes long
+    most = replicates if large else min(state.setting.drafts, len(state.simulated))
     while True:
         predictor = state.predictor(replicates)
         slopes = _slopes(predictor, bare, effects, free)
@@ -107,9 +114,11 @@ def _slopes(
     predictor: Predictor, bare: Camera, effects: tuple[Effect, ...], free: Sequence[Free]
 ) -> Array:
     """Return how numbers move with each parameter: (replicate, number, parameter)."""
+    beside = list(shifted(bare, effects, free))
+    predictor.ready(other for other, _ in beside)
     columns = [
         np.zeros_like(predictor.base) if other is None else predictor.changes(other) / step
-        for other, step in shifted(bare, effects, free)
+        for other, step in beside
     ]
     return np.stack(columns, 2)
 

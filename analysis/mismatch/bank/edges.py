@@ -40,11 +40,15 @@ def names(axis: str) -> Iterator[str]:
             yield f"fixed_edge of {axis}, {end}, {reach}"
 
 
+def decays(size: int) -> Array:
+    """Return exp(-d / reach) from the first and the last line: (shape, line)."""
+    line = np.arange(size)
+    distances = (line, size - 1 - line)
+    return np.array([np.exp(-d / reach) for d in distances for reach in REACHES.values()])
+
+
 @lru_cache(maxsize=64)
 def edge_shapes(size: int) -> Array:
     """Return the decays from the first and the last line, less smooth polynomials, of norm 1."""
-    line = np.arange(size)
-    distances = (line, size - 1 - line)
-    shapes = np.array([np.exp(-d / reach) for d in distances for reach in REACHES.values()])
-    rest = beyond_smooth(shapes.T).T
+    rest = beyond_smooth(decays(size).T).T
     return np.asarray(rest / np.linalg.norm(rest, axis=1, keepdims=True))

@@ -125,7 +125,8 @@ class WaveSums:
         fine[~self._looked_at()] = 0.0
         y, x = (int(i) for i in np.unravel_index(int(fine.argmax()), fine.shape))
         around = np.pad(fine, 1)
-        across = x / 2 + top(around[y + 1], x + 1) / 2
+        # At half a cycle per pixel both sides are alike: each is the other's conjugate.
+        across = x / 2 + (top(around[y + 1], x + 1) / 2 if x < columns else 0.0)
         along = y / 2 + top(around[:, x + 1], y + 1) / 2
         fx = frequency(across, columns)
         fy = frequency(along, rows)

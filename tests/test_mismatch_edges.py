@@ -1,0 +1,140 @@
+"""Lines that have not settled: the effect, the numbers that see it, and that it is named."""
+
+import sys
+from pathlib import Path
+from types import SimpleNamespace as Stub
+from typing import Any
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
+
+import numpy as np
+import pytest
+from planter import Choice, draw_case
+from planter.readout import settled
+from planter.view import View
+
+from analysis.mismatch import find_mismatch
+from analysis.mismatch.bank.edges import REACHES, edge_shapes, edges
+from analysis.mismatch.bank.edges import names as edge_names
+from analysis.mismatch.bank.parts import parts
+from analysis.mismatch.candidates.edges import CANDIDATES
+from dsis.cfa import Cfa
+from dsis.grid import PixelGrid
+from exposing import apply, effect
+from mismatch_recordings import camera, recorded
+
+EDGES = ["left", "right", "top", "bottom"]
+SURE = 5.0  # standard errors
+
+
+def _applied(image: np.ndarray, **parameters: Any) -> np.ndarray:
+    return apply(effect("line_settling", **parameters), image)
+
+
+@pytest.mark.parametrize("edge", EDGES)
+def test_offset_and_gain_decay_from_the_edge(edge: str) -> None:
+    """What is named and what the planter plants, written apart, are one thing."""
+    flat = np.full((24, 40), 500.0, np.float32)
+    own = {"offset_dn": -3.0, "gain_percent": 2.0, "length_pixels": 6.5, "edge": edge}
+    made = _applied(flat, **own)
+    turned = {"left": made, "right": made[:, ::-1], "top": made.T, "bottom": made[::-1].T}[edge]
+    expected = 500 + (10 - 3) * np.exp(-np.arange(turned.shape[1]) / 6.5)
+    np.testing.assert_allclose(turned, np.broadcast_to(expected, turned.shape), rtol=1e-6)
+    case = draw_case(3, "tiny", Choice(cfa="MONO"))
+    left = settled(View(case, 0, 0), own)
+    ones = np.zeros((case.rows, case.columns), np.float32)
+    again = _applied(ones, **{**own, "offset_dn": 1.0, "gain_percent": 0.0})
+    np.testing.assert_allclose(left, again, rtol=1e-4, atol=1e-7)
+
+
+def test_a_crop_is_the_crop_of_the_whole() -> None:
+    one = effect("line_settling", gain_percent=5.0, length_pixels=4.0, edge="right")
+    image = np.full((8, 32), 100.0)
+    grid = PixelGrid(8, 12, Cfa.MONO, first_column=20, sensor_rows=8, sensor_columns=32)
+    crop = apply(one, image[:, 20:], grid=grid)
+    np.testing.assert_allclose(crop, apply(one, image)[:, 20:])
+
+
+def test_numbers_of_edges_are_normal_where_there_is_none() -> None:
+    rng = np.random.default_rng(1)
+    found = [parts(rng.normal(0, 2.0, (48, 64)), 2.0).numbers for _ in range(200)]
+    for axis in ("rows", "columns"):
+        for name in edge_names(axis):
+            values = np.array([one[name][0] for one in found])
+            assert abs(values.mean()) < SURE / np.sqrt(200)
+            assert values.std() == pytest.approx(1, abs=SURE / np.sqrt(400))
+
+
+def test_numbers_of_edges_are_in_units_of_their_noise() -> None:
+    size, across, sd = 64, 48, 0.3
+    for i, reach in enumerate(REACHES.values()):
+        decay = 0.5 * np.exp(-np.arange(size) / reach)
+        found = edges(np.zeros(across), decay, (1.0, sd**2))
+        name = list(edge_names("columns"))[i]
+        expected = edge_shapes(size)[i] @ decay / (sd / np.sqrt(across))
+        assert found[name][0] == pytest.approx(expected)
+        assert found[name][0] > 0
+
+
+def test_so_few_lines_that_a_decay_is_a_surface_have_no_number() -> None:
+    found = edges(np.zeros(12), np.zeros(64), (1.0, 1.0))
+    assert all(np.isnan(found[name][0]) for name in edge_names("rows"))
+    assert all(np.isfinite(found[name][0]) for name in edge_names("columns"))
+
+
+def _clues(offset: np.ndarray, gain: np.ndarray, *effects: object, top: float = 1000.0) -> Any:
+    images = {"offset": {"MONO": (offset, 0.05)}, "gain": {"MONO": (gain, 0.05)}}
+    rows, columns = offset.shape
+    return Stub(
+        image=images.__getitem__,
+        scale=lambda name, _channel: top if name == "gain" else 1.0,
+        layout=Stub(rows=rows, columns=columns, sites={"MONO": (0, 0)}),
+        shape=lambda _channel: (rows, columns),
+        camera=Stub(effect=effects),
+    )
+
+
+@pytest.mark.parametrize("edge", EDGES)
+def test_proposals_start_from_what_the_maps_show(edge: str) -> None:
+    rng = np.random.default_rng(2)
+    own = {"length_pixels": 5.0, "edge": edge}
+    noise = rng.normal(0, 0.05, (2, 96, 128))
+    dark = np.zeros((96, 128), np.float32)
+    offset = noise[0] + _applied(dark, offset_dn=-1.5, **own)
+    # A map of gains in DN at the brightest signal: 1 % of 1000.
+    gain = noise[1] + _applied(dark + 1000, gain_percent=1.0, **own) - 1000
+    (proposal,) = CANDIDATES[0].propose(_clues(offset, gain))
+    values = proposal.effect.model_dump()
+    assert values["edge"] == edge
+    assert values["offset_dn"] == pytest.approx(-1.5, rel=0.1)
+    assert values["gain_percent"] == pytest.approx(1.0, rel=0.1)
+    assert values["length_pixels"] == pytest.approx(5.0, rel=0.15)
+    assert proposal.free == ("offset_dn", "gain_percent", "length_pixels")
+    known = effect("line_settling", offset_dn=-1.5, gain_percent=1.0, **own)
+    assert not CANDIDATES[0].propose(_clues(offset, gain, known))
+    (alone,) = CANDIDATES[0].propose(_clues(offset, noise[1]))
+    assert alone.free == ("offset_dn", "length_pixels")
+
+
+def test_lines_that_have_not_settled_are_named_with_their_numbers() -> None:
+    own = {"offset_dn": -1.0, "gain_percent": 1.0, "length_pixels": 5.0}
+    true = camera(effect("line_settling", edge="right", **own))
+    words = frozenset({"line_settling", "column_prnu", "column_fpn", "shading", "amp_glow"})
+    found = find_mismatch(camera(), recorded(true, 9), seed=1, vocabulary=words)
+    (named,) = found.omitted_physics
+    assert named.effect == "line_settling"
+    assert not found.unexplained
+    for name, value in own.items():
+        fitted = named.parameters[name]
+        assert abs(fitted.value - value) < 4 * fitted.standard_error  # type: ignore[operator] # one number
+    (where,) = [m.where for m in found.mismatches if m.statistic == "fixed_edge"]
+    assert where.columns == (128 - 1 - 16, 128 - 1)
+    assert where.rows is None
+
+
+def test_without_its_word_nothing_else_is_named() -> None:
+    one = effect("line_settling", gain_percent=1.0, length_pixels=5.0)
+    words = frozenset({"column_prnu", "column_fpn", "shading", "amp_glow", "tap_mismatch"})
+    found = find_mismatch(camera(), recorded(camera(one), 9), seed=1, vocabulary=words)
+    assert not [one.effect for one in found.omitted_physics]
+    assert any(m.statistic == "fixed_edge" for m in found.unexplained)

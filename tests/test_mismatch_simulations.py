@@ -1,0 +1,59 @@
+"""Simulations that are made ahead, side by side: the same as one by one, and each made once."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import analysis.mismatch.simulations as module
+from analysis.mismatch.simulations import Simulations
+from mismatch_recordings import camera
+
+CAMERAS = [camera(black=64.0 + i) for i in range(3)]
+
+
+class Model:
+    """A model whose recordings are told by camera and number."""
+
+    def __init__(self, own: Any = None) -> None:
+        self.camera = own
+
+    def with_camera(self, own: Any) -> "Model":
+        return Model(own)
+
+
+@pytest.fixture
+def made(monkeypatch: pytest.MonkeyPatch) -> list[tuple[float, int]]:
+    """Return what was simulated: the camera's black level, and the replicate."""
+    found: list[tuple[float, int]] = []
+
+    def simulate(model: Any, _layout: Any, replicates: Any, _seed: int, _jobs: int) -> list[Any]:
+        found.extend((model.camera.black_level, number) for number in replicates)
+        return [(model.camera.black_level, number) for number in replicates]
+
+    monkeypatch.setattr(module, "simulate", simulate)
+    return found
+
+
+def simulations(jobs: int) -> Simulations:
+    anything: Any = None
+    model: Any = Model()
+    return Simulations(anything, model, np.array, 1, jobs)
+
+
+@pytest.mark.parametrize("jobs", [1, 2, 3])
+def test_what_is_made_ahead_is_what_would_be_made(jobs: int, made: list[tuple[float, int]]) -> None:
+    own = simulations(jobs)
+    own.of(CAMERAS[1], 1)
+    own.ready([*CAMERAS, CAMERAS[0]], 2)
+    assert len(made) == (6 if jobs > 1 else 1)
+    for one in CAMERAS:
+        expected = [[one.black_level, number] for number in range(2)]
+        np.testing.assert_array_equal(own.of(one, 2), expected)
+    assert sorted(made) == [(one.black_level, number) for one in CAMERAS for number in range(2)]
+
+
+def test_a_single_one_is_left_to_who_asks(made: list[tuple[float, int]]) -> None:
+    own = simulations(2)
+    own.ready(CAMERAS[:1], 1)
+    assert not made

@@ -26,6 +26,7 @@ from planter.tables import share, table
 
 STRENGTHS = (5, 10, 20)
 DRAWS = 40
+CLEAR = 10  # from here on effects are to be located
 
 
 def background(kind: str, seed: int, number: int) -> Case:
@@ -92,6 +93,9 @@ def report(entries: list[dict[str, Any]]) -> None:
         placed = share(sum(e["placed"] for e in own), len(own))
         right = share(sum(e["kind"] in e["named"] for e in own), len(own))
         print(f"z {wanted}: located in its place {placed}; named {right}")
+    clear = [e for e in seen if e["z"] >= CLEAR]
+    print(f"z {CLEAR} and more: located in its place "
+          f"{share(sum(e['placed'] for e in clear), len(clear))}")  # fmt: skip
     for e in seen:
         if not e["placed"] and e["z"] >= 0.9 * 10:
             what = e["error"] or [m[:2] for m in e["mismatches"][:4]]

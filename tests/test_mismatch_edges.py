@@ -18,11 +18,33 @@ from analysis.mismatch.bank.edges import REACHES, edge_shapes, edges
 from analysis.mismatch.bank.edges import names as edge_names
 from analysis.mismatch.bank.parts import parts
 from analysis.mismatch.candidates.edges import CANDIDATES
+from analysis.mismatch.finding import Change, Finding, FittedParameter, Gain, OmittedEffect, Proof
+from analysis.mismatch.jsonfile import finding_values
+from analysis.mismatch.report.sentences import verdict
+from analysis.mismatch.report.summary import summary
 from dsis.cfa import Cfa
 from dsis.grid import PixelGrid
 from exposing import apply, effect
 from mismatch_recordings import camera, recorded
 
+NAMED = Finding(
+    "omitted_physics",
+    (),
+    (),
+    (
+        OmittedEffect(
+            "line_settling",
+            {"length_pixels": FittedParameter(6.0, 0.5)},
+            ("fixed_edge",),
+            Gain(3.0, (2.0, 4.0)),
+            choices={"edge": "top"},
+        ),
+    ),
+    (),
+    (),
+    Proof({}, Change(-1.0, -0.9), Change(1, 0), None, None),
+    camera(),
+)
 EDGES = ["left", "right", "top", "bottom"]
 SURE = 5.0  # standard errors
 
@@ -128,7 +150,7 @@ def test_lines_that_have_not_settled_are_named_with_their_numbers() -> None:
         fitted = named.parameters[name]
         assert abs(fitted.value - value) < 4 * fitted.standard_error  # type: ignore[operator] # one number
     (where,) = [m.where for m in found.mismatches if m.statistic == "fixed_edge"]
-    assert where.columns == (128 - 1 - 16, 128 - 1)
+    assert where.columns == (128 - 16, 128 - 1)
     assert where.rows is None
 
 
@@ -138,3 +160,29 @@ def test_without_its_word_nothing_else_is_named() -> None:
     found = find_mismatch(camera(), recorded(camera(one), 9), seed=1, vocabulary=words)
     assert not [one.effect for one in found.omitted_physics]
     assert any(m.statistic == "fixed_edge" for m in found.unexplained)
+
+
+def test_one_column_at_the_edge_is_no_decay() -> None:
+    stacks = recorded(camera(), 9)
+    assert stacks.stacks is not None
+    for stack in stacks.stacks.values():
+        stack[:, :, 0] += 5
+    words = frozenset({"line_settling", "amp_glow", "shading"})
+    found = find_mismatch(camera(), stacks, seed=1, vocabulary=words)
+    assert not found.omitted_physics
+    assert "fixed_edge" in {m.statistic for m in found.unexplained}
+
+
+def test_one_hot_pixel_at_the_edge_is_no_decay() -> None:
+    rng = np.random.default_rng(4)
+    image = rng.normal(0, 1, (48, 64))
+    image[20, 0] += 400.0
+    assert abs(parts(image, 1.0).numbers["fixed_edge of columns, first, near"][0]) < SURE
+
+
+def test_a_named_decay_says_at_which_edge() -> None:
+    values = finding_values(NAMED)
+    (named,) = values["omitted_physics"]
+    assert named["choices"] == {"edge": "top"}
+    assert "edge top; length 6.00 ± 0.50 pixels" in verdict(NAMED)[0]
+    assert "edge top" in summary(NAMED)

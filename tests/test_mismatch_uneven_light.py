@@ -76,3 +76,13 @@ def test_the_fall_of_a_lens_is_a_fall_and_no_bow(tmp_path: Path) -> None:
     values = {name: parameter.value for name, parameter in named.parameters.items()}
     assert 16 < values["falloff_percent"] < 24  # type: ignore[operator] # one number
     assert values["bow_down_percent"] == values["bow_right_percent"] == 0
+
+
+@pytest.mark.parametrize("fall", [10.0, 70.0])
+def test_a_camera_that_knows_its_lens_matches_its_own_recording(fall: float) -> None:
+    """What a fall of the light takes of the level is taken once, however much it is."""
+    known = camera(_shading(falloff_percent=fall))  # type: ignore[arg-type] # an effect of the registry
+    found = find_mismatch(known, recorded(known, 9), seed=1, vocabulary=frozenset())
+    assert found.verdict == "match"
+    assert not found.searched
+    assert any("No physics was looked for" in remark for remark in found.remarks)

@@ -86,13 +86,33 @@ def test_a_wave_halfway_between_bins_keeps_most_of_its_power(down: int, right: i
 @pytest.mark.parametrize("cfa", [Cfa.MONO, Cfa.RGGB])
 def test_white_noise_has_one_everywhere_and_rare_peaks_rarely(cfa: Cfa) -> None:
     rng = np.random.default_rng(3)
-    many = [summed([noise(rng), noise(rng)], cfa) for _ in range(40)]
-    parts = [part.mean() for one in many for part in (one.power[:, :, 3:-3, 3:-3] / one.weight)]
-    assert np.mean(parts) == pytest.approx(1, abs=0.01)
+    many = [summed([noise(rng), noise(rng)], cfa) for _ in range(60)]
+    for down in (0, 1):
+        for right in (0, 1):
+            parts = [one.power[down, right, 3:-3, 3:-3] / one.weight for one in many]
+            assert np.mean(parts) == pytest.approx(1, abs=0.01)
     scores = np.array([one.number()[0] for one in many])
-    for score in (0.5, 1.0, 2.0):  # bins and three kinds of places between them are tried at once
-        rare = min(4 * norm.sf(score), 1.0)
-        assert (scores > score).mean() < rare + SURE * sqrt(rare * (1 - rare) / 40) + 1e-9
+    for score in (2.0, 2.5, 3.0):  # bins and three kinds of places between them are tried at once
+        rare = 4 * norm.sf(score)
+        assert (scores > score).mean() < rare + SURE * sqrt(rare * (1 - rare) / 60)
+    assert scores.mean() > 0  # and none of them is empty
+
+
+@pytest.mark.parametrize("uneven", ["pixel", "vignette", "middle"])
+def test_noise_that_is_uneven_over_the_sensor_is_no_wave(uneven: str) -> None:
+    """Between bins the middle of the sensor counts more than its edges."""
+    rng = np.random.default_rng(9)
+    y, x = (np.linspace(-1, 1, size) for size in (ROWS, COLUMNS))
+    square = y[:, np.newaxis] ** 2 + x**2
+    sd = {
+        "pixel": np.ones((ROWS, COLUMNS)),
+        "vignette": np.sqrt(1 - 0.45 * square),
+        "middle": np.sqrt(1 + 2 * np.exp(-4 * square)),
+    }[uneven]
+    if uneven == "pixel":
+        sd[ROWS // 2, COLUMNS // 2] = 50.0
+    stacks = [1000 + sd * rng.normal(0, 1, (FRAMES, ROWS, COLUMNS)) for _ in range(6)]
+    assert summed(stacks, Cfa.MONO).number()[0] < 4.0
 
 
 @settings(max_examples=12, deadline=None)
@@ -146,12 +166,25 @@ def test_a_checkerboard_has_a_number_of_its_own() -> None:
     assert (peak.fx, abs(peak.fy)) == (0.5, 0.5)
 
 
-@pytest.mark.parametrize("shape", [(5, 7), (8, 9), (9, 8), (6, 6)])
-@pytest.mark.parametrize("cfa", [Cfa.MONO, Cfa.RGGB])
-def test_small_and_odd_sensors_have_a_number_or_none(shape: tuple[int, int], cfa: Cfa) -> None:
+@pytest.mark.parametrize("shape", [(15, 21), (16, 21), (15, 20), (16, 20)])
+def test_odd_sensors_look_at_places_that_are_measured(shape: tuple[int, int]) -> None:
     rng = np.random.default_rng(7)
-    value, sd = summed([noise(rng, shape)], cfa, shape).number()
-    assert np.isnan(value) or (value < SURE and sd == 1.0)
+    sums = [summed([noise(rng, shape)], Cfa.MONO, shape) for _ in range(20)]
+    for parts in zip(*(one._parts() for one in sums), strict=True):
+        assert np.min(parts) > 0
+        assert np.mean(parts) / sums[0].weight == pytest.approx(1, abs=0.1)
+    assert all(one.number()[0] < SURE for one in sums)
+
+
+@pytest.mark.parametrize("shape", [(2, 2), (4, 4), (6, 6)])
+@pytest.mark.parametrize("cfa", [Cfa.MONO, Cfa.RGGB])
+def test_the_smallest_sensors_are_no_error(shape: tuple[int, int], cfa: Cfa) -> None:
+    if cfa is not Cfa.MONO and min(shape) < 4:
+        return
+    sums = summed([noise(np.random.default_rng(7), shape)], cfa, shape)
+    value, _ = sums.number()
+    assert np.isnan(value) or value < SURE
+    sums.peak()
 
 
 def test_frames_without_noise_say_nothing() -> None:

@@ -113,7 +113,8 @@ def find_mismatch(
         departures = Change(len(whole.mismatches), len(final.mismatches))
         proof = replace(proof, discrepancies=departures)
     found = _finding(camera, whole, final, search, gains, proof)
-    return replace(found, remarks=(*remarks, *found.remarks), evidence=evidence)
+    remarks = (*remarks, *found.remarks)
+    return replace(found, remarks=remarks, searched=bool(words), evidence=evidence)
 
 
 def _of_all_frames(
@@ -240,11 +241,13 @@ def _finding(
 
 
 def _omitted(named: Named, why: tuple[str, ...], gain: Gain) -> OmittedEffect:
-    parameters = {}
+    parameters, choices = {}, {}
     if named.proposal is not None:
         effect = named.proposal.effect
         for name, value in effect.model_dump(exclude={"kind"}).items():
-            if isinstance(value, tuple):
+            if isinstance(value, str):
+                choices[name] = value
+            elif isinstance(value, tuple):
                 parameters[name] = FittedParameter(value, 0.0)
             elif isinstance(value, (int, float)) and not isinstance(value, bool):
                 error = named.errors.get(name, 0.0 if name not in named.proposal.free else np.inf)
@@ -260,4 +263,4 @@ def _omitted(named: Named, why: tuple[str, ...], gain: Gain) -> OmittedEffect:
         )
         for kind, worse in named.rivals
     )
-    return OmittedEffect(named.kind, parameters, why, gain, rivals)
+    return OmittedEffect(named.kind, parameters, why, gain, rivals, choices)

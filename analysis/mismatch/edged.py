@@ -4,14 +4,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.bank.edges import decays
+from analysis.mismatch.bank.seams import beyond_smooth
 from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.state import State
+from dsis.effects import Effect
+from dsis.effects.line_settling import LineSettling
 
 Array = NDArray[np.float64]
 STATISTIC = "fixed_edge"
 # Where each kind is seen; of two maps of a gain the one that knows of no other.
 _MAPS = {"shading": ("gain",), "tap_mismatch": ("gain",), "amp_glow": ("time", "gain")}
 _MOST = 0.5  # of what the surfaces explain, that decays may feign
+_SURE, _SEEN = 2.0, 3.0  # standard errors
+_MEDIAN = 0.455  # of chi-squared of one degree of freedom
 
 
 def decaying(state: State) -> bool:
@@ -46,11 +51,45 @@ def edged(state: State, kind: str) -> Denial | None:
     return Denial(beside / alone, "lines that decay from an edge make most of what it explains")
 
 
+def single(state: State, effect: Effect) -> Denial | None:
+    """Return how a decay is denied by lines beyond the first; None: they show it.
+
+    One line that differs, at the edge, is no decay, however short.
+    """
+    if not isinstance(effect, LineSettling):
+        return None
+    layout, images = state.setting.layout, state.setting.seen.images
+    axis = int(effect.edge in ("left", "right"))
+    size = (layout.rows, layout.columns)[axis]
+    top = bottom = 0.0
+    for (channel, name), (image, noise) in images.items():
+        amplitude = {"offset": effect.offset_dn, "gain": effect.gain_percent / 100}.get(name)
+        if not amplitude:
+            continue
+        scale = layout.regressors(channel).scales[name] if name == "gain" else 1.0
+        step = 1 if channel == "MONO" else 2
+        line = layout.sites[channel][axis] + step * np.arange(image.shape[axis])
+        distance = line if effect.edge in ("left", "top") else size - 1 - line
+        beyond = distance >= step
+        means = beyond_smooth(image.mean(1 - axis)[beyond])
+        shape = beyond_smooth(np.exp(-distance[beyond] / effect.length_pixels))
+        square = max(noise**2 * means.size / image.size, float(np.median(means**2)) / _MEDIAN)
+        top += amplitude * scale * float(shape @ means) / square
+        bottom += (amplitude * scale) ** 2 * float(shape @ shape) / square
+    if bottom > 0 and (top + _SURE * bottom**0.5) / bottom >= _MOST and bottom > _SEEN**2:
+        return None
+    share = max(top / bottom, 0.0) if bottom > 0 else 0.0
+    return Denial(share, "beyond the line at the edge nothing is seen of the decay")
+
+
 def _designs(size: int) -> tuple[Array, Array]:
-    """Return tilt, bow and halves, and decays from both ends: (line, shape) each."""
+    """Return tilt, bow and halves, and what lies at the ends: (line, shape) each.
+
+    At each end are decays, and a line of its own.
+    """
     line = np.linspace(-1, 1, size)
     smooth = np.stack([line, line**2, np.where(line < 0, -1.0, 1.0)], 1)
-    return smooth, np.asarray(decays(size).T)
+    return smooth, np.vstack([decays(size), np.eye(size)[[0, -1]]]).T
 
 
 def _left(values: Array, design: Array) -> float:

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from analysis.mismatch.bank.edges import edge_shapes
 from analysis.mismatch.bank.seams import SMOOTH_DEGREE, beyond_smooth, seam_shapes
 from analysis.mismatch.contradicted import Denial
-from analysis.mismatch.edged import STATISTIC, edged
+from analysis.mismatch.edged import STATISTIC, edged, single
 from analysis.mismatch.state import State
 from analysis.mismatch.uneven import uneven
 from dsis.effects import Effect
@@ -32,6 +32,7 @@ def of_another(state: State, effect: Effect, without: Array) -> Denial | None:
         or outlying(state, kind)
         or stepped(state, kind)
         or edged(state, kind)
+        or single(state, effect)
         or heated(state, kind)
         or uneven(state, effect)
     )

@@ -57,16 +57,15 @@ def fill(folder: Path, finding: Finding, origin: str = "", maps: SensorMaps | No
 def camera_text(finding: Finding, origin: str = "") -> str:
     """Return camera.toml: the model with the physics named, comments on what it rests on."""
     comments = [line for line in origin.splitlines() if line]
-    comments.append("Re-calibrated on the training frames, and with the physics found there.")
+    found = ", and with the physics found there" if finding.searched else ""
+    comments.append(f"Re-calibrated on the training frames{found}.")
     comments += [
         f"{effect.effect}: {fitted(name, parameter)}"
         for effect in finding.omitted_physics
         for name, parameter in effect.parameters.items()
     ]
     if finding.unexplained:
-        comments.append(
-            f"{len(finding.unexplained)} departures stay unexplained; see mismatch.json."
-        )
+        comments.append(f"{len(finding.unexplained)} departures stay; see mismatch.json.")
     comments += finding.remarks
     lines = [line for comment in comments for line in comment.splitlines()]
     return "".join(f"# {line}\n" for line in lines) + camera_tables(camera_values(finding.camera))

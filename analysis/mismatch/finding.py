@@ -126,6 +126,8 @@ class OmittedEffect:
     because: tuple[str, ...]
     heldout_gain: Gain
     alternatives: tuple[Alternative, ...] = ()
+    choices: Mapping[str, str] = field(default_factory=dict)
+    """Of its parameters those that are words: an edge, the regions of amplifiers."""
 
 
 @dataclass(frozen=True)
@@ -172,6 +174,8 @@ class Finding:
         The camera model re-calibrated, with the effects named.
     remarks
         What limits the result, in sentences.
+    searched
+        Whether physics was looked for.
     evidence
         What the report draws: `analysis.mismatch.evidence.Evidence`; no part of the JSON.
     """
@@ -185,6 +189,7 @@ class Finding:
     proof: Proof
     camera: Camera
     remarks: tuple[str, ...] = ()
+    searched: bool = True
     evidence: Any = field(default=None, compare=False, repr=False)
 
     def values(self) -> dict[str, Any]:

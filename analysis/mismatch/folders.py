@@ -71,7 +71,11 @@ def diagnose_recordings(
     InputError
         A file, an option or `out` cannot be used: all faults of files and options at once.
     """
-    camera, opened = _read(camera_file, recordings, _unknown(without))
+    faults = _unknown(without)
+    if locate_only and without:
+        fact = "is given beside --locate-only, which names nothing: give one of the two"
+        faults.append(Fault("--without", "", fact))
+    camera, opened = _read(camera_file, recordings, faults)
     allowed = VOCABULARY - set(VOCABULARY if locate_only else without)
     maps = _maps(camera_file)
     folders = _folders(opened, out)

@@ -70,6 +70,7 @@ def _omitted(effect: OmittedEffect) -> Values:
         "because": effect.because,
         "heldout_gain": vars(effect.heldout_gain),
         "alternatives": [_alternative(a) for a in effect.alternatives],
+        **({"choices": dict(effect.choices)} if effect.choices else {}),
     }
 
 

@@ -175,7 +175,7 @@ def _lines(key: Key, axis: str, size: int) -> tuple[int, int] | None:
     if key.statistic == "half_seam":
         return size // 2 - 1, size // 2
     if key.statistic == "fixed_edge":
-        return (0, _EDGE) if "first" in key.detail else (size - 1 - _EDGE, size - 1)
+        return (0, _EDGE - 1) if "first" in key.detail else (size - _EDGE, size - 1)
     return None
 
 

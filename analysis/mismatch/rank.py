@@ -117,10 +117,13 @@ def ranked(
     tried = _tried(state, kinds, memory, step, settled, apart, possible)
     best = max((value for value, _, _ in tried), default=0.0)
     far = max(_FAR, _SHARE * (best - before))
-    chosen = _chosen(tried, best - far)
-    predictor.ready(c for _, own in chosen for c in needed(state.camera, [own]))
+    likely = _likely(tried, best - far)
+    predictor.ready(c for own in likely for c in needed(state.camera, [own]))
     found: list[tuple[str, Proposal, Polished]] = []
-    for kind, proposal in chosen:
+    for value, kind, proposal in tried:
+        kinds_so_far = {one[0] for one in found}
+        if value < best - far or (len(kinds_so_far) >= _MOST and kind not in kinds_so_far):
+            continue
         own = state.predictor(replicates_for(state.setting, [proposal.effect]))
         rounds = 1 + len(proposal.free)
         if state.setting.replicates == 1:  # of a large recording steps are long and sure
@@ -138,16 +141,11 @@ def ranked(
     return sorted(fitted, key=lambda one: -one.gain)
 
 
-def _chosen(
-    tried: Sequence[tuple[float, str, Proposal]], least: float
-) -> list[tuple[str, Proposal]]:
-    """Return the proposals that are fitted: of few kinds, none far behind the best."""
-    found: list[tuple[str, Proposal]] = []
-    for value, kind, proposal in tried:
-        kinds = {one[0] for one in found}
-        if value >= least and (len(kinds) < _MOST or kind in kinds):
-            found.append((kind, proposal))
-    return found
+def _likely(tried: Sequence[tuple[float, str, Proposal]], least: float) -> list[Proposal]:
+    """Return the proposals that will be fitted unless a fit fails."""
+    near = [(kind, proposal) for value, kind, proposal in tried if value >= least]
+    kinds = list(dict.fromkeys(kind for kind, _ in near))[:_MOST]
+    return [proposal for kind, proposal in near if kind in kinds]
 
 
 def _others(state: State, means: Sequence[Array]) -> NDArray[np.bool_]:

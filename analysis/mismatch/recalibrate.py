@@ -19,7 +19,8 @@ from dsis.camera import BaseNoise, Camera, Segment
 from dsis.effects.quantisation import Quantisation
 from dsis.measures.spikes import SPIKED
 
-_ROUNDS = 3
+_ROUNDS = 4
+_LEAST = 1e-3  # of a signal: no pattern is known better
 _SAME = 0.05  # of an error: the fit has settled
 _SWITCH_DEVIANCE = 12.0  # by which another gap must fit better before the switch is moved
 _APART = 1.005  # ratio of signals from which they are two levels
@@ -93,7 +94,7 @@ def calibrate(
     for _ in range(_ROUNDS if spiky or bends(camera.effect) else 1):
         recorded = _sum(undone, effects)
         fit = fitted(recorded, switches)
-        if before is not None and _same(before, fit):
+        if before is not None and _same(before, fit, seen.levels):
             break
         before = fit
         if len(switches) == 1:
@@ -109,17 +110,30 @@ def calibrate(
     return Calibrated(model, fit, fitted(offsets, switches), offsets, switches, left_out)
 
 
-def _same(one: BaseFit, other: BaseFit) -> bool:
-    """Return whether two fits differ by little of their errors."""
+def _same(one: BaseFit, other: BaseFit, levels: Mapping[Place, Level]) -> bool:
+    """Return whether two fits differ by little of their errors, and by less of their signals.
+
+    A fall of the light takes of level and variance alike: slope and intercept know nothing of it.
+    """
 
     def near(a: float, b: float, error: float) -> bool:
         return not isfinite(error) or abs(a - b) <= _SAME * error
 
-    return all(
-        near(a.slope, b.slope, a.slope_error) and near(a.intercept, b.intercept, a.intercept_error)
-        for a, b in zip(one.pieces, other.pieces, strict=True)
-    ) and all(
-        near(value, other.black_dn[c], one.black_error_dn[c]) for c, value in one.black_dn.items()
+    settled = all(
+        near(signal, other.signal_dn[place], max(levels[place].level_error_dn, _LEAST * signal))
+        for place, signal in one.signal_dn.items()
+    )
+    return (
+        settled
+        and all(
+            near(a.slope, b.slope, a.slope_error)
+            and near(a.intercept, b.intercept, a.intercept_error)
+            for a, b in zip(one.pieces, other.pieces, strict=True)
+        )
+        and all(
+            near(value, other.black_dn[c], one.black_error_dn[c])
+            for c, value in one.black_dn.items()
+        )
     )
 
 

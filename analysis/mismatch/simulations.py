@@ -58,8 +58,12 @@ class Simulations:
             (seen,) = simulate(model, self.layout, [number], self.seed, 1)
             return self.numbers_of(seen)
 
+        ahead: dict[str, list[Array]] = {}
         for (key, _), numbers in zip(missing, in_threads(made, missing, self.jobs), strict=True):
-            self.kept[key] = [*self.kept.get(key, ()), numbers]
+            ahead.setdefault(key, []).append(numbers)
+        for key, more in ahead.items():
+            known = self.kept.get(key, [])
+            self.kept[key] = [*known[: replicates - len(more)], *more]
 
     def of(self, camera: Camera, replicates: int) -> Array:
         """Return the numbers of a camera's first replicates: (replicate, number)."""

@@ -137,6 +137,16 @@ def _same_wave(
     return False
 
 
+def _at_edge(case: Case, where: Where) -> bool:
+    """Accept what lies at the planted edge."""
+    p = case.planted("line_settling") or {}
+    across = p["edge"] in ("left", "right")
+    lines, size = where.get("columns" if across else "rows"), case.columns if across else case.rows
+    if not lines:
+        return False
+    return lines[0] == 0 if p["edge"] in ("left", "top") else lines[1] == size - 1
+
+
 PLACES: dict[str, Place] = {
     **dict.fromkeys(
         (
@@ -157,6 +167,7 @@ PLACES: dict[str, Place] = {
         _lit,
     ),
     **dict.fromkeys(("dark_current", "hot_pixels", "amp_glow"), _longest),
+    "line_settling": _at_edge,
     "saturation": _brightest,
     "channel_imbalance": _green,
     "line_flicker": _lit,

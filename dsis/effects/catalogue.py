@@ -85,7 +85,7 @@ def _allowed(field: FieldInfo) -> str:
     if choices:
         return f"{len(choices)} numbers, {_bounds(choices[0].__metadata__[0].metadata)}"
     kind = "whole number" if field.annotation is int else "number"
-    return f"{kind}, {_bounds(field.metadata)}"
+    return ", ".join(part for part in (kind, _bounds(field.metadata)) if part)
 
 
 def _bounds(metadata: Any) -> str:

@@ -58,15 +58,15 @@ class LineSettling(Effect):
 
     def contributions(self, point: OperatingPoint) -> Mapping[str, float]:
         """Return what the decay makes of the mean level and of shot noise, over all pixels."""
-        lines = point.columns if self.edge in ("left", "right") else point.rows
-
-        def mean(power: int) -> float:
-            """Return the mean over lines of s to a power: a geometric sum."""
-            fall = power / self.length_pixels
-            return float(np.expm1(-lines * fall) / np.expm1(-fall)) / lines
-
+        first, second = (self.mean_share((point.rows, point.columns), power) for power in (1, 2))
         gain = self.gain_percent / 100
         return {
-            "level": (gain * point.signal_dn + self.offset_dn) * mean(1),
-            "pixel_variance": (2 * gain * mean(1) + gain**2 * mean(2)) * point.shot_variance_dn2,
+            "level": (gain * point.signal_dn + self.offset_dn) * first,
+            "pixel_variance": (2 * gain * first + gain**2 * second) * point.shot_variance_dn2,
         }
+
+    def mean_share(self, shape: tuple[int, int], power: int = 1) -> float:
+        """Return the mean of s to a power over a sensor of rows and columns: a geometric sum."""
+        lines = shape[self.edge in ("left", "right")]
+        fall = power / self.length_pixels
+        return float(np.expm1(-lines * fall) / np.expm1(-fall)) / lines

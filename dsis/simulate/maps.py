@@ -10,6 +10,7 @@ from pydantic import ConfigDict
 
 from dsis.camera import Camera
 from dsis.effects import Effect, Exposure, Image, Stage, registry
+from dsis.effects.line_settling import LineSettling
 from dsis.errors import Fault, InputError
 from dsis.grid import PixelGrid
 
@@ -165,7 +166,16 @@ def with_maps(camera: Camera, maps: SensorMaps, grid: PixelGrid) -> Camera:
         found, wanted = (" x ".join(map(str, s)) for s in (maps.dsnu_dn.shape, grid.shape))
         raise InputError.of(MAPS, "", f"is of {found} pixels, must be of {wanted} (rows x columns)")
     kept = tuple(effect for effect in camera.effect if effect.kind not in REPLACED)
-    links: list[Effect] = [GainMap(gains=maps.prnu_gain), OffsetMap(offsets_dn=maps.dsnu_dn)]
+    offset, gain = np.float32(0), np.float32(1)
+    for effect in camera.effect:
+        if isinstance(effect, LineSettling):  # a map has no mean of its own
+            mean = effect.mean_share(grid.sensor_shape)
+            offset += np.float32(effect.offset_dn * mean)
+            gain *= np.float32(1 + effect.gain_percent / 100 * mean)
+    links: list[Effect] = [
+        GainMap(gains=maps.prnu_gain * gain),
+        OffsetMap(offsets_dn=maps.dsnu_dn + offset),
+    ]
     if maps.prnu_noise:
         links.append(registry()["prnu"].model_validate({"sigma_percent": 100 * maps.prnu_noise}))
     if maps.dsnu_noise_dn:

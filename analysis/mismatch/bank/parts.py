@@ -16,6 +16,7 @@ from dsis.measures.fixed_pattern import Smooth
 from dsis.measures.residuals import pixel_residuals
 
 Array = NDArray[np.float64]
+_FAR_OUT, _FEW = 5.0, 0.01  # standard deviations of single pixels, and their share at most
 _CHANCE = 3.0  # standard errors of a mean square
 STANDING_OUT = (3.5, 5)  # standard deviations of a map above its middle
 
@@ -77,7 +78,7 @@ def parts(image: Array, noise: float) -> Parts:
         "outlying_pixels": _outlying(scatter + mean_square**2, square, pixels.size),
         **_standing_out(pixels, square),
         **seams(by_row, by_column, lines),
-        **edges(by_row, by_column, lines),
+        **edges(*_of_many(pixels, square, by_row, by_column), lines),
     }
     return Parts(pixels, rows, columns, square, coefficients, numbers)
 
@@ -89,6 +90,16 @@ def sure_of_lines(lines: float, pixels: float, dof: float) -> float:
     units of a noise that is one tenth too large would be off by many standard errors.
     """
     return max(pixels, lines / (1 + _CHANCE * sqrt(2 / dof)))
+
+
+def _of_many(pixels: Array, square: float, by_row: Array, by_column: Array) -> tuple[Array, Array]:
+    """Return line means without what few pixels that stand far out add to them."""
+    y, x = np.nonzero(np.abs(pixels) > _FAR_OUT * sqrt(square))
+    if not 0 < y.size < _FEW * pixels.size:
+        return by_row, by_column
+    own = pixels[y, x]
+    row = by_row - np.bincount(y, own, by_row.size) / by_column.size
+    return row, by_column - np.bincount(x, own, by_column.size) / by_row.size
 
 
 def _correlations(pixels: Array, square: float) -> dict[str, Number]:

@@ -107,21 +107,27 @@ class WaveSums:
         if not self.weight or not parts:
             return UNKNOWN
         degrees = max(round(self.weight**2 / self.squares), 1)
-        white = white_level(parts[0], degrees)
-        if not white > 0:
+        # Each by itself: between bins the middle of the sensor counts more than its edges, and
+        # where the noise is larger there, all of them are higher.
+        whites = [white_level(part, degrees) for part in parts]
+        if not min(whites) > 0:
             return UNKNOWN
-        least = min(log_chance(float(p.max()) / white, 1, p.size, degrees) for p in parts)
+        least = min(
+            log_chance(float(part.max()) / white, 1, part.size, degrees)
+            for part, white in zip(parts, whites, strict=True)
+        )
         return score_of_log(least), 1.0
 
     def peak(self) -> Peak | None:
         """Return where the power is largest: cycles per pixel of a plane, power as one shows it."""
-        if not self.weight:
+        if not self.weight or not all(np.median(own) > 0 for own in self.power.reshape(4, -1)):
             return None
         rows, columns = self.shape
         fine = np.zeros((2 * rows, 2 * self.power.shape[3]))
         for down in (0, 1):
             for right in (0, 1):
-                fine[down::2, right::2] = self.power[down, right]
+                own = self.power[down, right]
+                fine[down::2, right::2] = own * (np.median(self.power[0, 0]) / np.median(own))
         fine[~self._looked_at()] = 0.0
         y, x = (int(i) for i in np.unravel_index(int(fine.argmax()), fine.shape))
         around = np.pad(fine, 1)
@@ -156,7 +162,7 @@ class WaveSums:
         found = np.ones((2 * rows, 2 * self.power.shape[3]), np.bool_)
         found[[0, 1, -1]] = False
         found[:, [0, 1]] = False
-        found[:, columns + 1 :] = False  # beyond half a cycle per pixel
+        found[:, columns + (columns + 1) % 2 :] = False  # beyond half a cycle per pixel
         if columns % 2 == 0:
             # At half a cycle each wave stands twice, as its own conjugate; on rows of bins only.
             found[1::2, columns] = False

@@ -98,19 +98,21 @@ def _patterns(kind: str) -> Candidate:
 def frequencies(clues: Clues, kind: str) -> list[tuple[float, float, float]]:
     """Return candidates (fx, fy) in cycles per pixel of the mosaic, with amplitudes in DN.
 
-    Planes of a mosaic see frequencies modulo half a cycle per pixel: each alias is one.
+    Planes of a mosaic see frequencies modulo half a cycle per pixel: each alias is one. All of it
+    together sees the frequency itself.
     """
     place = min(clues.places, key=lambda p: clues.seen.levels[p].variance_dn2)
     v = clues.seen.levels[place].variance_dn2
     found = []
-    for channel, peak in _strongest(clues, kind):
+    for name, channel, peak in _strongest(clues, kind):
         n, m = clues.shape(channel)
         amplitude = 2 * sqrt(max(peak.power - 1, 0.05) * v / (n * m))
         if channel == "MONO":
             found.append((peak.fx, peak.fy, amplitude))
             continue
-        for ax in (0.0, 0.5):
-            for ay in (0.0, 0.5):
+        aliases = (0.0,) if _whole(name, channel) else (0.0, 0.5)
+        for ax in aliases:
+            for ay in aliases:
                 fx, fy = peak.fx / 2 + ax, peak.fy / 2 + ay
                 found.append(((fx + 0.5) % 1 - 0.5, (fy + 0.5) % 1 - 0.5, amplitude))
     if len(clues.layout.channels) > 1:  # constant in each plane: stripes and checkerboards
@@ -132,19 +134,28 @@ def _settled(clues: Clues, kind: str, at: Frequency, step: int) -> bool:
     return any(one == kind and same_line(known, at, *size, step) for one, known in clues.settled)
 
 
-def _strongest(clues: Clues, kind: str) -> Iterator[tuple[str, Peak]]:
-    """Yield the strongest line of the plane, of rows and of columns that is not settled yet."""
+def _whole(name: str, channel: str) -> bool:
+    """Return whether a spectrum is that of a whole mosaic, in phase: its lines have no aliases."""
+    return name == "spectrum" and not channel
 
-    def settled(channel: str, peak: Peak) -> bool:
+
+def _strongest(clues: Clues, kind: str) -> Iterator[tuple[str, str, Peak]]:
+    """Yield the strongest line of the plane, of rows and of columns that is not settled yet.
+
+    With the names of its spectrum and of its channel.
+    """
+
+    def settled(name: str, channel: str, peak: Peak) -> bool:
         step = 1 if channel == "MONO" else 2
-        return _settled(clues, kind, (peak.fx / step, peak.fy / step), step)
+        at = (peak.fx / step, peak.fy / step)
+        return _settled(clues, kind, at, 1 if _whole(name, channel) else step)
 
     ranks = [line_name(rank) for rank in range(1, RANKS[-1] + 2)]
     for names in (["spectrum", *ranks], ["rows"], ["columns"]):
-        lines = (clearest(clues, name) for name in names)
-        left = (line for line in lines if line is not None and not settled(*line))
-        line = next(left, None)
-        if line is not None and line[1].power >= _LEAST_POWER:
+        seen = ((name, clearest(clues, name)) for name in names)
+        lines = ((name, *line) for name, line in seen if line is not None)
+        line = next((line for line in lines if not settled(*line)), None)
+        if line is not None and line[2].power >= _LEAST_POWER:
             yield line
 
 

@@ -14,10 +14,10 @@ from analysis.mismatch.report.numbers import interval, measured, plain
 from analysis.mismatch.report.sentences import (
     because,
     considered,
-    fitted,
     gain,
     joined,
     numbers_in_short,
+    parameters,
     strongest,
     verdict,
 )
@@ -99,7 +99,7 @@ def render(
         "headline": HEADLINES[finding.verdict],
         "verdict": verdict(finding),
         "origin": [line for line in origin.splitlines() if line],
-        "effects": [(e, _parameters(e.parameters.items())) for e in finding.omitted_physics],
+        "effects": [(e, parameters(e)) for e in finding.omitted_physics],
         "differences": differences[:_FIRST_PAGE],
         "more": len(differences) - _FIRST_PAGE,
         "mismatches": strongest(finding.mismatches),
@@ -145,10 +145,6 @@ def _only_unexplained(finding: Finding) -> list[Mismatch]:
     """Return what is left over that the base model's departures do not list already."""
     listed_too = {(m.statistic, m.where) for m in finding.mismatches}
     return [m for m in finding.unexplained if (m.statistic, m.where) not in listed_too]
-
-
-def _parameters(items: Iterable[tuple[str, Any]]) -> str:
-    return "; ".join(fitted(name, parameter) for name, parameter in items)
 
 
 def _locked(finding: Finding) -> list[tuple[str, str]]:

@@ -33,14 +33,19 @@ def verdict(finding: Finding) -> tuple[str, ...]:
             said = [f"The camera model leaves out {names}.", *unproven(finding)]
         case "unexplained":
             said = ["Something differs, and no effect of the vocabulary is proven to explain it."]
+            if not finding.searched:
+                said = ["Something differs; which physics that is was not asked."]
     if finding.parameter_errors:
         said.append(_wrong_numbers(finding.parameter_errors))
     if finding.unexplained:
         most = strongest(finding.unexplained)[0]
         rest = len(finding.unexplained)
         departures = "One departure stays" if rest == 1 else f"{rest} departures stay"
+        unexplained = " unexplained" if finding.searched else ""
+        if not finding.searched:
+            departures = "One departure" if rest == 1 else f"{rest} departures"
         said.append(
-            f"{departures} unexplained, the largest in: {statistic_words(most.statistic)} "
+            f"{departures}{unexplained}, the largest in: {statistic_words(most.statistic)} "
             f"(z = {plain(most.z)}; {place(most.where)})."
         )
     if finding.undecided:
@@ -90,8 +95,14 @@ def effect_label(effect: OmittedEffect) -> str:
     return f"{words} at ({', '.join(plain(float(v)) for v in np.ravel(frequency.value))})"
 
 
+def parameters(effect: OmittedEffect) -> str:
+    """Return all parameters of an effect: `edge left; length 6.1 ± 0.2 pixels` say."""
+    words = (f"{name} {value.replace('_', ' ')}" for name, value in effect.choices.items())
+    return "; ".join([*words, *(fitted(name, p) for name, p in effect.parameters.items())])
+
+
 def _effect_in_short(effect: OmittedEffect) -> str:
-    numbers = "; ".join(fitted(name, p) for name, p in effect.parameters.items())
+    numbers = parameters(effect)
     return f"{effect_words(effect.effect)} ({numbers})" if numbers else effect_words(effect.effect)
 
 

@@ -1,10 +1,10 @@
 """What the terminal shows of a diagnosis; of several, one line each."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 from analysis.mismatch.finding import Change, Finding
 from analysis.mismatch.report.numbers import plain
-from analysis.mismatch.report.sentences import considered, fitted, gain, strongest, verdict
+from analysis.mismatch.report.sentences import considered, gain, parameters, strongest, verdict
 from analysis.mismatch.words import effect_words, place, statistic_words
 
 _SHOWN = 8
@@ -17,22 +17,27 @@ def summary(finding: Finding) -> str:
         lines += ["| physics left out | parameters | held-out gain, nats/frame (95 %) |"]
         lines += ["|---|---|---|"]
     for effect in finding.omitted_physics:
-        numbers = "; ".join(fitted(name, p) for name, p in effect.parameters.items())
-        lines.append(f"| {effect.effect} | {numbers} | {gain(effect.heldout_gain)} |")
+        lines.append(f"| {effect.effect} | {parameters(effect)} | {gain(effect.heldout_gain)} |")
     ties = [a for of, a in considered(finding) if not of or a.would_settle]
     lines += [f"- {effect_words(a.effect)}: {a.why_not} {a.would_settle}".rstrip() for a in ties]
+    after = ("z after", "explained by") if finding.searched else ()
     if finding.mismatches:
-        lines += ["", "| differs | where | z | z after | explained by |", "|---|---|---|---|---|"]
+        head = ("differs", "where", "z", *after)
+        lines += ["", _row(head), _row("---" for _ in head).replace(" ", "")]
     for m in strongest(finding.mismatches)[:_SHOWN]:
-        lines.append(
-            f"| {statistic_words(m.statistic)} | {place(m.where)} | {plain(m.z)} | "
-            f"{plain(m.z_after)} | {m.explained_by or 'nothing'} |"
-        )
+        cells = (statistic_words(m.statistic), place(m.where), plain(m.z))
+        rest = (plain(m.z_after), m.explained_by or "nothing") if after else ()
+        lines.append(_row((*cells, *rest)))
     more = len(finding.mismatches) - _SHOWN
     if more > 0:
         lines.append(f"and {more} more, in the report")
-    lines += ["", *_proof(finding), *(f"- {remark}" for remark in finding.remarks)]
+    proof = _proof(finding) if finding.searched else [""]
+    lines += ["", *proof, *(f"- {remark}" for remark in finding.remarks)]
     return "\n".join(lines).strip() + "\n"
+
+
+def _row(cells: Iterable[str]) -> str:
+    return f"| {' | '.join(cells)} |"
 
 
 def _proof(finding: Finding) -> list[str]:

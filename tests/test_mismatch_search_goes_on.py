@@ -86,6 +86,7 @@ class Proving:
 
     def __init__(self, after: list[Named]) -> None:
         self.named, self.after = [_named("kept", x=1.0), _named("weak")], after
+        self.setting = Stub(jobs=1)
         self.calls: list[str] = []
 
     def fitted_without(self, *_: Any) -> None:

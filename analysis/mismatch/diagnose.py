@@ -20,6 +20,7 @@ from analysis.mismatch.finding import (
     Verdict,
 )
 from analysis.mismatch.instance import kind_of
+from analysis.mismatch.model import in_threads
 from analysis.mismatch.name import Search
 from analysis.mismatch.named import Named
 from analysis.mismatch.observe import observe
@@ -171,8 +172,7 @@ def _proven(
     """
     while True:
         final = final if judged else _undenied(search, final)
-        without = {named.name: search.fitted_without(final, named) for named in search.named}
-        gained = trial.gains(final, without)
+        gained = trial.gains(final, _fitted_without(search, final))
         weak = [named for named in search.named if not gained[named.name].certain]
         if not weak:
             return final, {name: one.gain for name, one in gained.items()}
@@ -185,6 +185,16 @@ def _proven(
             final = search.further(final)
             if named != search.named:
                 final = search.settle(final)
+
+
+def _fitted_without(search: Search, final: State) -> dict[str, Camera]:
+    """Return the cameras without each of the effects named, fitted side by side."""
+
+    def one(named: Named) -> Camera:
+        return search.fitted_without(final, named)
+
+    made = in_threads(one, search.named, search.setting.jobs)
+    return {named.name: camera for named, camera in zip(search.named, made, strict=True)}
 
 
 def _finding(

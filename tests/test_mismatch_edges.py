@@ -24,6 +24,7 @@ from analysis.mismatch.report.sentences import verdict
 from analysis.mismatch.report.summary import summary
 from dsis.cfa import Cfa
 from dsis.grid import PixelGrid
+from dsis.simulate.maps import SensorMaps, with_maps
 from exposing import apply, effect
 from mismatch_recordings import camera, recorded
 
@@ -96,6 +97,19 @@ def test_numbers_of_edges_are_in_units_of_their_noise() -> None:
         expected = edge_shapes(size)[i] @ decay / (sd / np.sqrt(across))
         assert found[name][0] == pytest.approx(expected)
         assert found[name][0] > 0
+
+
+def test_the_same_sensor_keeps_the_mean_that_a_map_has_not() -> None:
+    """Maps hold the decay as it was measured, less the mean of all pixels."""
+    shape = (24, 40)
+    own = effect("line_settling", offset_dn=50.0, gain_percent=20.0, length_pixels=6.0)
+    drawn = apply(own, np.full(shape, 500.0)) - 500
+    zero, one = np.zeros(shape, np.float32), np.ones(shape, np.float32)
+    same = with_maps(camera(own), SensorMaps(zero, one), PixelGrid(*shape, Cfa.MONO))
+    image = np.full(shape, 500.0)
+    for link in same.effect:
+        image = apply(link, image)
+    assert (image - 500).mean() == pytest.approx(drawn.mean(), rel=1e-3)
 
 
 def test_so_few_lines_that_a_decay_is_a_surface_have_no_number() -> None:

@@ -20,7 +20,7 @@ from dsis.effects.quantisation import Quantisation
 from dsis.measures.spikes import SPIKED
 
 _ROUNDS = 4
-_LEAST = 1e-3  # of a signal: no pattern is known better
+_LEAST = 0.01  # of a signal: with the above, half a thousandth of it is as good as none
 _SAME = 0.05  # of an error: the fit has settled
 _SWITCH_DEVIANCE = 12.0  # by which another gap must fit better before the switch is moved
 _APART = 1.005  # ratio of signals from which they are two levels

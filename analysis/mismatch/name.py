@@ -167,6 +167,8 @@ class Search:
         null = base.null
         found = {}
         predictor = final.predictor() if self.named else None
+        if predictor is not None:
+            predictor.ready(self.without(final, n) for n in self.named if n.proposal is not None)
         for named in self.named:
             if named.proposal is None or predictor is None:
                 change = bent(base, final)

@@ -162,7 +162,8 @@ def test_an_effect_is_dropped_only_where_many_simulations_say_so() -> None:
     effect = Named("flicker", None, {}, 10.0, ())
     state: Any = SimpleNamespace(predictor=lambda count: SimpleNamespace(replicates=count))
     search = _search(named=[effect])
-    few: Any = SimpleNamespace(replicates=2)
+    ahead: list[Any] = []
+    few: Any = SimpleNamespace(replicates=2, ready=ahead.append)
 
     def needless(*of: Any) -> tuple[float, str] | None:
         predictor = of[1]

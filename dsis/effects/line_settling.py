@@ -20,7 +20,7 @@ class LineSettling(Effect):
     """
 
     kind: Literal["line_settling"] = "line_settling"
-    offset_dn: Annotated[float, Field(examples=[20.0])] = 0.0
+    offset_dn: Annotated[float, Field(gt=-65536, lt=65536, examples=[20.0])] = 0.0
     gain_percent: Annotated[float, Field(gt=-100, lt=100, examples=[4.0])] = 0.0
     length_pixels: Annotated[float, Field(gt=0, examples=[5.0])]
     edge: Edge = "left"

@@ -112,7 +112,7 @@ def test_twice_the_distance_is_half_the_period(light: NDArray[np.float64]) -> No
     near = Eye(20.0).difference(grating(1 / 8, light), Eye(20.0).seen(GREY_18))
     far = Eye(40.0).difference(grating(1 / 16, light), Eye(40.0).seen(GREY_18))
     # Equal but for the curvature of L*, a*, b*, which the waves sample at other phases, and for
-    # float32: a* is 500 times a difference of numbers below 1, on each processor rounded as it does.
+    # float32: a* is 500 times a difference of numbers below 1, and processors round differently.
     rounding = 2 * 500 * 2.0**-24 / math.sqrt(far.energy)
     assert near.energy == pytest.approx(far.energy, rel=1e-4 + rounding)
     assert Eye(40.0).difference(grating(1 / 8, light), Eye(40.0).seen(GREY_18)).energy < far.energy

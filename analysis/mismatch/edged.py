@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.mismatch.bank.edges import MEDIAN, decays
+from analysis.mismatch.bank.edges import decays
 from analysis.mismatch.bank.seams import beyond_smooth
 from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.state import State
@@ -16,6 +16,7 @@ STATISTIC = "fixed_edge"
 _MAPS = {"shading": ("gain",), "tap_mismatch": ("gain",), "amp_glow": ("time", "gain")}
 _MOST = 0.5  # of what the surfaces explain, that decays may feign
 _SURE, _SEEN = 2.0, 3.0  # standard errors
+_MEDIAN = 0.455  # of chi-squared of one degree of freedom
 
 
 def decaying(state: State) -> bool:
@@ -72,7 +73,7 @@ def single(state: State, effect: Effect) -> Denial | None:
         beyond = distance >= step
         means = beyond_smooth(image.mean(1 - axis)[beyond])
         shape = beyond_smooth(np.exp(-distance[beyond] / effect.length_pixels))
-        square = max(noise**2 * means.size / image.size, float(np.median(means**2)) / MEDIAN)
+        square = max(noise**2 * means.size / image.size, float(np.median(means**2)) / _MEDIAN)
         top += amplitude * scale * float(shape @ means) / square
         bottom += (amplitude * scale) ** 2 * float(shape @ shape) / square
     if bottom > 0 and (top + _SURE * bottom**0.5) / bottom >= _MOST and bottom > _SEEN**2:

@@ -13,24 +13,20 @@ from analysis.mismatch.bank.seams import beyond_smooth
 Array = NDArray[np.float64]
 ENDS = ("first", "last")
 REACHES = {"near": 2.5, "far": 10.0}  # pixels of the plane after which 1 / e is left
-MEDIAN = 0.455  # of chi-squared of one degree of freedom
 _LEAST_LINES = 24  # fewer are a smooth surface
 
 
-def edges(by_row: Array, by_column: Array, square: float) -> dict[str, Number]:
-    """Return how line means decay from each edge, over two reaches, in the noise of lines.
+def edges(by_row: Array, by_column: Array, squares: tuple[float, float]) -> dict[str, Number]:
+    """Return how line means decay from each edge, over two reaches, in their own noise.
 
-    Each is the coefficient of exp(-d / reach) beside smooth polynomials, over its error: that of
-    the median line, or of the pixels' mean `square`, whichever is larger. So the few lines of a
-    decay are no noise to themselves, and its size shows however large it is.
+    Each is the coefficient of exp(-d / reach) beside smooth polynomials, over its error.
     """
     found: dict[str, Number] = {}
-    for axis, means, across in (
-        ("rows", by_row, by_column.size),
-        ("columns", by_column, by_row.size),
+    for axis, means, square, across in (
+        ("rows", by_row, squares[0], by_column.size),
+        ("columns", by_column, squares[1], by_row.size),
     ):
-        middle = float(np.median(beyond_smooth(means) ** 2)) / MEDIAN
-        sd = sqrt(max(square / across, middle))
+        sd = sqrt(square / across)
         for name, shape in zip(names(axis), edge_shapes(means.size), strict=True):
             clear = means.size >= _LEAST_LINES and sd > 0
             found[name] = (float(shape @ means) / sd, 1.0) if clear else UNKNOWN

@@ -78,7 +78,7 @@ def parts(image: Array, noise: float) -> Parts:
         "outlying_pixels": _outlying(scatter + mean_square**2, square, pixels.size),
         **_standing_out(pixels, square),
         **seams(by_row, by_column, lines),
-        **edges(*_of_many(pixels, square, by_row, by_column), square),
+        **edges(*_of_many(pixels, square, by_row, by_column), lines),
     }
     return Parts(pixels, rows, columns, square, coefficients, numbers)
 

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.mismatch.bank.edges import decays
+from analysis.mismatch.bank.edges import decays, line_square
 from analysis.mismatch.bank.seams import beyond_smooth
 from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.state import State
@@ -16,12 +16,6 @@ STATISTIC = "fixed_edge"
 _MAPS = {"shading": ("gain",), "tap_mismatch": ("gain",), "amp_glow": ("time", "gain")}
 _MOST = 0.5  # of what the surfaces explain, that decays may feign
 _SURE, _SEEN = 2.0, 3.0  # standard errors
-_MEDIAN = 0.455  # of chi-squared of one degree of freedom
-
-
-def decaying(state: State) -> bool:
-    """Return whether a decay from an edge is left unexplained."""
-    return any(m.statistic == STATISTIC for m in state.mismatches)
 
 
 def edged(state: State, kind: str) -> Denial | None:
@@ -31,7 +25,7 @@ def edged(state: State, kind: str) -> Denial | None:
     is left unexplained, and tilts, bows and halves beside decays explain not half of what they
     explain alone, there may be none.
     """
-    if kind not in _MAPS or not decaying(state):
+    if kind not in _MAPS or all(m.statistic != STATISTIC for m in state.mismatches):
         return None
     alone, beside = 0.0, 0.0
     images = state.setting.seen.images
@@ -73,7 +67,7 @@ def single(state: State, effect: Effect) -> Denial | None:
         beyond = distance >= step
         means = beyond_smooth(image.mean(1 - axis)[beyond])
         shape = beyond_smooth(np.exp(-distance[beyond] / effect.length_pixels))
-        square = max(noise**2 * means.size / image.size, float(np.median(means**2)) / _MEDIAN)
+        square = line_square(means, noise, image.shape[1 - axis])
         top += amplitude * scale * float(shape @ means) / square
         bottom += (amplitude * scale) ** 2 * float(shape @ shape) / square
     if bottom > 0 and (top + _SURE * bottom**0.5) / bottom >= _MOST and bottom > _SEEN**2:

@@ -13,6 +13,7 @@ from analysis.mismatch.bank.seams import beyond_smooth
 Array = NDArray[np.float64]
 ENDS = ("first", "last")
 REACHES = {"near": 2.5, "far": 10.0}  # pixels of the plane after which 1 / e is left
+_MEDIAN = 0.455  # of chi-squared of one degree of freedom
 _LEAST_LINES = 24  # fewer are a smooth surface
 
 
@@ -38,6 +39,14 @@ def names(axis: str) -> Iterator[str]:
     for end in ENDS:
         for reach in REACHES:
             yield f"fixed_edge of {axis}, {end}, {reach}"
+
+
+def line_square(means: Array, noise: float, across: int) -> float:
+    """Return the mean square of line means, of the median line: at least that of pixels' noise.
+
+    `means` are less what is smooth; each is over so many pixels `across`.
+    """
+    return max(noise**2 / across, float(np.median(means**2)) / _MEDIAN)
 
 
 def decays(size: int) -> Array:

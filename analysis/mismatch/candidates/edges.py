@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.mismatch.bank.edges import line_square
 from analysis.mismatch.bank.seams import beyond_smooth
 from analysis.mismatch.candidates.candidate import Candidate, Proposal, proposals
 from analysis.mismatch.clues import Clues
@@ -78,7 +79,7 @@ def _fitted(clues: Clues, edge: str, length: float) -> _Fit:
             own -= beyond_smooth(_had(clues, axis, name, line, size)) * scale
             shape = beyond_smooth(np.exp(-distance / length))
             # Lines scatter beyond the noise of their pixels: a decay must stand out of that.
-            square = max(noise**2 / (image.size / own.size), float(np.median(own**2)) / 0.455)
+            square = line_square(own, noise, image.size // own.size)
             top += scale * float(shape @ own) / square
             bottom += scale**2 * float(shape @ shape) / square
         if bottom > 0:

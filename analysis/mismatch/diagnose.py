@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.candidates import CANDIDATES
+from analysis.mismatch.evidence import Evidence
 from analysis.mismatch.explain import because, explained
 from analysis.mismatch.feigned import heated
 from analysis.mismatch.finding import (
@@ -26,6 +27,7 @@ from analysis.mismatch.named import Named
 from analysis.mismatch.observe import observe
 from analysis.mismatch.parameters import parameter_errors
 from analysis.mismatch.pictures import Album, evidence_of
+from analysis.mismatch.recalibrate import Calibrated, calibrate
 from analysis.mismatch.remarks import remarks_on
 from analysis.mismatch.settle import would_settle
 from analysis.mismatch.source import Source
@@ -79,9 +81,9 @@ def find_mismatch(
     album = Album(layout)
     seen = observe(layout, lambda name: source.frames(name, numbers[name]), album, keep=True)
     samples = sum(len(e.numbers) for e in layout.exposures) * layout.rows * layout.columns
-    counts = (8, 4, 1, 1, 2) if samples > _LARGE else (16, 16, 2, 2, 4)
+    large = samples > _LARGE
+    counts = (8, 4, 1, 1, 2) if large else (16, 16, 2, 2, 4)
     setting = Setting(layout, seen, split.interpolated, seed, jobs, *counts)
-    base = State.of(setting, camera, step)
     words = VOCABULARY if vocabulary is None else vocabulary & VOCABULARY
     remarks = remarks if words else (*remarks, _LOCATED)
 
@@ -89,8 +91,13 @@ def find_mismatch(
         return source.frames(name, numbers[name])
 
     trial = Trial.of(recording, split, source, setting)
-    large = samples > _LARGE
-    whole = base if large else _of_all_frames(camera, setting, trial, step)
+    whole = State.of(setting if large else _of_all_frames(setting, trial), camera, step)
+    if not (words and whole.mismatches):
+        search = Search(setting, camera, whole, words, step)
+        proof = _proof_without(trial, whole, _calibrated_to(setting, whole, camera), step, source)
+        evidence = evidence_of(whole, whole, album if large else trial.numbers.album, split)
+        return _said(_finding(camera, whole, whole, search, {}, proof), remarks, evidence, words)
+    base = whole if large else State.of(setting, camera, step)
     search = Search(
         setting,
         camera,
@@ -113,20 +120,47 @@ def find_mismatch(
         final = State.of(whole.setting, final.camera, step) if search.named else whole
         departures = Change(len(whole.mismatches), len(final.mismatches))
         proof = replace(proof, discrepancies=departures)
-    found = _finding(camera, whole, final, search, gains, proof)
-    remarks = (*remarks, *found.remarks)
-    return replace(found, remarks=remarks, searched=bool(words), evidence=evidence)
+    return _said(_finding(camera, whole, final, search, gains, proof), remarks, evidence, words)
 
 
-def _of_all_frames(
-    camera: Camera, setting: Setting, trial: Trial, step: Callable[[], None]
-) -> State:
-    """Return the base state of all frames, the locked ones too.
+def _said(
+    found: Finding, remarks: tuple[str, ...], evidence: Evidence, words: frozenset[str]
+) -> Finding:
+    """Return a finding with what is to be remarked and shown."""
+    said = (*remarks, *found.remarks)
+    return replace(found, remarks=said, searched=bool(words), evidence=evidence)
+
+
+def _of_all_frames(setting: Setting, trial: Trial) -> Setting:
+    """Return the setting of all frames, the locked ones too.
 
     Whether anything differs is asked of all; what it is, of those that are not locked.
     """
     layout, seen = trial.numbers.whole
-    return State.of(replace(setting, layout=layout, seen=seen), camera, step)
+    return replace(setting, layout=layout, seen=seen)
+
+
+def _calibrated_to(setting: Setting, whole: State, camera: Camera) -> Calibrated:
+    """Return the model with base numbers that saw no locked frame."""
+    if whole.setting is setting:
+        return whole.calibrated
+    return calibrate(
+        camera,
+        setting.layout,
+        setting.seen,
+        setting.interpolated,
+        seed=setting.seed,
+        jobs=setting.jobs,
+    )
+
+
+def _proof_without(
+    trial: Trial, whole: State, calibrated: Calibrated, step: Callable[[], None], source: Source
+) -> Proof:
+    """Return the proof where nothing is named: no gap is closed, so none is measured."""
+    model = replace(whole, setting=trial.numbers.setting, calibrated=calibrated, mismatches=())
+    left = Change(len(whole.mismatches), len(whole.mismatches))
+    return replace(trial.proof(model, model, step, source), discrepancies=left)
 
 
 def _heated(

@@ -18,6 +18,7 @@ from analysis.mismatch.given import Numbers, Ratio, ratio
 from analysis.mismatch.layout import Layout
 from analysis.mismatch.model import in_threads
 from analysis.mismatch.observe import Observation, observe
+from analysis.mismatch.pictures.album import Album
 from analysis.mismatch.recalibrate import Calibrated
 from analysis.mismatch.source import Source
 from analysis.mismatch.split import Split
@@ -56,17 +57,28 @@ class HeldNumbers:
     setting: Setting
     kept: dict[str, tuple[Array, Array]] = field(default_factory=dict)
 
-    @cached_property
+    @property
     def whole(self) -> tuple[Layout, Observation]:
         """Layout and observation of all frames of the exposures that were fitted."""
+        return self._watched[:2]
+
+    @property
+    def album(self) -> Album:
+        """What has watched the observation of all frames."""
+        return self._watched[2]
+
+    @cached_property
+    def _watched(self) -> tuple[Layout, Observation, Album]:
         numbers = {
             e.name: tuple(sorted((*e.numbers, *self.split.locked.get(e.name, ()))))
             for e in self.setting.layout.exposures
         }
         layout = layout_of(self.recording, numbers, self.source.frames)
-        return layout, observe(
-            layout, lambda name: self.source.frames(name, numbers[name]), keep=True
+        album = Album(layout)
+        seen = observe(
+            layout, lambda name: self.source.frames(name, numbers[name]), album, keep=True
         )
+        return layout, seen, album
 
     @property
     def frames(self) -> int:

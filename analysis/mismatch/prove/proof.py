@@ -104,7 +104,8 @@ def prove_held(
             auc_of(held, camera, signals, seed=seed),
         )
 
-    (one, seen), (two, seen_after) = in_threads(judged, (before, after), jobs)
+    made = in_threads(judged, (before,) if after == before else (before, after), jobs)
+    (one, seen), (two, seen_after) = made[0], made[-1]
     change = Change(seen.value, seen_after.value) if seen and seen_after else None
     return ProofNumbers(
         one.per_frame,

@@ -36,7 +36,7 @@ def verdict(finding: Finding) -> tuple[str, ...]:
             if not finding.searched:
                 said = ["Something differs; which physics that is was not asked."]
     if finding.parameter_errors:
-        said.append(_wrong_numbers(finding.parameter_errors))
+        said.append(_wrong_numbers(finding.parameter_errors, sure=not finding.unexplained))
     if finding.unexplained:
         most = strongest(finding.unexplained)[0]
         rest = len(finding.unexplained)
@@ -54,8 +54,8 @@ def verdict(finding: Finding) -> tuple[str, ...]:
     return tuple(said)
 
 
-def _wrong_numbers(errors: tuple[ParameterError, ...]) -> str:
-    """Return which numbers are off, and by how much."""
+def _wrong_numbers(errors: tuple[ParameterError, ...], *, sure: bool) -> str:
+    """Return which numbers are off, and by how much; not `sure`: what is unexplained may do it."""
     said = []
     for error in errors[:_NAMED]:
         value = measured(error.recorded, error.standard_error)
@@ -63,7 +63,8 @@ def _wrong_numbers(errors: tuple[ParameterError, ...]) -> str:
         said.append(f"{error.parameter} is {recorded}, not {plain(error.model, 5)}")
     more = len(errors) - _NAMED
     rest = [f"{more} more"] if more > 0 else []
-    return f"Numbers of the camera model are off: {'; '.join([*said, *rest])}."
+    off = "are off" if sure else "seem off, unless what is unexplained shifts them"
+    return f"Numbers of the camera model {off}: {'; '.join([*said, *rest])}."
 
 
 def parameter_words(name: str) -> str:

@@ -63,6 +63,14 @@ def test_offset_and_gain_decay_from_the_edge(edge: str) -> None:
     turned = {"left": made, "right": made[:, ::-1], "top": made.T, "bottom": made[::-1].T}[edge]
     expected = 500 + (10 - 3) * np.exp(-np.arange(turned.shape[1]) / 6.5)
     np.testing.assert_allclose(turned, np.broadcast_to(expected, turned.shape), rtol=1e-6)
+    sooner = _applied(flat, **own, gain_length_pixels=3.0)
+    apart = 10 * (
+        np.exp(-np.arange(turned.shape[1]) / 3) - np.exp(-np.arange(turned.shape[1]) / 6.5)
+    )
+    turned = {"left": sooner, "right": sooner[:, ::-1], "top": sooner.T, "bottom": sooner[::-1].T}
+    np.testing.assert_allclose(
+        turned[edge] - expected, np.broadcast_to(apart, turned[edge].shape), atol=2e-4
+    )
     case = draw_case(3, "tiny", Choice(cfa="MONO"))
     left = settled(View(case, 0, 0), own)
     ones = np.zeros((case.rows, case.columns), np.float32)
@@ -145,7 +153,8 @@ def test_proposals_start_from_what_the_maps_show(edge: str) -> None:
     assert values["offset_dn"] == pytest.approx(-1.5, rel=0.1)
     assert values["gain_percent"] == pytest.approx(1.0, rel=0.1)
     assert values["length_pixels"] == pytest.approx(5.0, rel=0.15)
-    assert proposal.free == ("offset_dn", "gain_percent", "length_pixels")
+    assert values["gain_length_pixels"] == pytest.approx(5.0, rel=0.15)
+    assert proposal.free == ("offset_dn", "gain_percent", "length_pixels", "gain_length_pixels")
     known = effect("line_settling", offset_dn=-1.5, gain_percent=1.0, **own)
     assert not CANDIDATES[0].propose(_clues(offset, gain, known))
     (alone,) = CANDIDATES[0].propose(_clues(offset, noise[1]))
@@ -166,6 +175,27 @@ def test_lines_that_have_not_settled_are_named_with_their_numbers() -> None:
     (where,) = [m.where for m in found.mismatches if m.statistic == "fixed_edge"]
     assert where.columns == (128 - 16, 128 - 1)
     assert where.rows is None
+
+
+def test_two_edges_are_two_effects_and_offset_and_gain_have_lengths_of_their_own() -> None:
+    left = {
+        "offset_dn": -12.0,
+        "gain_percent": 1.5,
+        "length_pixels": 9.0,
+        "gain_length_pixels": 5.0,
+    }
+    top = {"gain_percent": 1.0, "length_pixels": 3.0}
+    effects = effect("line_settling", **left), effect("line_settling", edge="top", **top)
+    words = frozenset({"line_settling", "row_prnu", "column_prnu", "shading", "amp_glow"})
+    found = find_mismatch(camera(), recorded(camera(*effects), 9), seed=1, vocabulary=words)
+    assert {one.effect for one in found.omitted_physics} == {"line_settling"}
+    assert not found.unexplained
+    by_edge = {one.choices["edge"]: one.parameters for one in found.omitted_physics}
+    assert by_edge.keys() == {"left", "top"}
+    for edge, planted in (("left", left), ("top", top)):
+        for name, value in planted.items():
+            fitted = by_edge[edge][name]
+            assert abs(fitted.value - value) < 4 * fitted.standard_error  # type: ignore[operator] # one number
 
 
 def test_without_its_word_nothing_else_is_named() -> None:

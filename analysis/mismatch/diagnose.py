@@ -294,7 +294,9 @@ def _omitted(named: Named, why: tuple[str, ...], gain: Gain) -> OmittedEffect:
             elif isinstance(value, tuple):
                 parameters[name] = FittedParameter(value, 0.0)
             elif isinstance(value, (int, float)) and not isinstance(value, bool):
-                error = named.errors.get(name, 0.0 if name not in named.proposal.free else np.inf)
+                own = named.proposal
+                known = np.inf if name in own.free else own.errors.get(name, 0.0)
+                error = named.errors.get(name, known)
                 parameters[name] = FittedParameter(float(value), error)
     else:
         parameters["switch_dn"] = FittedParameter(named.switch_dn, named.errors["switch_dn"])

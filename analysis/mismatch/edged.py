@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.mismatch.bank.edges import decays, line_square
+from analysis.mismatch.bank.edges import decays, line_square_beside
 from analysis.mismatch.bank.seams import beyond_smooth
 from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.state import State
@@ -57,7 +57,10 @@ def single(state: State, effect: Effect) -> Denial | None:
     size = (layout.rows, layout.columns)[axis]
     top = bottom = 0.0
     for (channel, name), (image, noise) in images.items():
-        amplitude = {"offset": effect.offset_dn, "gain": effect.gain_percent / 100}.get(name)
+        amplitude, length = {
+            "offset": (effect.offset_dn, effect.length_pixels),
+            "gain": (effect.gain_percent / 100, effect.gain_length),
+        }.get(name, (0.0, 1.0))
         if not amplitude:
             continue
         scale = layout.regressors(channel).scales[name] if name == "gain" else 1.0
@@ -66,8 +69,8 @@ def single(state: State, effect: Effect) -> Denial | None:
         distance = line if effect.edge in ("left", "top") else size - 1 - line
         beyond = distance >= step
         means = beyond_smooth(image.mean(1 - axis)[beyond])
-        shape = beyond_smooth(np.exp(-distance[beyond] / effect.length_pixels))
-        square = line_square(means, noise, image.shape[1 - axis])
+        shape = beyond_smooth(np.exp(-distance[beyond] / length))
+        square = line_square_beside(means, shape, noise, image.shape[1 - axis])
         top += amplitude * scale * float(shape @ means) / square
         bottom += (amplitude * scale) ** 2 * float(shape @ shape) / square
     if bottom > 0 and (top + _SURE * bottom**0.5) / bottom >= _MOST and bottom > _SEEN**2:

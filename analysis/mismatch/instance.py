@@ -1,6 +1,7 @@
-"""Which of its kind an effect is: a sensor may have several lines, each at its own frequency."""
+"""Which of its kind an effect is: lines have frequencies of their own, decays their edges."""
 
 from dsis.effects import Effect
+from dsis.effects.line_settling import LineSettling
 
 LINES = frozenset({"periodic_noise", "bistable_pattern"})
 Frequency = tuple[float, float]
@@ -16,7 +17,9 @@ def frequency_of(effect: Effect | None) -> Frequency | None:
 
 
 def instance(kind: str, effect: Effect | None) -> str:
-    """Return the identity of an effect: its kind, and of a line its frequency."""
+    """Return the identity of an effect: its kind, of a line its frequency, of a decay its edge."""
+    if isinstance(effect, LineSettling):
+        return f"{kind} ({effect.edge})"
     frequency = frequency_of(effect)
     return kind if frequency is None else f"{kind} ({frequency[0]:.5g}, {frequency[1]:.5g})"
 

@@ -1,12 +1,12 @@
 """Which physics explains the mismatches: add the best effect, fit all again, look again."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.mismatch.candidates import CANDIDATES, Proposal
+from analysis.mismatch.candidates import CANDIDATES
 from analysis.mismatch.contradicted import contradicted, refuted
 from analysis.mismatch.feigned import of_another
 from analysis.mismatch.instance import LINES, Frequency, frequency_of, instance, same_line
@@ -26,6 +26,7 @@ from dsis.effects import Effect
 
 Array = NDArray[np.float64]
 Step = Callable[[], None]
+_WEAK = 20.0  # gain below which an effect may be what others, fitted one by one, left over
 LEAST_GAIN = 2.0  # of log-likelihood, for an effect to be taken in where something is located
 _MOST_EFFECTS = 14  # some may have to go again
 _MOST_LINES = 3  # further ones stay unexplained, located
@@ -57,6 +58,7 @@ class Search:
     frames_of: Frames | None = None
     memory: Memory = field(default_factory=Memory)
     seen_alias: dict[Frequency, bool] = field(default_factory=dict)
+    polished: State | None = None
 
     def run(self) -> State:
         """Return the final state."""
@@ -102,6 +104,9 @@ class Search:
             added = self._best(state)
             if added is None:
                 break
+            if added[0].gain < _WEAK and self.named and state is not self.polished:
+                state = self._polished(state)  # what is large, and fitted roughly, feigns a little
+                continue
             self._take(added[0])
             state = State.of(self.setting, added[1], self.step, draft=True)
         if not state.mismatches:
@@ -205,13 +210,17 @@ class Search:
         rivals = tuple((one.kind, best.gain - one.gain) for one in fitted[1:4])
         if path is not None:
             rivals = (*rivals, ("dual_gain", best.gain - path.gain))
-        effect = Proposal(best.polished.effects[0], best.proposal.free, best.proposal.signed)
+        effect = replace(best.proposal, effect=best.polished.effects[0])
         return Named(best.kind, effect, best.polished.errors[0], best.gain, rivals), camera
 
     def _left(self) -> frozenset[str]:
         lines = sum(n.kind in LINES for n in self.named)
         full = LINES if lines >= _MOST_LINES else frozenset()
-        return self.vocabulary - {n.name for n in self.named} - self.refused.keys() - full
+        return self.vocabulary - self._done() - full
+
+    def _done(self) -> frozenset[str]:
+        """Return what was named or refused, of its kind or one of it."""
+        return frozenset({*(n.name for n in self.named), *self.refused})
 
     def _decided(self, state: State) -> list[Ranked]:
         """Return the effects that may be claimed; the best of pairs that tie are put aside.
@@ -271,7 +280,9 @@ class Search:
         return fitted
 
     def _possible(self, effect: Effect) -> bool:
-        """Return whether an effect may be tried: of a line, the alias that whole frames show."""
+        """Return whether an effect may be tried: not again, of a line as whole frames show it."""
+        if instance(effect.kind, effect) in self._done():
+            return False
         frequency = frequency_of(effect)
         layout = self.setting.layout
         if frequency is None or self.frames_of is None or len(layout.channels) == 1:
@@ -303,7 +314,8 @@ class Search:
     def _polished(self, state: State) -> State:
         """Fit the parameters of all effects together, and judge the result once more."""
         mine = [(n, n.proposal) for n in self.named if n.proposal is not None]
-        if not mine:
+        if not mine or state is self.polished:
+            self.polished = state
             return state
         bare = camera_without(state.camera, [p.effect for _, p in mine], self.camera)
         sparse = replicates_for(self.setting, [p.effect for _, p in mine])
@@ -312,13 +324,15 @@ class Search:
         rounds = 2 if self.setting.replicates > 1 else 1
         polished = polish(predictor, bare, [p for _, p in mine], rounds=rounds)
         if polished is None:
+            self.polished = state
             return state
         fitted = iter(zip(polished.effects, polished.errors, strict=True))
         self.named = [
             n if n.proposal is None else renewed(n, n.proposal, *next(fitted)) for n in self.named
         ]
         camera = with_effects(bare, polished.effects)
-        return state if camera is None else State.of(self.setting, camera, self.step)
+        self.polished = state if camera is None else State.of(self.setting, camera, self.step)
+        return self.polished
 
     def denied(self, state: State) -> tuple[Named, str] | None:
         """Return the effect that the recording denies most, and why; None: it denies none."""

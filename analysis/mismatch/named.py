@@ -44,7 +44,7 @@ def renewed(named: Named, proposal: Proposal, effect: Effect, errors: dict[str, 
     """Return an effect named with other parameters and their errors."""
     return replace(
         named,
-        proposal=Proposal(effect, proposal.free, proposal.signed),
+        proposal=replace(proposal, effect=effect),
         errors=errors,
     )
 

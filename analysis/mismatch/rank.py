@@ -23,7 +23,8 @@ _COSINE = 0.5  # of what two predictions change, from which they change the same
 _ALIKE = 0.05  # relative difference of parameters up to which a proposal is an earlier one
 _SPARSE = 4  # times as many simulations
 _BY_FRAME = frozenset({"frame_variance"})
-_BY_SIGN = frozenset({"bistable_pattern"})  # of two frames half show nothing, half show it twice
+# A sign: half of the pairs of frames show nothing, half show it twice. A band: one bin's phase.
+_BY_PHASE = frozenset({"bistable_pattern", "line_flicker"})
 _FAR_OFF, _LITTLE = 8.0, 0.3  # departures, and the share of one that is little
 _SHARED = 0.1  # share of an effect's change that may lie where the model moved since
 
@@ -69,7 +70,7 @@ def replicates_for(setting: Setting, effects: Iterable[Effect]) -> int:
 
 
 def _sparse(effect: Effect) -> bool:
-    return effect.measures == _BY_FRAME or effect.kind in _BY_SIGN
+    return effect.measures == _BY_FRAME or effect.kind in _BY_PHASE
 
 
 def _near(one: Effect, other: Effect) -> bool:

@@ -52,6 +52,15 @@ def _of_pixels(gain: Gain, frames: int) -> Gained:
     return Gained(gain, above and (gain.ci95[0] > 0 or own * frames > _TOTAL))
 
 
+def _denied(gain: Gain, frames: int) -> bool:
+    """Return whether the pixels of the locked frames are sure that an effect makes it worse.
+
+    Intervals tell how frames scatter. They do not know that parameters were fitted to others: of an
+    effect that pixels hardly show, that costs a nat or two in all.
+    """
+    return gain.ci95[1] < 0 and gain.nats_per_frame * frames < -_TOTAL
+
+
 def _per_frame(told: Ratio, frames: int) -> Gain:
     value, error = told.nats / frames, _NORMAL * told.error / frames
     return Gain(value, (value - error, value + error))
@@ -104,7 +113,7 @@ class Trial:
         for (kind, camera), less in zip(without.items(), rest, strict=True):
             found[kind] = _of_pixels(heldout_gain(less, whole, seed=self.seed), frames)
             # Where the pixels are sure that it is worse, sums of numbers do not overrule them.
-            if not found[kind].certain and found[kind].gain.ci95[1] > 0:
+            if not found[kind].certain and not _denied(found[kind].gain, frames):
                 told = self.numbers.gain(final, camera)
                 if told is not None and told.certain:
                     found[kind] = Gained(_per_frame(told, self.numbers.frames), certain=True)

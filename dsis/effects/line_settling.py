@@ -14,15 +14,17 @@ Edge = Literal["left", "right", "top", "bottom"]
 class LineSettling(Effect):
     """Offset and gain that decay from an edge of the sensor, the same in all frames.
 
-    v = Q (1 + g s) + o s with s = exp(-d / L), d the distance in pixels from the edge where the
+    v = Q (1 + g exp(-d / G)) + o exp(-d / L), d the distance in pixels from the edge where the
     amplifier comes out of its pause: the `left` of rows that are read from there. Charge and its
-    noise are scaled.
+    noise are scaled. The gain may come to rest sooner or later than the clamp that holds the
+    offset: `gain_length_pixels` is G; unless given, it is L, `length_pixels`.
     """
 
     kind: Literal["line_settling"] = "line_settling"
     offset_dn: Annotated[float, Field(gt=-65536, lt=65536, examples=[20.0])] = 0.0
     gain_percent: Annotated[float, Field(gt=-100, lt=100, examples=[4.0])] = 0.0
     length_pixels: Annotated[float, Field(gt=0, examples=[5.0])]
+    gain_length_pixels: Annotated[float, Field(gt=0)] | None = None
     edge: Edge = "left"
 
     stage: ClassVar[Stage] = Stage.READ_OUT
@@ -51,22 +53,36 @@ class LineSettling(Effect):
         distance = {"left": x, "right": columns - 1 - x, "top": y, "bottom": rows - 1 - y}[
             self.edge
         ]
-        share = np.exp(-distance / self.length_pixels)
-        gain = (1 + self.gain_percent / 100 * share).astype(np.float32)
+        share, of_gain = (
+            np.exp(-distance / length) for length in (self.length_pixels, self.gain_length)
+        )
+        gain = (1 + self.gain_percent / 100 * of_gain).astype(np.float32)
         made: Image = image * gain + (self.offset_dn * share).astype(np.float32)
         return made
 
+    @property
+    def gain_length(self) -> float:
+        """Pixels after which 1 / e is left of the gain."""
+        return self.gain_length_pixels or self.length_pixels
+
     def contributions(self, point: OperatingPoint) -> Mapping[str, float]:
         """Return what the decay makes of the mean level and of shot noise, over all pixels."""
-        first, second = (self.mean_share((point.rows, point.columns), power) for power in (1, 2))
-        gain = self.gain_percent / 100
+        shape, gain = (point.rows, point.columns), self.gain_percent / 100
+        first, second = (self._mean_share(shape, self.gain_length / n) for n in (1, 2))
         return {
-            "level": (gain * point.signal_dn + self.offset_dn) * first,
+            "level": gain * point.signal_dn * first + self.mean_offset_dn(shape),
             "pixel_variance": (2 * gain * first + gain**2 * second) * point.shot_variance_dn2,
         }
 
-    def mean_share(self, shape: tuple[int, int], power: int = 1) -> float:
-        """Return the mean of s to a power over a sensor of rows and columns: a geometric sum."""
+    def mean_offset_dn(self, shape: tuple[int, int]) -> float:
+        """Return the mean offset of a sensor of rows and columns, DN."""
+        return self.offset_dn * self._mean_share(shape, self.length_pixels)
+
+    def mean_gain(self, shape: tuple[int, int]) -> float:
+        """Return the mean gain of a sensor of rows and columns."""
+        return 1 + self.gain_percent / 100 * self._mean_share(shape, self.gain_length)
+
+    def _mean_share(self, shape: tuple[int, int], length: float) -> float:
+        """Return the mean of a decay over a sensor of rows and columns: a geometric sum."""
         lines = shape[self.edge in ("left", "right")]
-        fall = power / self.length_pixels
-        return float(np.expm1(-lines * fall) / np.expm1(-fall)) / lines
+        return float(np.expm1(-lines / length) / np.expm1(-1 / length)) / lines

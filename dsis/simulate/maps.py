@@ -169,9 +169,8 @@ def with_maps(camera: Camera, maps: SensorMaps, grid: PixelGrid) -> Camera:
     offset, gain = np.float32(0), np.float32(1)
     for effect in camera.effect:
         if isinstance(effect, LineSettling):  # a map has no mean of its own
-            mean = effect.mean_share(grid.sensor_shape)
-            offset += np.float32(effect.offset_dn * mean)
-            gain *= np.float32(1 + effect.gain_percent / 100 * mean)
+            offset += np.float32(effect.mean_offset_dn(grid.sensor_shape))
+            gain *= np.float32(effect.mean_gain(grid.sensor_shape))
     links: list[Effect] = [
         GainMap(gains=maps.prnu_gain * gain),
         OffsetMap(offsets_dn=maps.dsnu_dn + offset),

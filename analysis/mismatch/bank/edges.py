@@ -49,6 +49,12 @@ def line_square(means: Array, noise: float, across: int) -> float:
     return max(noise**2 / across, float(np.median(means**2)) / _MEDIAN)
 
 
+def line_square_beside(means: Array, shape: Array, noise: float, across: int) -> float:
+    """Return the same of what a shape leaves of line means: no shape is noise to itself."""
+    own = means - shape * float(shape @ means) / max(float(shape @ shape), 1e-300)
+    return line_square(own, noise, across)
+
+
 def decays(size: int) -> Array:
     """Return exp(-d / reach) from the first and the last line: (shape, line)."""
     line = np.arange(size)

@@ -1,6 +1,6 @@
 """What an effect needs to be diagnosed: statistics that call for it, parameters to start from."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from pydantic import ValidationError
@@ -21,11 +21,14 @@ class Proposal:
         Its parameters that are fitted; others are fixed by the proposal.
     signed
         Those of them that may be negative: fitted as they are, others by their logarithm.
+    errors
+        Standard errors of parameters that the proposal has measured by itself.
     """
 
     effect: Effect
     free: tuple[str, ...]
     signed: frozenset[str] = field(default_factory=frozenset)
+    errors: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.mismatch.bank.edges import line_square
+from analysis.mismatch.bank.edges import line_square_beside
 from analysis.mismatch.bank.seams import beyond_smooth
 from analysis.mismatch.candidates.candidate import Candidate, Proposal, proposals
 from analysis.mismatch.clues import Clues
@@ -23,33 +23,44 @@ _NUMBERS = {"offset": "offset_dn", "gain": "gain_percent"}
 
 
 def _settling(clues: Clues) -> Sequence[Proposal]:
-    """Start from the decays that fit the maps best: of long ones both ends are much alike."""
+    """Start from the decays that fit the maps best: of long ones both ends are much alike.
+
+    Offset and gain may come to rest after different lengths, each to be seen in its own map.
+    """
     best = [
-        max((_fitted(clues, edge, own) for own in _lengths(clues, edge)), key=_clear)
+        {name: max(fits, key=_clear) for name in _NUMBERS if (fits := _decays(clues, edge, name))}
         for edge in _EDGES
     ]
-    most = max(map(_clear, best))
+    worth = [sum(_clear(fit) for fit in own.values()) for own in best]
     found: list[Proposal] = []
-    for edge, fit in zip(_EDGES, best, strict=True):
-        start = {
-            _NUMBERS[name]: float(np.clip(size, -90, 90)) if name == "gain" else size
-            for name, (size, z) in fit.sizes.items()
-            if abs(z) > _CLEAR
-        }
-        if start and _clear(fit) > _NEAR * most:
-            length = {"length_pixels": fit.length, "edge": edge}
-            found += proposals(
-                "line_settling", [*start, "length_pixels"], list(start), **start, **length
-            )
+    for edge, of_maps, own in zip(_EDGES, best, worth, strict=True):
+        clear = {name: fit for name, fit in of_maps.items() if abs(fit.z) > _CLEAR}
+        if clear and own > _NEAR * max(worth):
+            start = {
+                _NUMBERS[name]: float(np.clip(fit.size, -90, 90)) if name == "gain" else fit.size
+                for name, fit in clear.items()
+            }
+            lengths = {"length_pixels": next(iter(clear.values())).length}
+            if len(clear) > 1:
+                lengths["gain_length_pixels"] = clear["gain"].length
+            free = [*start, *lengths]
+            found += proposals("line_settling", free, list(start), **start, **lengths, edge=edge)
     return found
 
 
 @dataclass(frozen=True)
 class _Fit:
-    """A decay: its length in pixels, its size in each map (DN or per cent) and standard errors."""
+    """A decay: its length in pixels, its size in a map (DN or per cent) and in errors of that."""
 
     length: float
-    sizes: dict[str, tuple[float, float]]
+    size: float
+    z: float
+
+
+def _decays(clues: Clues, edge: str, name: str) -> list[_Fit]:
+    """Return the decay of each length that fits a map best; none where there is no such map."""
+    made = [_fitted(clues, edge, name, length) for length in _lengths(clues, edge)]
+    return [fit for fit in made if fit is not None]
 
 
 def _lengths(clues: Clues, edge: str) -> list[float]:
@@ -59,32 +70,27 @@ def _lengths(clues: Clues, edge: str) -> list[float]:
 
 
 def _clear(fit: _Fit) -> float:
-    """Return how much of the maps a decay explains: chi-squared."""
-    return sum(z**2 for _, z in fit.sizes.values())
+    """Return how much of a map a decay explains: chi-squared."""
+    return fit.z**2
 
 
-def _fitted(clues: Clues, edge: str, length: float) -> _Fit:
-    """Return the decay of a length that fits the maps best."""
+def _fitted(clues: Clues, edge: str, name: str, length: float) -> _Fit | None:
+    """Return the decay of a length that fits a map best; None where there is no such map."""
     axis, end = _EDGES[edge]
-    found = {}
-    for name in _NUMBERS:
-        images = clues.image(name)
-        top = bottom = 0.0
-        for channel, (image, noise) in images.items():
-            scale = clues.scale(name, channel) / (100 if name == "gain" else 1)
-            line = _places(clues, channel, axis)
-            size = clues.layout.columns if axis == "columns" else clues.layout.rows
-            distance = line if end == "first" else size - 1 - line
-            own = beyond_smooth(image.mean(0 if axis == "columns" else 1))
-            own -= beyond_smooth(_had(clues, axis, name, line, size)) * scale
-            shape = beyond_smooth(np.exp(-distance / length))
-            # Lines scatter beyond the noise of their pixels: a decay must stand out of that.
-            square = line_square(own, noise, image.size // own.size)
-            top += scale * float(shape @ own) / square
-            bottom += scale**2 * float(shape @ shape) / square
-        if bottom > 0:
-            found[name] = (top / bottom, top / bottom**0.5)
-    return _Fit(length, found)
+    top = bottom = 0.0
+    for channel, (image, noise) in clues.image(name).items():
+        scale = clues.scale(name, channel) / (100 if name == "gain" else 1)
+        line = _places(clues, channel, axis)
+        size = clues.layout.columns if axis == "columns" else clues.layout.rows
+        distance = line if end == "first" else size - 1 - line
+        own = beyond_smooth(image.mean(0 if axis == "columns" else 1))
+        own -= beyond_smooth(_had(clues, axis, name, line, size)) * scale
+        shape = beyond_smooth(np.exp(-distance / length))
+        # Lines scatter beyond the noise of their pixels: a decay must stand out of that.
+        square = line_square_beside(own, shape, noise, image.size // own.size)
+        top += scale * float(shape @ own) / square
+        bottom += scale**2 * float(shape @ shape) / square
+    return _Fit(length, top / bottom, top / bottom**0.5) if bottom > 0 else None
 
 
 def _places(clues: Clues, channel: str, axis: str) -> Array:
@@ -100,8 +106,9 @@ def _had(clues: Clues, axis: str, name: str, line: Array, size: int) -> Array:
     for own in clues.camera.effect:
         if isinstance(own, LineSettling) and _EDGES[own.edge][0] == axis:
             distance = line if _EDGES[own.edge][1] == "first" else size - 1 - line
-            amplitude = own.offset_dn if name == "offset" else own.gain_percent
-            total += amplitude * np.exp(-distance / own.length_pixels)
+            offset = (own.offset_dn, own.length_pixels)
+            amplitude, length = offset if name == "offset" else (own.gain_percent, own.gain_length)
+            total += amplitude * np.exp(-distance / length)
     return total
 
 

@@ -1,14 +1,19 @@
 """Lines and frames that move together: row and column noise, drift, flicker, bands, patterns."""
 
 from collections.abc import Iterator, Sequence
-from math import sqrt
+from dataclasses import replace
+from math import inf, isfinite, pi, sqrt
 
 from analysis.mismatch.bank.coherent import RANKS, Peak, line_name
+from analysis.mismatch.bank.scalars import UNKNOWN
 from analysis.mismatch.candidates.candidate import Candidate, Proposal, proposals
 from analysis.mismatch.clues import Clues, alike
 from analysis.mismatch.instance import Frequency, same_line
 
 _ALTERNATING = {"checkerboard": (0.5, 0.5), "rows": (0.0, 0.5), "columns": (0.5, 0.0)}
+_BANDS = {"rows of light": "row_spectrum_peak of light", "rows": "row_spectrum_peak"}
+_TINY = 1e-300
+_PARABOLA = 1.3  # scatter of a parabola's top on half bins, over the bound (Rife & Boorstyn, 1974)
 _LEAST_POWER = 1.2  # of a line worth a trial, white noise at 1
 
 
@@ -35,36 +40,42 @@ def _flicker(clues: Clues) -> Sequence[Proposal]:
 
 
 def _line_flicker(clues: Clues) -> Sequence[Proposal]:
-    found: list[Proposal] = []
-    for kind in ("rows of light", "rows"):
-        clear = clearest(clues, kind)
-        if clear is None:
-            continue
-        channel, peak = clear
-        cycles = peak.fy * clues.shape(channel)[0] + peak.off
-        if cycles > 0 and not any(
-            abs(p.effect.cycles_per_frame - cycles) < 0.2  # type: ignore[attr-defined] # its own kind
-            for p in found
-        ):
-            found += proposals(
-                "line_flicker",
-                ["depth_percent", "cycles_per_frame"],
-                depth_percent=100 * _depth(clues, channel, peak),
-                cycles_per_frame=cycles,
-            )
-    return found
+    """Start from the clearer of two peaks: of bands that grow with light, or are alike in DN.
+
+    How high a peak is tells nothing of where it is: no trial finds the right one of two.
+    """
+    found = {kind: own for kind in _BANDS if (own := clearest(clues, kind)) is not None}
+    if not found:
+        return []
+
+    def score(kind: str) -> float:
+        value, _ = clues.seen.pooled[found[kind][0]].get(_BANDS[kind], UNKNOWN)
+        return value if isfinite(value) else -inf
+
+    channel, peak = found[max(found, key=score)]
+    cycles = peak.fy * clues.shape(channel)[0] + peak.off
+    if cycles <= 0:
+        return []
+    bright = _brightness(clues, channel)
+    mean = sum(w * b for b, w in bright) / max(sum(w for _, w in bright), _TINY)
+    if not mean > 0:
+        return []
+    n, m = clues.shape(channel)
+    excess = max(peak.power - 1, 0.05)
+    depth = 2 * sqrt(excess / (n * m * mean))  # of power d^2 S^2 n m / (4 v) beyond noise
+    frames = sum(w for _, w in bright) ** 2 / sum(w * b for b, w in bright)
+    made = proposals(
+        "line_flicker", ["depth_percent"], depth_percent=100 * depth, cycles_per_frame=cycles
+    )
+    error = _PARABOLA * sqrt(6 / (excess * frames)) / (2 * pi)
+    return [replace(one, errors={"cycles_per_frame": error}) for one in made]
 
 
-def _depth(clues: Clues, channel: str, peak: Peak) -> float:
-    """Return the relative depth of a band of light: of power d^2 S^2 n m / (4 v) beyond noise."""
+def _brightness(clues: Clues, channel: str) -> list[tuple[float, float]]:
+    """Return S^2 / v of each place with light, and the weight that its frames have."""
     places = [p for p in clues.places if channel in ("", p[1]) and clues.signal(p) > 0]
     bright = [clues.signal(p) ** 2 / clues.seen.levels[p].variance_dn2 for p in places]
-    weights = [b * (clues.frames(p[0]) - 1) for p, b in zip(places, bright, strict=True)]
-    if not sum(weights) > 0:
-        return 0.0
-    mean = sum(w * b for w, b in zip(weights, bright, strict=True)) / sum(weights)
-    n, m = clues.shape(channel)
-    return 2 * sqrt(max(peak.power - 1, 0.05) / (n * m * mean))
+    return [(b, b * (clues.frames(p[0]) - 1)) for p, b in zip(places, bright, strict=True)]
 
 
 def _pink(clues: Clues) -> Sequence[Proposal]:

@@ -24,7 +24,8 @@ _ALIKE = 0.05  # relative difference of parameters up to which a proposal is an 
 _SPARSE = 4  # times as many simulations
 _BY_FRAME = frozenset({"frame_variance"})
 # A sign: half of the pairs of frames show nothing, half show it twice. A band: one bin's phase.
-_BY_PHASE = frozenset({"bistable_pattern", "line_flicker"})
+# Pink noise: most of it in a frame's mean and in the first few bins.
+_BY_DRAW = frozenset({"bistable_pattern", "line_flicker", "pink_noise"})
 _FAR_OFF, _LITTLE = 8.0, 0.3  # departures, and the share of one that is little
 _SHARED = 0.1  # share of an effect's change that may lie where the model moved since
 
@@ -70,7 +71,7 @@ def replicates_for(setting: Setting, effects: Iterable[Effect]) -> int:
 
 
 def _sparse(effect: Effect) -> bool:
-    return effect.measures == _BY_FRAME or effect.kind in _BY_PHASE
+    return effect.measures == _BY_FRAME or effect.kind in _BY_DRAW
 
 
 def _near(one: Effect, other: Effect) -> bool:

@@ -16,10 +16,12 @@ from planter.view import View
 from analysis.mismatch import find_mismatch
 from analysis.mismatch.bank.edges import REACHES, edge_shapes, edges
 from analysis.mismatch.bank.edges import names as edge_names
+from analysis.mismatch.bank.key import Key
 from analysis.mismatch.bank.parts import parts
 from analysis.mismatch.candidates.edges import CANDIDATES
 from analysis.mismatch.finding import Change, Finding, FittedParameter, Gain, OmittedEffect, Proof
 from analysis.mismatch.jsonfile import finding_values
+from analysis.mismatch.locate import lines_of
 from analysis.mismatch.report.sentences import verdict
 from analysis.mismatch.report.summary import summary
 from dsis.cfa import Cfa
@@ -215,6 +217,13 @@ def test_one_column_at_the_edge_is_no_decay() -> None:
     found = find_mismatch(camera(), stacks, seed=1, vocabulary=words)
     assert not found.omitted_physics
     assert "fixed_edge" in {m.statistic for m in found.unexplained}
+
+
+@pytest.mark.parametrize("detail", ["columns, last, near", "offset alone columns, last, far"])
+def test_numbers_of_edges_and_contrasts_of_them_say_their_lines(detail: str) -> None:
+    key = Key("fixed_edge", "contrast", "", "", detail)
+    assert lines_of(key, "columns", 128) == (112, 127)
+    assert lines_of(key, "rows", 96) is None
 
 
 def test_one_hot_pixel_at_the_edge_is_no_decay() -> None:

@@ -159,8 +159,8 @@ def _where(
         kind=kinds.pop() if len(kinds) == 1 else None,
         channel=channel,
         signal_dn=(round(min(signals), 3), round(max(signals), 3)) if signals else None,
-        rows=_lines(keys[top], "rows", layout.rows),
-        columns=_lines(keys[top], "columns", layout.columns),
+        rows=lines_of(keys[top], "rows", layout.rows),
+        columns=lines_of(keys[top], "columns", layout.columns),
         spatial_frequency=_frequency(layout, seen, statistic, keys[top]),
         pixels=_pixels(layout, seen, keys[top]),
         exposure_time_s=(min(times), max(times))
@@ -169,8 +169,9 @@ def _where(
     )
 
 
-def _lines(key: Key, axis: str, size: int) -> tuple[int, int] | None:
-    if not key.detail.startswith(axis):
+def lines_of(key: Key, axis: str, size: int) -> tuple[int, int] | None:
+    """Return the first and last of the `rows` or `columns` that a number is of; None: of all."""
+    if axis not in key.detail.replace(",", " ").split():  # a contrast names its map first
         return None
     if key.statistic == "half_seam":
         return size // 2 - 1, size // 2

@@ -74,6 +74,7 @@ def _section(kind: type[Effect]) -> str:
 
 def _row(name: str, field: FieldInfo) -> str:
     default = "required" if field.is_required() else f"`{field.default}`"
+    default = "none" if field.default is None else default
     return f"| `{name}` | {_allowed(field)} | {default} |"
 
 
@@ -82,6 +83,8 @@ def _allowed(field: FieldInfo) -> str:
     choices = getattr(field.annotation, "__args__", ())
     if choices and all(isinstance(choice, str) for choice in choices):
         return ", ".join(f"`{choice}`" for choice in choices)
+    if type(None) in choices:  # may be left out
+        return f"number, {_bounds(choices[0].__metadata__[0].metadata)}"
     if choices:
         return f"{len(choices)} numbers, {_bounds(choices[0].__metadata__[0].metadata)}"
     kind = "whole number" if field.annotation is int else "number"

@@ -80,7 +80,7 @@ def _row(name: str, field: FieldInfo) -> str:
 
 def _allowed(field: FieldInfo) -> str:
     """Return a field's type and bounds in words."""
-    choices = getattr(field.annotation, "__args__", ())
+    choices: tuple[Any, ...] = getattr(field.annotation, "__args__", ())
     if choices and all(isinstance(choice, str) for choice in choices):
         return ", ".join(f"`{choice}`" for choice in choices)
     if type(None) in choices:  # may be left out

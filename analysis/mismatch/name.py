@@ -59,6 +59,7 @@ class Search:
     memory: Memory = field(default_factory=Memory)
     seen_alias: dict[Frequency, bool] = field(default_factory=dict)
     polished: State | None = None
+    rough: bool = False
 
     def run(self) -> State:
         """Return the final state."""
@@ -104,10 +105,11 @@ class Search:
             added = self._best(state)
             if added is None:
                 break
-            if added[0].gain < _WEAK and self.named and state is not self.polished:
+            if added[0].gain < _WEAK and self.rough:
                 state = self._polished(state)  # what is large, and fitted roughly, feigns a little
                 continue
             self._take(added[0])
+            self.rough |= added[0].gain >= _WEAK
             state = State.of(self.setting, added[1], self.step, draft=True)
         if not state.mismatches:
             self.ties = []  # what was undecided on the way is explained
@@ -313,6 +315,7 @@ class Search:
 
     def _polished(self, state: State) -> State:
         """Fit the parameters of all effects together, and judge the result once more."""
+        self.rough = False
         mine = [(n, n.proposal) for n in self.named if n.proposal is not None]
         if not mine or state is self.polished:
             self.polished = state

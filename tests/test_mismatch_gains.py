@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
+from analysis.mismatch.finding import Gain
 from analysis.mismatch.prove import Loglik, gap_closed, heldout_gain
+from analysis.mismatch.trial import _denied
 
 
 def test_intervals_cover() -> None:
@@ -75,3 +77,11 @@ def test_gap_is_not_that_of_numbers_nearly_without_spread() -> None:
         sims[:, 0] = 1e-9 * np.arange(k)
     x[0] = 1.0
     assert gap_closed(x, before, after, sd) == pytest.approx(1, abs=0.15)
+
+
+def test_pixels_deny_an_effect_only_where_they_are_a_hundred_times_against_it() -> None:
+    """Parameters were fitted to other frames: what hardly shows costs a nat or two in all."""
+    assert not _denied(Gain(-0.2, (-0.25, -0.15)), 14)
+    assert _denied(Gain(-0.5, (-0.6, -0.4)), 14)
+    assert not _denied(Gain(-0.5, (-1.2, 0.2)), 14)
+    assert _denied(Gain(float("nan"), (float("nan"), float("nan"))), 14)

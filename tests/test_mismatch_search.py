@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 from analysis.mismatch import name
+from analysis.mismatch.candidates import Proposal
 from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.name import Search
 from analysis.mismatch.named import Named
 from analysis.mismatch.polish import largest
-from analysis.mismatch.rank import alike, ties
+from analysis.mismatch.rank import Ranked, _near, alike, ties
 from analysis.mismatch.recalibrate import _moved
 from dsis.effects import registry
 
@@ -212,3 +213,41 @@ def test_a_frequency_is_fitted_where_it_was_found() -> None:
     effects = (registry()["line_flicker"](depth_percent=0.04, cycles_per_frame=8.4),)
     assert largest(effects, 0, "cycles_per_frame") == pytest.approx(0.3 / 8.4)
     assert largest(effects, 0, "depth_percent") == np.inf
+
+
+def test_a_denied_decay_waits_as_others_do_and_leaves_other_edges(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def decay(edge: str, gain: float) -> Any:
+        effect = registry()["line_settling"](gain_percent=1.0, length_pixels=5.0, edge=edge)
+        proposal = Proposal(effect, ("gain_percent",))
+        return Ranked(gain, "line_settling", proposal, SimpleNamespace(mean=np.zeros(NUMBERS)))
+
+    left, top, other = decay("left", 50.0), decay("top", 20.0), _ranked("row_noise", 30.0, 0)
+    other.proposal.effect = registry()["row_noise"](sigma_dn=1.0)
+    denied = {id(left.polished.mean), id(other.polished.mean)}
+
+    def ranked(*of: Any) -> list[Any]:
+        kinds, possible = of[1], of[6]
+        offered = [one for one in (left, other, top) if one.kind in kinds]
+        return [one for one in offered if possible(one.proposal.effect)]
+
+    monkeypatch.setattr(name, "ranked", ranked)
+    monkeypatch.setattr(
+        name, "refuted", lambda *of: Denial(0.0, "no") if id(of[3]) in denied else None
+    )
+    monkeypatch.setattr(name, "replicates_for", lambda *_: 2)
+    layout = SimpleNamespace(channels=("MONO",))
+    search = _search(
+        setting=SimpleNamespace(drafts=16, layout=layout),
+        vocabulary=frozenset({"line_settling", "row_noise"}),
+    )
+    assert [one.name for one in search._decided(STATE)] == ["line_settling (top)"]
+    assert search.doubted.keys() == {"line_settling (left)", "row_noise"}
+
+
+def test_an_optional_number_is_near_its_like_only() -> None:
+    kind, own = registry()["line_settling"], {"gain_percent": 1.0, "length_pixels": 5.0}
+    assert _near(kind(**own), kind(**own))
+    assert not _near(kind(**own), kind(**own, gain_length_pixels=3.0))
+    assert not _near(kind(**own, gain_length_pixels=3.0), kind(**own))

@@ -129,3 +129,36 @@ def test_numbers_are_settled_where_the_search_has_touched_them(
     trial: Any = gains
     _proven(search, OPEN, trial, judged=False)
     assert search.calls == calls
+
+
+class Refitted(Scripted):
+    """A search whose joint fits explain what `feigned` seemed to, and are counted."""
+
+    def _best(self, state: Any) -> Any:
+        for kind, gain in (("strong", 300.0), ("weak", 5.0), ("weaker", 4.0)):
+            feigned = kind == "weak" and state is FITTED
+            if kind in self._left() and not feigned:
+                return Named(kind, None, {}, gain, ()), None
+        return None
+
+    def _polished(self, _state: Any) -> Any:
+        self.rough = False
+        self.fits += 1
+        return FITTED
+
+
+FITTED = Stub(mismatches=["something"])
+
+
+def test_all_is_fitted_again_once_before_what_is_weak_is_taken_in(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(search_module, "State", Stub(of=lambda *_, **__: FITTED))
+    setting: Any = Stub(drafts=16, layout=None)
+    words = frozenset({"strong", "weak", "weaker"})
+    nothing: Any = OPEN
+    search = Refitted(setting, nothing, nothing, words, step=lambda: None)
+    search.fits = 0  # type: ignore[attr-defined] # its own
+    search._sought(nothing)
+    assert [n.kind for n in search.named] == ["strong", "weaker"]
+    assert search.fits == 1  # type: ignore[attr-defined] # its own

@@ -157,10 +157,11 @@ def _calibrated_to(setting: Setting, whole: State, camera: Camera) -> Calibrated
 def _proof_without(
     trial: Trial, whole: State, calibrated: Calibrated, step: Callable[[], None], source: Source
 ) -> Proof:
-    """Return the proof where nothing is named: no gap is closed, so none is measured."""
+    """Return the proof where nothing is named: of a gap nothing is closed."""
     model = replace(whole, setting=trial.numbers.setting, calibrated=calibrated, mismatches=())
     left = Change(len(whole.mismatches), len(whole.mismatches))
-    return replace(trial.proof(model, model, step, source), discrepancies=left)
+    proof = trial.proof(model, model, step, source)
+    return replace(proof, discrepancies=left, gap_closed=0.0 if whole.mismatches else None)
 
 
 def _heated(

@@ -59,7 +59,7 @@ class Search:
     memory: Memory = field(default_factory=Memory)
     seen_alias: dict[Frequency, bool] = field(default_factory=dict)
     polished: State | None = None
-    rough: bool = False
+    rough: bool = False  # a strong effect was taken in since
 
     def run(self) -> State:
         """Return the final state."""
@@ -105,9 +105,10 @@ class Search:
             added = self._best(state)
             if added is None:
                 break
-            if added[0].gain < _WEAK and self.rough:
-                state = self._polished(state)  # what is large, and fitted roughly, feigns a little
-                continue
+            if added[0].gain < _WEAK and self.rough:  # what is large, and rough, feigns a little
+                state, before = self._polished(state), state
+                if state is not before:
+                    continue
             self._take(added[0])
             self.rough |= added[0].gain >= _WEAK
             state = State.of(self.setting, added[1], self.step, draft=True)
@@ -221,7 +222,6 @@ class Search:
         return self.vocabulary - self._done() - full
 
     def _done(self) -> frozenset[str]:
-        """Return what was named or refused, of its kind or one of it."""
         return frozenset({*(n.name for n in self.named), *self.refused})
 
     def _decided(self, state: State) -> list[Ranked]:
@@ -266,7 +266,7 @@ class Search:
     def _undoubted(self, state: State, fitted: list[Ranked]) -> list[Ranked]:
         """Leave out the best as long as a statistic which calls for it denies it, for this round.
 
-        A kind of which nothing is left is doubted. What is named besides may show another of it:
+        That of which nothing is left is doubted. What is named besides may show another of it:
         then it is tried again.
         """
         while fitted and fitted[0].gain >= LEAST_GAIN and fitted[0].kind not in LINES:
@@ -276,14 +276,14 @@ class Search:
             if denial is None:
                 break
             fitted = others
-            if all(one.kind != best.kind for one in others):
+            if all(one.name != best.name for one in others):
                 self.doubted[best.name] = denial.why
                 break
         return fitted
 
     def _possible(self, effect: Effect) -> bool:
         """Return whether an effect may be tried: not again, of a line as whole frames show it."""
-        if instance(effect.kind, effect) in self._done():
+        if instance(effect.kind, effect) in self._done() | self.doubted.keys():
             return False
         frequency = frequency_of(effect)
         layout = self.setting.layout
@@ -318,7 +318,6 @@ class Search:
         self.rough = False
         mine = [(n, n.proposal) for n in self.named if n.proposal is not None]
         if not mine or state is self.polished:
-            self.polished = state
             return state
         bare = camera_without(state.camera, [p.effect for _, p in mine], self.camera)
         sparse = replicates_for(self.setting, [p.effect for _, p in mine])
@@ -326,15 +325,16 @@ class Search:
         # Of a large recording each simulation tells much and costs much: `settle` steps once more.
         rounds = 2 if self.setting.replicates > 1 else 1
         polished = polish(predictor, bare, [p for _, p in mine], rounds=rounds)
+        self.polished = state
         if polished is None:
-            self.polished = state
             return state
         fitted = iter(zip(polished.effects, polished.errors, strict=True))
         self.named = [
             n if n.proposal is None else renewed(n, n.proposal, *next(fitted)) for n in self.named
         ]
         camera = with_effects(bare, polished.effects)
-        self.polished = state if camera is None else State.of(self.setting, camera, self.step)
+        if camera is not None:
+            self.polished = State.of(self.setting, camera, self.step)
         return self.polished
 
     def denied(self, state: State) -> tuple[Named, str] | None:

@@ -36,7 +36,7 @@ class Named:
 
     @property
     def name(self) -> str:
-        """Its kind, and of a line its frequency: a sensor may have several."""
+        """Its kind, and of a line its frequency, of a decay its edge: there may be several."""
         return instance(self.kind, None if self.proposal is None else self.proposal.effect)
 
 

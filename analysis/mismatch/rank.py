@@ -79,7 +79,8 @@ def _near(one: Effect, other: Effect) -> bool:
         return False
     a, b = one.model_dump(), other.model_dump()
     return all(
-        abs(a[name] - b[name]) <= _ALIKE * abs(a[name]) if isinstance(a[name], float)
+        abs(a[name] - b[name]) <= _ALIKE * abs(a[name])
+        if isinstance(a[name], float) and isinstance(b[name], float)
         else a[name] == b[name]
         for name in a
     )  # fmt: skip
@@ -96,7 +97,7 @@ class Ranked:
 
     @property
     def name(self) -> str:
-        """Its kind, and of a line its frequency."""
+        """Its kind, and of a line its frequency, of a decay its edge."""
         return instance(self.kind, self.proposal.effect)
 
 

@@ -58,7 +58,8 @@ def _denied(gain: Gain, frames: int) -> bool:
     Intervals tell how frames scatter. They do not know that parameters were fitted to others: of an
     effect that pixels hardly show, that costs a nat or two in all.
     """
-    return gain.ci95[1] < 0 and gain.nats_per_frame * frames < -_TOTAL
+    sure = gain.ci95[1] < 0 and gain.nats_per_frame * frames < -_TOTAL
+    return sure or not np.isfinite(gain.nats_per_frame)
 
 
 def _per_frame(told: Ratio, frames: int) -> Gain:

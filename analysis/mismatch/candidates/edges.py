@@ -18,7 +18,7 @@ _EDGES = {"left": ("columns", "first"), "right": ("columns", "last"),
 _LENGTHS = tuple(np.geomspace(1.0, 48.0, 24).tolist())  # pixels of the sensor
 _LONGEST = 1 / 8  # of the sensor
 _CLEAR = 3.0  # standard errors of a decay that is worth a trial
-_NEAR = 0.5  # of what the best decay explains
+_NEAR = 0.5  # of what a decay from the opposite edge explains
 _NUMBERS = {"offset": "offset_dn", "gain": "gain_percent"}
 
 
@@ -33,9 +33,10 @@ def _settling(clues: Clues) -> Sequence[Proposal]:
     ]
     worth = [sum(_clear(fit) for fit in own.values()) for own in best]
     found: list[Proposal] = []
-    for edge, of_maps, own in zip(_EDGES, best, worth, strict=True):
+    opposites = (worth[1], worth[0], worth[3], worth[2])
+    for edge, of_maps, own, opposite in zip(_EDGES, best, worth, opposites, strict=True):
         clear = {name: fit for name, fit in of_maps.items() if abs(fit.z) > _CLEAR}
-        if clear and own > _NEAR * max(worth):
+        if clear and own > _NEAR * opposite:
             start = {
                 _NUMBERS[name]: float(np.clip(fit.size, -90, 90)) if name == "gain" else fit.size
                 for name, fit in clear.items()

@@ -44,7 +44,11 @@ def _line_flicker(clues: Clues) -> Sequence[Proposal]:
 
     How high a peak is tells nothing of where it is: no trial finds the right one of two.
     """
-    found = {kind: own for kind in _BANDS if (own := clearest(clues, kind)) is not None}
+    found = {
+        kind: own
+        for kind in _BANDS
+        if (own := clearest(clues, kind)) is not None and _cycles(clues, *own) > 0
+    }
     if not found:
         return []
 
@@ -53,9 +57,6 @@ def _line_flicker(clues: Clues) -> Sequence[Proposal]:
         return value if isfinite(value) else -inf
 
     channel, peak = found[max(found, key=score)]
-    cycles = peak.fy * clues.shape(channel)[0] + peak.off
-    if cycles <= 0:
-        return []
     bright = _brightness(clues, channel)
     mean = sum(w * b for b, w in bright) / max(sum(w for _, w in bright), _TINY)
     if not mean > 0:
@@ -65,10 +66,18 @@ def _line_flicker(clues: Clues) -> Sequence[Proposal]:
     depth = 2 * sqrt(excess / (n * m * mean))  # of power d^2 S^2 n m / (4 v) beyond noise
     frames = sum(w for _, w in bright) ** 2 / sum(w * b for b, w in bright)
     made = proposals(
-        "line_flicker", ["depth_percent"], depth_percent=100 * depth, cycles_per_frame=cycles
+        "line_flicker",
+        ["depth_percent"],
+        depth_percent=100 * depth,
+        cycles_per_frame=_cycles(clues, channel, peak),
     )
     error = _PARABOLA * sqrt(6 / (excess * frames)) / (2 * pi)
     return [replace(one, errors={"cycles_per_frame": error}) for one in made]
+
+
+def _cycles(clues: Clues, channel: str, peak: Peak) -> float:
+    """Return cycles per frame of a peak."""
+    return peak.fy * clues.shape(channel)[0] + peak.off
 
 
 def _brightness(clues: Clues, channel: str) -> list[tuple[float, float]]:

@@ -63,7 +63,7 @@ def _wrong_numbers(errors: tuple[ParameterError, ...], *, sure: bool) -> str:
         said.append(f"{error.parameter} is {recorded}, not {plain(error.model, 5)}")
     more = len(errors) - _NAMED
     rest = [f"{more} more"] if more > 0 else []
-    off = "are off" if sure else "seem off, unless what is unexplained shifts them"
+    off = "are off" if sure else "seem off, unless what differs shifts them"
     return f"Numbers of the camera model {off}: {'; '.join([*said, *rest])}."
 
 
@@ -88,9 +88,11 @@ def fitted(name: str, parameter: FittedParameter) -> str:
 
 
 def effect_label(effect: OmittedEffect) -> str:
-    """Return the usual name of an effect, of a line with its frequency: there may be several."""
+    """Return the usual name of an effect, with its frequency or edge: there may be several."""
     frequency = effect.parameters.get("frequency")
     words = effect_words(effect.effect)
+    if "edge" in effect.choices:
+        return f"{words} at the {effect.choices['edge']} edge"
     if frequency is None:
         return words
     return f"{words} at ({', '.join(plain(float(v)) for v in np.ravel(frequency.value))})"

@@ -49,7 +49,7 @@ def _proof(finding: Finding) -> list[str]:
         said.append(f"classifier AUC {_change(proof.classifier_auc)}")
     if proof.photon_transfer_chi2 is not None:
         said.append(f"photon-transfer chi²/dof {_change(proof.photon_transfer_chi2)}")
-    return ["On the locked frames: " + "; ".join(said) + ".", ""]
+    return ["Before and after: " + "; ".join(said) + ".", ""]
 
 
 def _change(change: Change) -> str:

@@ -9,7 +9,7 @@ from analysis.mismatch.candidates.candidate import Candidate, Proposal, proposal
 from analysis.mismatch.clues import Clues, alike
 
 _ALONG_ROWS, _ALONG_COLUMNS = "correlation_0_1", "correlation_1_0"
-_AS_LIKELY = 8.0  # of chi-squared, odds of 50: of few levels, periods may be alike
+_AS_LIKELY = 4.6  # of chi-squared, odds of 10: of few levels, periods may be alike
 _NEAR = (_ALONG_ROWS, _ALONG_COLUMNS, "line_correlation", "pixel_variance")
 
 

@@ -66,18 +66,24 @@ def test_a_band_is_clearer_in_all_colours_together_and_where_it_is(cycles: float
 def test_a_fit_starts_where_the_band_is_and_at_its_depth(cycles: float) -> None:
     """Half bins lose 1 - sinc(1/4)^2 = 0.19 of the power, 0.1 of the depth, at most."""
     depth, places = 0.01, [("flat", name) for name in SIGNAL]
+    bands = bands_of(recorded(np.random.default_rng(6), depth, cycles))
     clues = SimpleNamespace(
         places=places,
         signal=lambda place: SIGNAL[place[1]],
         seen=SimpleNamespace(
-            levels={p: SimpleNamespace(variance_dn2=VARIANCE[p[1]]) for p in places}
+            levels={p: SimpleNamespace(variance_dn2=VARIANCE[p[1]]) for p in places},
+            peaks={("", kind): peak for kind, peak in bands.peaks().items()},
+            pooled={"": bands.numbers()},
         ),
         frames=lambda _: FRAMES,
         shape=lambda _: (ROWS // 2, COLUMNS // 2),
     )
-    peak = bands_of(recorded(np.random.default_rng(6), depth, cycles)).peaks()["rows of light"]
-    assert peak.fy * ROWS / 2 + peak.off == pytest.approx(cycles, abs=0.1)
-    assert 0.8 * depth < temporal._depth(cast(Clues, clues), "", peak) < 1.1 * depth
+    (proposal,) = temporal._line_flicker(cast(Clues, clues))
+    found = proposal.effect.model_dump()
+    assert 0.8 * depth < found["depth_percent"] / 100 < 1.1 * depth
+    assert proposal.free == ("depth_percent",)
+    error = proposal.errors["cycles_per_frame"]
+    assert abs(found["cycles_per_frame"] - cycles) < max(4 * error, 0.1)
 
 
 def test_noise_alone_is_scored_as_a_normal_deviate_or_less() -> None:

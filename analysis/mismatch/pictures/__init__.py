@@ -92,10 +92,10 @@ def _carrying(base: State) -> list[str]:
 
 
 def threshold_z(state: State) -> float:
-    """Return from where on the number of a single exposure is certain to depart."""
+    """Return from where on the number of a single exposure is certain to depart; none: a sum."""
     null = state.null
     by_key = zip(null.keys, shares(state.setting.layout, null), strict=True)
-    least = float(min(share for key, share in by_key if key.exposure and share > 0))
+    least = min((float(share) for key, share in by_key if key.exposure and share > 0), default=1.0)
     chance = FAMILY * least
     return float(scipy.stats.t.isf(chance / 2, null.degrees))
 

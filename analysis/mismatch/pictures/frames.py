@@ -24,8 +24,8 @@ def spectra(album: Album, before: Albums, after: Albums) -> dict[str, tuple[Spec
 
     some = tuple(
         Spectrum(name, of(name)(album), *_means(of(name), before, after), pitch_px=_pitch(name))
-        for name, sums in album.spectra.items()
-        if sums.weight[""][0]
+        for name in album.spectra
+        if _moves(name, (album, *before, *after))
     )
     return {POOLED: some} if some else {}
 
@@ -40,7 +40,7 @@ def line_spectra(
     found: dict[str, tuple[LineSpectrum, ...]] = {}
     pooled = []
     for name, sums in album.spectra.items():
-        if not sums.weight[""][0]:
+        if not _moves(name, (album, *before, *after)):
             continue
         key = _weighting(sums, axis)
 
@@ -55,8 +55,10 @@ def line_spectra(
         )
     if pooled:
         found[POOLED] = tuple(pooled)
-    for exposure in dict.fromkeys(place[0] for place in album.lines):
-        places = [place for place in album.lines if place[0] == exposure]
+    # Codes that stand still may move in a simulation, or the other way round.
+    shown = [place for place in album.lines if all(place in a.lines for a in (*before, *after))]
+    for exposure in dict.fromkeys(place[0] for place in shown):
+        places = [place for place in shown if place[0] == exposure]
         found[exposure] = tuple(_line(album, before, after, place, axis) for place in places)
     return found
 
@@ -122,6 +124,11 @@ def _means(
         np.mean([of(a) for a in some], axis=0) if some else None for some in (before, after)
     )
     return one, two
+
+
+def _moves(channel: str, albums: Albums) -> bool:
+    """Return whether a channel has a spectrum in all of them: codes may stand still in one."""
+    return all(one.spectra[channel].weight[""][0] for one in albums)
 
 
 def _pitch(channel: str) -> int:

@@ -39,6 +39,7 @@ HEADLINES = {
     "omitted_physics": "The simulation leaves out physics",
     "unexplained": "Something differs that is not explained",
 }
+LOCATED = "Simulation and recording differ"
 TEMPLATE = Path(__file__).with_name("report.html.jinja")
 _FIRST_PAGE = 8  # kinds of departure listed before the details
 _SAID = 3  # sentences below a picture
@@ -96,7 +97,10 @@ def render(
     differences = _differences([*finding.mismatches, *_only_unexplained(finding)])
     values = {
         "finding": finding,
-        "headline": HEADLINES[finding.verdict],
+        "headline": HEADLINES[finding.verdict]
+        if finding.searched or finding.verdict != "unexplained"
+        else LOCATED,
+        "searched": finding.searched,
         "verdict": verdict(finding),
         "origin": [line for line in origin.splitlines() if line],
         "effects": [(e, parameters(e)) for e in finding.omitted_physics],

@@ -13,7 +13,6 @@ from analysis.mismatch.candidates import Proposal
 from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.name import Search
 from analysis.mismatch.named import Named
-from analysis.mismatch.polish import largest
 from analysis.mismatch.rank import Ranked, _near, alike, ties
 from analysis.mismatch.recalibrate import _moved
 from dsis.effects import registry
@@ -206,13 +205,6 @@ def test_what_is_named_or_refused_is_not_tried_again() -> None:
     assert replace(search, refused={"crosstalk": "denied"})._left() == frozenset(
         {"spatial_filtering", "readout_memory", "adc_dnl"}
     )
-
-
-def test_a_frequency_is_fitted_where_it_was_found() -> None:
-    """The peak is known to a fraction of a cycle: a longer step would end in another one."""
-    effects = (registry()["line_flicker"](depth_percent=0.04, cycles_per_frame=8.4),)
-    assert largest(effects, 0, "cycles_per_frame") == pytest.approx(0.3 / 8.4)
-    assert largest(effects, 0, "depth_percent") == np.inf
 
 
 def test_a_denied_decay_waits_as_others_do_and_leaves_other_edges(

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from math import exp, inf, log
+from math import exp, log
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,6 @@ from dsis.effects import Effect
 Array = NDArray[np.float64]
 STEP = 0.12  # of the logarithm, for the derivative
 _LARGEST = 1.2  # step of a logarithm
-_FREQUENCIES, _CYCLES = frozenset({"cycles_per_frame"}), 0.3  # largest step of those
 _CYCLIC = {"at_code": "period_codes"}
 _SMALL = 0.05  # gain of log-likelihood below which another round is in vain
 Free = tuple[int, str, bool]
@@ -128,8 +127,7 @@ def shifted(
 ) -> Iterator[tuple[Camera | None, float]]:
     """Yield the camera with each free parameter moved in turn, or None, and by how much."""
     for i, name, signed in free:
-        step = min(STEP, largest(effects, i, name))
-        other = moved(effects, i, name, signed, step)
+        other = moved(effects, i, name, signed, STEP)
         yield (None, 1.0) if other is None else (with_effects(camera, other[0]), other[1])
 
 
@@ -165,8 +163,7 @@ def _along(
     for shrink in (1.0, 0.4, 0.15):
         own: tuple[Effect, ...] | None = effects
         for (i, name, signed), delta in zip(free, step * shrink, strict=True):
-            most = 0.0 if own is None else min(_LARGEST, largest(own, i, name))
-            limited = delta if signed else float(np.clip(delta, -most, most))
+            limited = delta if signed else float(np.clip(delta, -_LARGEST, _LARGEST))
             changed = None if own is None else moved(own, i, name, signed, limited, as_is=True)
             own = None if changed is None else changed[0]
         built = None if own is None else with_effects(camera, own)
@@ -177,11 +174,6 @@ def _along(
         if value > best:
             return own, mean, value
     return None
-
-
-def largest(effects: tuple[Effect, ...], which: int, name: str) -> float:
-    """Return how far a logarithm may move: a frequency is known to a fraction of a cycle."""
-    return _CYCLES / float(getattr(effects[which], name)) if name in _FREQUENCIES else inf
 
 
 def moved(

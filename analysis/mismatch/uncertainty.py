@@ -19,7 +19,6 @@ from analysis.mismatch.candidates import Proposal
 from analysis.mismatch.polish import (
     Free,
     free_of,
-    largest,
     moved,
     precisions,
     shifted,
@@ -72,8 +71,7 @@ def settled(
     reach = float(scipy.stats.t.ppf(0.975, count - 1)) * np.sqrt(np.diag(sandwich))
     corrected = effects
     for (i, name, signed), delta in zip(free, step, strict=True):
-        most = min(_LARGEST, largest(corrected, i, name))
-        limited = float(delta if signed else np.clip(delta, -most, most))
+        limited = float(delta if signed else np.clip(delta, -_LARGEST, _LARGEST))
         changed = moved(corrected, i, name, signed, limited, as_is=True)
         corrected = corrected if changed is None else changed[0]
     # Where a parameter acts by a threshold the step is no guide: it must not make things worse.

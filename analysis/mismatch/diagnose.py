@@ -1,7 +1,8 @@
 """`find_mismatch`: split, re-calibrate, locate, name, prove."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,7 @@ from analysis.mismatch.name import Search
 from analysis.mismatch.named import Named
 from analysis.mismatch.observe import observe
 from analysis.mismatch.parameters import parameter_errors
+from analysis.mismatch.phase import WholeFrames
 from analysis.mismatch.pictures import Album, evidence_of
 from analysis.mismatch.recalibrate import Calibrated, calibrate
 from analysis.mismatch.remarks import remarks_on
@@ -34,8 +36,8 @@ from analysis.mismatch.source import Source
 from analysis.mismatch.split import Split
 from analysis.mismatch.state import Setting, State
 from analysis.mismatch.taking import layout_of
-from analysis.mismatch.thinned import thinned
-from analysis.mismatch.trial import Trial
+from analysis.mismatch.thinned import stages
+from analysis.mismatch.trial import Gained, Trial
 from analysis.mismatch.wholecells import whole_cells
 from dsis.camera import Camera
 from dsis.recording import Recording
@@ -44,6 +46,7 @@ Progress = Callable[[int, int, str], None]
 VOCABULARY = frozenset({*CANDIDATES, "dual_gain"})
 _NEAR = 8.0  # of log-likelihood: a rival worth naming a recording that would decide
 _LOCATED = "No physics was looked for: it is only said where recording and model differ."
+_DOUBTFUL = 30.0  # gain of log-likelihood below which locked frames may not confirm an effect
 _LARGE = 2.5e7  # samples from which fewer simulations must do
 
 
@@ -78,17 +81,14 @@ def find_mismatch(
     remarks = remarks_on(recording, development, layout)
     # What is left out proves nothing either: copies of a frame are told from any simulation.
     split = split.without(development.keys() - {e.name for e in layout.exposures})
-    album = Album(layout)
-    seen = observe(layout, lambda name: source.frames(name, numbers[name]), album, keep=True)
+    album, frames_of = Album(layout), partial(_frames_of, source, numbers)
+    seen = observe(layout, frames_of, album, keep=True)
     samples = sum(len(e.numbers) for e in layout.exposures) * layout.rows * layout.columns
     large = samples > _LARGE
-    counts = (8, 4, 1, 1, 2) if large else (16, 16, 2, 2, 4)
+    counts = (8, 4, 1, 1, 2) if large else (16, 8, 2, 2, 4)
     setting = Setting(layout, seen, split.interpolated, seed, jobs, *counts)
     words = VOCABULARY if vocabulary is None else vocabulary & VOCABULARY
     remarks = remarks if words else (*remarks, _LOCATED)
-
-    def frames_of(name: str) -> Iterator[NDArray[np.uint16]]:
-        return source.frames(name, numbers[name])
 
     trial = Trial.of(recording, split, source, setting)
     whole = State.of(setting if large else _of_all_frames(setting, trial), camera, step)
@@ -104,7 +104,7 @@ def find_mismatch(
         replace(base, mismatches=whole.mismatches),
         words,
         step,
-        frames_of=frames_of,
+        lines=WholeFrames(frames_of),
     )
     final = _searched(search, source) if large else search.run()
     if large:  # simulations of large recordings tell more, and cost more
@@ -176,19 +176,36 @@ def _heated(
 
 
 def _searched(search: Search, source: Source) -> State:
-    """Return the final state of a large recording: sought on some of its frames, judged on all."""
-    whole, base = search.setting, search.base
-    layout = thinned(whole.layout)
-    numbers = {e.name: e.numbers for e in layout.exposures}
-    if layout == whole.layout:
-        return search.run()
-    seen = observe(layout, lambda name: source.frames(name, numbers[name]), keep=True)
-    # All states here are on the way: what is found is judged on all frames.
-    search.setting = replace(whole, layout=layout, seen=seen, nulls=whole.drafts)
-    search.base = State.of(search.setting, search.camera, search.step)
-    found = search.run()
+    """Return the final state of a large recording: sought on some of its frames, judged on all.
+
+    What is strong is found on few frames, and what is weak beside it on more.
+    """
+    whole, base, camera = search.setting, search.base, search.camera
+    for layout, search.least in stages(whole.layout):
+        if layout == whole.layout:
+            break
+        numbers = {e.name: e.numbers for e in layout.exposures}
+        seen = observe(layout, partial(_frames_of, source, numbers), keep=True)
+        # All states here are on the way: what is found is judged on all frames.
+        search.setting = replace(whole, layout=layout, seen=seen, nulls=whole.drafts)
+        state = State.of(search.setting, camera, search.step)
+        if search.named:
+            state = search.resumed(state)
+        else:
+            search.base = state
+            state = search.run()
+        camera = state.camera
     search.setting, search.base = whole, base
-    return State.of(whole, found.camera, search.step) if search.named else base
+    final = State.of(whole, camera, search.step) if search.named else base
+    if layout == whole.layout:
+        return search.resumed(final) if search.named else search.run()
+    return final
+
+
+def _frames_of(
+    source: Source, numbers: Mapping[str, Sequence[int]], name: str
+) -> Iterator[NDArray[np.uint16]]:
+    return source.frames(name, numbers[name])
 
 
 def _undenied(search: Search, final: State) -> State:
@@ -207,8 +224,12 @@ def _proven(
     """
     while True:
         final = final if judged else _undenied(search, final)
-        gained = trial.gains(final, _fitted_without(search, final))
-        weak = [named for named in search.named if not gained[named.name].certain]
+        gained = _gained(search, final, trial)
+        weak = [
+            named
+            for named in search.named
+            if named.name in gained and not gained[named.name].certain
+        ]
         if not weak:
             return final, {name: one.gain for name, one in gained.items()}
         worst = min(weak, key=lambda named: gained[named.name].gain.nats_per_frame)
@@ -222,14 +243,29 @@ def _proven(
                 final = search.settle(final)
 
 
-def _fitted_without(search: Search, final: State) -> dict[str, Camera]:
-    """Return the cameras without each of the effects named, fitted side by side."""
+def _gained(search: Search, final: State, trial: Trial) -> dict[str, Gained]:
+    """Return the gains of all effects; of those that chance could feign, where one of them fails.
+
+    What gained little when it was taken in is asked first: the others change with it.
+    """
+    found: dict[str, Gained] = {}
+    little = [named for named in search.named if named.gain < _DOUBTFUL]
+    for some in (little, [named for named in search.named if named not in little]):
+        cameras = _fitted_without(search, final, some)
+        found |= trial.gains(final, cameras)
+        if not all(one.certain for one in found.values()):
+            break
+    return found
+
+
+def _fitted_without(search: Search, final: State, some: Sequence[Named]) -> dict[str, Camera]:
+    """Return the cameras without each of some effects, fitted side by side."""
 
     def one(named: Named) -> Camera:
         return search.fitted_without(final, named)
 
-    made = in_threads(one, search.named, search.setting.jobs)
-    return {named.name: camera for named, camera in zip(search.named, made, strict=True)}
+    made = in_threads(one, some, search.setting.jobs)
+    return {named.name: camera for named, camera in zip(some, made, strict=True)}
 
 
 def _finding(

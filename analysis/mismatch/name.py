@@ -9,10 +9,9 @@ from numpy.typing import NDArray
 from analysis.mismatch.candidates import CANDIDATES
 from analysis.mismatch.contradicted import contradicted, refuted
 from analysis.mismatch.feigned import of_another
-from analysis.mismatch.instance import LINES, Frequency, frequency_of, instance, same_line
+from analysis.mismatch.instance import LINES, Frequency, frequency_of, instance, periodic
 from analysis.mismatch.named import Named, camera_without, renewed
-from analysis.mismatch.observe import Frames
-from analysis.mismatch.phase import aliases, keeps_phase, strongest
+from analysis.mismatch.phase import WholeFrames
 from analysis.mismatch.polish import polish, with_effects
 from analysis.mismatch.predict import Predictor
 from analysis.mismatch.rank import Memory, Ranked, ranked, replicates_for, ties
@@ -30,10 +29,6 @@ _WEAK = 20.0  # gain below which an effect may be what others, fitted one by one
 LEAST_GAIN = 2.0  # of log-likelihood, for an effect to be taken in where something is located
 _MOST_EFFECTS = 14  # some may have to go again
 _MOST_LINES = 3  # further ones stay unexplained, located
-_PHASES = {
-    "periodic_noise": "the pattern's phase is the same in all frames but for its sign",
-    "bistable_pattern": "the pattern's phase is another in every frame",
-}
 _SPIKY = 10.0  # standard errors from which tails bend the variances
 _TAILS = frozenset({"kurtosis", "kurtosis_within_pixels", "one_off_outliers"})
 _LITTLE = "it would explain"
@@ -55,28 +50,47 @@ class Search:
     tied: dict[str, Ranked] = field(default_factory=dict)
     doubted: dict[str, str] = field(default_factory=dict)
     settled: list[tuple[str, Frequency]] = field(default_factory=list)
-    frames_of: Frames | None = None
+    lines: WholeFrames | None = None
     memory: Memory = field(default_factory=Memory)
-    seen_alias: dict[Frequency, bool] = field(default_factory=dict)
     polished: State | None = None
     rough: bool = False  # a strong effect was taken in since
+    least: float = LEAST_GAIN  # for an effect to be taken in
 
     def run(self) -> State:
         """Return the final state."""
         return self.further(self.base)
 
-    def further(self, state: State) -> State:
+    def resumed(self, state: State) -> State:
+        """Return the final state of a search that goes on with more frames than before.
+
+        What too few frames denied may be proposed again. What has a period, which more frames tell
+        better, is looked for once more, and everything fitted once more.
+        """
+        self.memory, self.refused, self.tied = Memory(), {}, {}
+        again = [n for n in self.named if n.proposal is not None and periodic(n.proposal.effect)]
+        own = [n.proposal.effect for n in again if n.proposal is not None]
+        if again:
+            self.named = [named for named in self.named if named not in again]
+            self.settled = []
+            camera = camera_without(state.camera, own, self.camera)
+            state = State.of(self.setting, camera, self.step, draft=True)
+        self.rough = True
+        return self.further(state, again=True)
+
+    def further(self, state: State, *, again: bool = False) -> State:
         """Return the final state of a search that goes on from one.
 
         What was dropped had hidden something: it is looked for once more. An effect that explained
-        some of what it changes, while others were missing, may come back.
+        some of what it changes, while others were missing, may come back. `again`: what is named
+        is judged even where nothing is added.
         """
         forgiven: dict[str, str] = {}
         for last in (False, True):
             known = len(self.named)
             state = self._sought(state)
-            if len(self.named) == known:
+            if len(self.named) == known and not again:
                 break
+            again = False
             state = self._polished(state)
             taken = list(self.named)
             state = self._pruned(state)
@@ -199,7 +213,7 @@ class Search:
         undecided = [one for pair in self.ties for one in pair]
         bent = [one for one in undecided if "pixel_variance" in CANDIDATES[one.kind].calls]
         tied = max((one.gain for one in bent), default=0.0)
-        if path is not None and path.gain > max(LEAST_GAIN, most, tied):
+        if path is not None and path.gain > max(self.least, most, tied):
             rivals = tuple((one.kind, path.gain - one.gain) for one in fitted[:3])
             error = {"switch_dn": path.error_dn}
             return (
@@ -207,7 +221,7 @@ class Search:
                 path.camera,
             )
         camera = with_effects(state.camera, fitted[0].polished.effects) if fitted else None
-        if camera is None or most < LEAST_GAIN:
+        if camera is None or most < self.least:
             return None
         best = fitted[0]
         rivals = tuple((one.kind, best.gain - one.gain) for one in fitted[1:4])
@@ -236,11 +250,7 @@ class Search:
             apart = [one.polished.mean for pair in self.ties for one in pair]
             settled = tuple(self.settled)
             left = self._left() - self.doubted.keys()
-            fitted = self._phased(
-                ranked(state, left, self.memory, self.step, settled, apart, self._possible)
-            )
-            if len(self.settled) > len(settled):
-                continue  # a line was refused: others were too far behind it
+            fitted = ranked(state, left, self.memory, self.step, settled, apart, self._possible)
             before = len(self.doubted)
             fitted = self._undoubted(state, fitted)
             if len(self.doubted) > before:
@@ -282,36 +292,15 @@ class Search:
         return fitted
 
     def _possible(self, effect: Effect) -> bool:
-        """Return whether an effect may be tried: not again, of a line as whole frames show it."""
+        """Return whether an effect may be tried: not again, and as whole frames show its line."""
         if instance(effect.kind, effect) in self._done() | self.doubted.keys():
             return False
-        frequency = frequency_of(effect)
-        layout = self.setting.layout
-        if frequency is None or self.frames_of is None or len(layout.channels) == 1:
-            return True
-        wrapped = ((frequency[0] + 0.5) % 1 - 0.5, (frequency[1] + 0.5) % 1 - 0.5)
-        if wrapped not in self.seen_alias:
-            alike = aliases(wrapped)
-            shown = strongest(layout, self.frames_of, alike)
-            for one in alike:
-                self.seen_alias[one] = same_line(one, shown, layout.rows, layout.columns)
-        return self.seen_alias[wrapped]
-
-    def _phased(self, fitted: list[Ranked]) -> list[Ranked]:
-        """Keep interference or a bistable pattern, alike in power, as the phases say."""
-        if self.frames_of is None:
-            return fitted
-        left = []
-        for one in fitted:
-            frequency = frequency_of(one.proposal.effect)
-            kept = None
-            if frequency is not None:
-                kept = keeps_phase(self.setting.layout, self.frames_of, frequency)
-            if kept is None or kept == (one.kind == "bistable_pattern"):
-                left.append(one)
-            else:
-                self._refuse(one.kind, one.proposal.effect, _PHASES[one.kind])
-        return left
+        if self.lines is None or not self.lines.shown(self.setting.layout, effect):
+            return self.lines is None
+        denial = self.lines.denial(self.setting.layout, effect)
+        if denial is not None:
+            self._refuse(effect.kind, effect, denial)
+        return denial is None
 
     def _polished(self, state: State) -> State:
         """Fit the parameters of all effects together, and judge the result once more."""
@@ -324,7 +313,7 @@ class Search:
         predictor = state.predictor(max(self.setting.polishing, sparse))
         # Of a large recording each simulation tells much and costs much: `settle` steps once more.
         rounds = 2 if self.setting.replicates > 1 else 1
-        polished = polish(predictor, bare, [p for _, p in mine], rounds=rounds)
+        polished = polish(predictor, bare, [p for _, p in mine], rounds, self._slopes(state))
         self.polished = state
         if polished is None:
             return state
@@ -336,6 +325,11 @@ class Search:
         if camera is not None:
             self.polished = State.of(self.setting, camera, self.step)
         return self.polished
+
+    def _slopes(self, state: State) -> Callable[[Effect], Predictor]:
+        """Return what tells how numbers move with an effect: few simulations, where they do."""
+        least = self.setting.polishing
+        return lambda effect: state.predictor(max(least, replicates_for(self.setting, [effect])))
 
     def denied(self, state: State) -> tuple[Named, str] | None:
         """Return the effect that the recording denies most, and why; None: it denies none."""

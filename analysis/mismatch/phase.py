@@ -5,18 +5,69 @@ line through zero of the complex plane, free phases give a circle: |sum c^2| / s
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.mismatch.instance import Frequency
+from analysis.mismatch.instance import Frequency, frequency_of, same_line
 from analysis.mismatch.layout import Layout
+from dsis.effects import Effect
 
 FramesOf = Callable[[str], Iterable[NDArray[np.generic]]]
 _ONE_LINE, _CIRCLE = 0.75, 0.45
 _LEAST = 8  # frames, to tell
 _CLEAR = 8.0  # standard errors of the noise's power from which a line's phase is seen
 _ASIDE = 3  # bins to the neighbours that say what is around
+_PHASES = {
+    "periodic_noise": "the pattern's phase is the same in all frames but for its sign",
+    "bistable_pattern": "the pattern's phase is another in every frame",
+}
+
+
+@dataclass(frozen=True)
+class WholeFrames:
+    """What whole frames say of lines, asked once for each.
+
+    Attributes
+    ----------
+    frames_of
+        Gives the frames of an exposure.
+    """
+
+    frames_of: FramesOf
+    _shown: dict[Frequency, bool] = field(default_factory=dict)
+    _kept: dict[Frequency, bool | None] = field(default_factory=dict)
+
+    def shown(self, layout: Layout, effect: Effect) -> bool:
+        """Return whether an effect is no line of a mosaic, or the one that whole frames show."""
+        frequency = frequency_of(effect)
+        if frequency is None or len(layout.channels) == 1:
+            return True
+        wrapped = ((frequency[0] + 0.5) % 1 - 0.5, (frequency[1] + 0.5) % 1 - 0.5)
+        if wrapped not in self._shown:
+            alike = aliases(wrapped)
+            clearest = strongest(layout, self.frames_of, alike)
+            for one in alike:
+                self._shown[one] = same_line(one, clearest, layout.rows, layout.columns)
+        return self._shown[wrapped]
+
+    def denial(self, layout: Layout, effect: Effect) -> str | None:
+        """Return why a line's phase says that it is of the other kind; None: it does not.
+
+        Interference and a bistable pattern are alike in power.
+        """
+        frequency = frequency_of(effect)
+        if frequency is None:
+            return None
+        if frequency not in self._kept:
+            self._kept[frequency] = keeps_phase(layout, self.frames_of, frequency)
+        kept = self._kept[frequency]
+        return (
+            None
+            if kept is None or kept == (effect.kind == "bistable_pattern")
+            else (_PHASES[effect.kind])
+        )
 
 
 def keeps_phase(layout: Layout, frames_of: FramesOf, frequency: Frequency) -> bool | None:

@@ -1,6 +1,6 @@
 """Parameters of effects by Gauss-Newton steps on the bank's numbers, predicted by simulation."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from math import exp, log
 
@@ -50,10 +50,12 @@ def polish(
     camera: Camera,
     start: Sequence[Proposal],
     rounds: int = 2,
+    slopes: Callable[[Effect], Predictor] | None = None,
 ) -> Polished | None:
     """Return `camera` with effects whose parameters are fitted; None where it is no camera.
 
-    `camera` holds what stays as it is; the effects of `start` are added to it.
+    `camera` holds what stays as it is; the effects of `start` are added to it. `slopes` gives what
+    tells how numbers move with the parameters of an effect, where fewer simulations do.
     """
     free = free_of(start)
     effects = tuple(p.effect for p in start)
@@ -64,7 +66,7 @@ def polish(
     best = predictor.loglik(mean)
     errors: Array = np.full(len(free), np.inf)
     for _ in range(rounds if free else 0):
-        step, errors = _newton(predictor, camera, effects, free, mean)
+        step, errors = _newton(predictor, camera, effects, free, mean, slopes)
         better = _along(predictor, camera, effects, free, step, best)
         if better is None:
             break
@@ -97,27 +99,34 @@ def _newton(
     effects: tuple[Effect, ...],
     free: Sequence[Free],
     mean: Array,
+    slopes: Callable[[Effect], Predictor] | None,
 ) -> tuple[Array, Array]:
     """Return the Gauss-Newton step of the free parameters and their standard errors."""
-    j = jacobian(predictor, camera, effects, free, mean)
+    j = jacobian(predictor if slopes is None else slopes, camera, effects, free)
     score, inverse = information(predictor, mean, j)
     rest, _, _ = predictor.weights(mean)
     return inverse @ (score @ rest), np.sqrt(np.diag(inverse))
 
 
 def jacobian(
-    predictor: Predictor,
+    predictor: Predictor | Callable[[Effect], Predictor],
     camera: Camera,
     effects: tuple[Effect, ...],
     free: Sequence[Free],
-    mean: Array,
 ) -> Array:
     """Return how the predicted numbers move with each free parameter: (number, parameter)."""
-    beside = list(shifted(camera, effects, free))
-    predictor.ready(other for other, _ in beside)
+    own = [predictor if isinstance(predictor, Predictor) else predictor(effects[i])
+           for i, _, _ in free]  # fmt: skip
+    built, beside = with_effects(camera, effects), list(shifted(camera, effects, free))
+    for most in sorted({one.replicates for one in own}):
+        some = [other for one, (other, _) in zip(own, beside, strict=True)
+                if one.replicates >= most]  # fmt: skip
+        next(one for one in own if one.replicates == most).ready([built, *some])
     columns = [
-        np.zeros_like(mean) if other is None else (predictor.mean(other) - mean) / step
-        for other, step in beside
+        np.zeros(one.forms.size)
+        if other is None or built is None
+        else (one.mean(other) - one.mean(built)) / step
+        for one, (other, step) in zip(own, beside, strict=True)
     ]
     return np.stack(columns, 1)
 

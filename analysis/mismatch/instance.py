@@ -16,14 +16,6 @@ def frequency_of(effect: Effect | None) -> Frequency | None:
     return found
 
 
-def periodic(effect: Effect) -> bool:
-    """Return whether an effect has a period that only frames tell, and none exactly."""
-    frequency = frequency_of(effect)
-    if frequency is not None:
-        return any(abs(own) not in (0.0, 0.5) for own in frequency)
-    return "period_codes" in type(effect).model_fields
-
-
 def instance(kind: str, effect: Effect | None) -> str:
     """Return the identity of an effect: its kind, of a line its frequency, of a decay its edge."""
     if isinstance(effect, LineSettling):

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from analysis.mismatch.candidates import CANDIDATES
 from analysis.mismatch.contradicted import contradicted, refuted
 from analysis.mismatch.feigned import of_another
-from analysis.mismatch.instance import LINES, Frequency, frequency_of, instance, periodic
+from analysis.mismatch.instance import LINES, Frequency, frequency_of, instance
 from analysis.mismatch.named import Named, camera_without, renewed
 from analysis.mismatch.phase import WholeFrames
 from analysis.mismatch.polish import polish, with_effects
@@ -28,6 +28,7 @@ Step = Callable[[], None]
 _WEAK = 20.0  # gain below which an effect may be what others, fitted one by one, left over
 LEAST_GAIN = 2.0  # of log-likelihood, for an effect to be taken in where something is located
 _MOST_EFFECTS = 14  # some may have to go again
+_CHOSEN = frozenset({"adc_memory"})  # its period
 _MOST_LINES = 3  # further ones stay unexplained, located
 _SPIKY = 10.0  # standard errors from which tails bend the variances
 _TAILS = frozenset({"kurtosis", "kurtosis_within_pixels", "one_off_outliers"})
@@ -63,15 +64,14 @@ class Search:
     def resumed(self, state: State) -> State:
         """Return the final state of a search that goes on with more frames than before.
 
-        What too few frames denied may be proposed again. What has a period, which more frames tell
-        better, is looked for once more, and everything fitted once more.
+        What too few frames denied may be proposed again. What is chosen among many, which more
+        frames tell better, is looked for once more, and everything fitted once more.
         """
         self.memory, self.refused, self.tied = Memory(), {}, {}
-        again = [n for n in self.named if n.proposal is not None and periodic(n.proposal.effect)]
+        again = [n for n in self.named if n.kind in _CHOSEN]
         own = [n.proposal.effect for n in again if n.proposal is not None]
         if again:
             self.named = [named for named in self.named if named not in again]
-            self.settled = []
             camera = camera_without(state.camera, own, self.camera)
             state = State.of(self.setting, camera, self.step, draft=True)
         self.rough = True

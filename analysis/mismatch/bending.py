@@ -1,6 +1,7 @@
 """What a camera's own effects add to the level and the variance of every exposure."""
 
 from collections.abc import Iterable, Mapping
+from functools import partial
 from itertools import islice
 
 import numpy as np
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 from analysis.mismatch.bank.bulk import Bulk
 from analysis.mismatch.basefit import Offsets
 from analysis.mismatch.layout import Layout, Place
-from analysis.mismatch.model import Model, in_threads
+from analysis.mismatch.model import Model, each
 from dsis.camera import Camera
 from dsis.compiled import kernel
 from dsis.effects import Effect
@@ -48,19 +49,8 @@ def bending_offsets(
     samples *= layout.rows * layout.columns
     replicates = min(_REPLICATES, 1 + int(_SAMPLES // samples))
 
-    def one(work: tuple[Camera, int]) -> Mapping[Place, Three]:
-        camera, replicate = work
-        frames_of = model.with_camera(camera).frames(layout, replicate, seed)
-        found: dict[Place, Three] = {}
-        for e in layout.uniform:
-            many = Bulk.of(layout, e.name)
-            pairs = _pairs(layout, many.watching(islice(frames_of(e.name), _FRAMES)))
-            for channel, pair in pairs.items():
-                found[e.name, channel] = (*pair, many.variance_dn2(channel, pair[1]))
-        return found
-
     work = [(camera, replicate) for replicate in range(replicates) for camera in cameras]
-    made = in_threads(one, work, jobs)
+    made = each(partial(_levels, model, layout, seed), work, jobs)
     pairs = list(zip(made[::2], made[1::2], strict=True))
 
     def change(which: int) -> dict[Place, float]:
@@ -70,6 +60,21 @@ def bending_offsets(
         }
 
     return Offsets(change(0), change(1), bulk_dn2=change(2))
+
+
+def _levels(
+    model: Model, layout: Layout, seed: int, work: tuple[Camera, int]
+) -> Mapping[Place, Three]:
+    """Return level and variances that a camera's effects give, of one simulated recording."""
+    camera, replicate = work
+    frames_of = model.with_camera(camera).frames(layout, replicate, seed)
+    found: dict[Place, Three] = {}
+    for e in layout.uniform:
+        many = Bulk.of(layout, e.name)
+        pairs = _pairs(layout, many.watching(islice(frames_of(e.name), _FRAMES)))
+        for channel, pair in pairs.items():
+            found[e.name, channel] = (*pair, many.variance_dn2(channel, pair[1]))
+    return found
 
 
 def _pairs(layout: Layout, frames: Iterable[NDArray[np.generic]]) -> dict[str, Pair]:

@@ -22,7 +22,7 @@ from analysis.mismatch.finding import (
     Verdict,
 )
 from analysis.mismatch.instance import kind_of
-from analysis.mismatch.model import in_threads
+from analysis.mismatch.model import processes
 from analysis.mismatch.name import Search
 from analysis.mismatch.named import Named
 from analysis.mismatch.observe import observe
@@ -47,7 +47,6 @@ VOCABULARY = frozenset({*CANDIDATES, "dual_gain"})
 _NEAR = 8.0  # of log-likelihood: a rival worth naming a recording that would decide
 _LOCATED = "No physics was looked for: it is only said where recording and model differ."
 _DOUBTFUL = 30.0  # gain of log-likelihood below which locked frames may not confirm an effect
-_LARGE = 2.5e7  # samples from which fewer simulations must do
 
 
 def find_mismatch(
@@ -59,7 +58,11 @@ def find_mismatch(
     vocabulary: frozenset[str] | None = None,
     progress: Progress | None = None,
 ) -> Finding:
-    """Return where a recording differs from a camera model, and what physics was left out."""
+    """Return where a recording differs from a camera model, and what physics was left out.
+
+    With `jobs` above 1, simulations run in processes that are started afresh: a program that calls
+    this needs its `__main__` guard.
+    """
     done = 0
 
     def step(what: str = "simulating") -> None:
@@ -68,6 +71,19 @@ def find_mismatch(
         if progress is not None:
             progress(done, done + 1, what)
 
+    words = VOCABULARY if vocabulary is None else vocabulary & VOCABULARY
+    with processes(jobs):
+        return _found(camera, recording, (seed, jobs), words, step)
+
+
+def _found(
+    camera: Camera,
+    recording: Recording,
+    how: tuple[int, int],
+    words: frozenset[str],
+    step: Callable[[], None],
+) -> Finding:
+    """Return the finding; `how` is the seed and the number of processes."""
     recording = whole_cells(recording)
     split = Split.of(recording)
     source = Source(recording)
@@ -83,11 +99,9 @@ def find_mismatch(
     split = split.without(development.keys() - {e.name for e in layout.exposures})
     album, frames_of = Album(layout), partial(_frames_of, source, numbers)
     seen = observe(layout, frames_of, album, keep=True)
-    samples = sum(len(e.numbers) for e in layout.exposures) * layout.rows * layout.columns
-    large = samples > _LARGE
+    large = layout.large
     counts = (8, 4, 1, 1, 2) if large else (16, 8, 2, 2, 4)
-    setting = Setting(layout, seen, split.interpolated, seed, jobs, *counts)
-    words = VOCABULARY if vocabulary is None else vocabulary & VOCABULARY
+    setting = Setting(layout, seen, split.interpolated, *how, *counts)
     remarks = remarks if words else (*remarks, _LOCATED)
 
     trial = Trial.of(recording, split, source, setting)
@@ -259,13 +273,8 @@ def _gained(search: Search, final: State, trial: Trial) -> dict[str, Gained]:
 
 
 def _fitted_without(search: Search, final: State, some: Sequence[Named]) -> dict[str, Camera]:
-    """Return the cameras without each of some effects, fitted side by side."""
-
-    def one(named: Named) -> Camera:
-        return search.fitted_without(final, named)
-
-    made = in_threads(one, some, search.setting.jobs)
-    return {named.name: camera for named, camera in zip(some, made, strict=True)}
+    """Return the cameras without each of some effects."""
+    return {named.name: search.fitted_without(final, named) for named in some}
 
 
 def _finding(

@@ -8,7 +8,7 @@ as it should.
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from analysis.mismatch.bank.key import Key
 from analysis.mismatch.given import Numbers, Ratio, ratio
 from analysis.mismatch.layout import Layout
-from analysis.mismatch.model import in_threads
+from analysis.mismatch.model import Model, each
 from analysis.mismatch.observe import Observation, observe
 from analysis.mismatch.pictures.album import Album
 from analysis.mismatch.recalibrate import Calibrated
@@ -33,7 +33,6 @@ Array = NDArray[np.float64]
 Simulated = Callable[[str], Iterable[NDArray[np.generic]]]
 _SIMULATIONS = 16
 _FEW = 5  # where simulations are large
-_LARGE = 2.5e7  # samples
 _MOST_KEPT = 2.5e8  # samples, of two bytes
 
 
@@ -116,19 +115,17 @@ class HeldNumbers:
         key = f"{judge} {final.camera.model_dump_json()} {camera.model_dump_json()}"
         if key not in self.kept:
             whole, rest = self.whole[0], self.setting.layout
-            count = _SIMULATIONS if _samples(whole) <= _LARGE else _FEW
+            count = _FEW if whole.large else _SIMULATIONS
             model, seed = final.calibrated.model.with_camera(camera), self.setting.seed + 3
 
-            def numbers(replicate: int) -> tuple[Array, Array]:
-                frames = model.frames(whole, replicate, seed)
-                both = _observed(whole, rest, frames, model.frames(rest, replicate, seed))
-                one, two = (
-                    _vector_of(yardstick, layout, seen).values
-                    for layout, seen in zip((whole, rest), both, strict=True)
-                )
-                return one, two
-
-            made = in_threads(numbers, range(count), self.setting.jobs)
+            seen = each(partial(_two, model, whole, rest, seed), range(count), self.setting.jobs)
+            made = [
+                [
+                    _vector_of(yardstick, *part).values
+                    for part in zip((whole, rest), both, strict=True)
+                ]
+                for both in seen
+            ]
             first, second = (np.stack(part) for part in zip(*made, strict=True))
             self.kept[key] = first, second
         return self.kept[key]
@@ -163,6 +160,14 @@ def _shared(parts: Sequence[Vector]) -> tuple[list[Key], list[list[int]]]:
 
 def _samples(layout: Layout) -> int:
     return sum(len(e.numbers) for e in layout.exposures) * layout.rows * layout.columns
+
+
+def _two(
+    model: Model, whole: Layout, rest: Layout, seed: int, replicate: int
+) -> tuple[Observation, Observation]:
+    """Return what all frames of a simulated recording show, and what those of `rest` show."""
+    frames, again = (model.frames(own, replicate, seed) for own in (whole, rest))
+    return _observed(whole, rest, frames, again)
 
 
 def _observed(

@@ -9,6 +9,7 @@ from analysis.mismatch.bank.maps import Regressors
 from analysis.mismatch.scenes import SCENE, Local, Scene
 from dsis.cfa import Cfa, pattern
 
+_LARGE = 2.5e7  # samples
 Place = tuple[str, str]
 """Exposure and channel; of a scene also channel and bin of signal."""
 
@@ -69,6 +70,12 @@ class Layout:
     scenes: Mapping[str, Scene] = field(default_factory=dict)
     moving: tuple[str, ...] = ()
     still: frozenset[Place] = frozenset()
+
+    @property
+    def large(self) -> bool:
+        """Whether there are so many samples that few simulations must do, and tell enough."""
+        frames = sum(len(e.numbers) for e in self.exposures)
+        return frames * self.rows * self.columns > _LARGE
 
     @property
     def channels(self) -> tuple[str, ...]:

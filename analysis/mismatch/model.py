@@ -6,7 +6,10 @@ share their noise: the difference that an effect makes is known far better than 
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TypeVar
 
 import numpy as np
@@ -20,10 +23,12 @@ from dsis.draw import Draw
 from dsis.effects import Image
 from dsis.grid import PixelGrid
 from dsis.simulate.shot import tiled
+from dsis.workers import Workers, workers
 
 Sites = NDArray[np.float64]
 T = TypeVar("T")
 R = TypeVar("R")
+_pool: ContextVar[Workers | None] = ContextVar("pool", default=None)
 
 
 @dataclass(frozen=True)
@@ -73,11 +78,46 @@ def simulate(
     model: Model, layout: Layout, replicates: Sequence[int], seed: int, jobs: int
 ) -> list[Observation]:
     """Return the observations of simulated recordings, one for each replicate number."""
+    return each(partial(simulated, layout, seed), [(model, one) for one in replicates], jobs)
 
-    def one(replicate: int) -> Observation:
-        return observe(layout, model.frames(layout, replicate, seed))
 
-    return in_threads(one, replicates, jobs)
+def simulated(layout: Layout, seed: int, which: tuple[Model, int]) -> Observation:
+    """Return the observation of one simulated recording, of a model and replicate number."""
+    model, replicate = which
+    return observe(layout, model.frames(layout, replicate, seed))
+
+
+@contextmanager
+def processes(jobs: int) -> Iterator[None]:
+    """Let `each` use so many processes; with one job there are none."""
+    if jobs <= 1:
+        yield
+        return
+    with workers(jobs, kind="processes") as pool:
+        for _ in range(jobs):  # they start, and import, while the recording is read
+            pool.submit(_started)
+        token = _pool.set(pool)
+        try:
+            yield
+        finally:
+            _pool.reset(token)
+
+
+def _started() -> None:
+    """Do nothing: whoever is asked to has imported all this by then."""
+
+
+def each(work: Callable[[T], R], items: Sequence[T], jobs: int) -> list[R]:
+    """Return `work` of each item, in order, by the processes there are, else by threads.
+
+    A frame is small work: threads would wait for one another's Python. Work, items and results are
+    pickled.
+    """
+    pool = _pool.get()
+    if pool is None or jobs <= 1 or len(items) < 2:
+        return in_threads(work, items, jobs)
+    running = [pool.submit(work, item) for item in items]
+    return [one.result() for one in running]
 
 
 def in_threads(work: Callable[[T], R], items: Sequence[T], jobs: int) -> list[R]:

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from analysis.mismatch.candidates import CANDIDATES, Proposal
 from analysis.mismatch.instance import Frequency, frequency_of, instance, same_line
-from analysis.mismatch.model import in_threads
 from analysis.mismatch.polish import Polished, needed, polish, with_effects
 from analysis.mismatch.state import Setting, State
 from dsis.effects import Effect
@@ -121,7 +120,9 @@ def ranked(
     best = max((value for value, _, _ in tried), default=0.0)
     far = max(_FAR, _SHARE * (best - before))
     likely = _likely(tried, best - far)
-    predictor.ready(c for own in likely for c in needed(state.camera, [own]))
+    for start in likely:
+        asked = state.predictor(replicates_for(state.setting, [start.effect]))
+        asked.ready(needed(state.camera, [start]))
     found: list[tuple[str, Proposal, Polished]] = []
     for value, kind, proposal in tried:
         kinds_so_far = {one[0] for one in found}
@@ -185,36 +186,45 @@ def _tried(
         if possible(proposal.effect)
     ]
     predictor = state.predictor(state.setting.screening)
-    effects = [proposal.effect for _, proposal in proposed]
-    by_frame = state.predictor(replicates_for(state.setting, effects))
-
-    def mean(one: tuple[str, Proposal]) -> tuple[Array | None, bool]:
-        known = memory.recalled(one[1].effect, state)
-        if known is not None:
-            return known, True
-        built = with_effects(state.camera, [one[1].effect])
-        step()
-        own = by_frame if _sparse(one[1].effect) else predictor
-        return (None if built is None else own.mean(built)), False
-
-    # One simulation for each leaves the threads to them.
-    side_by_side = state.setting.jobs if predictor.replicates == 1 else 1
-    means = in_threads(mean, proposed, side_by_side)
     found: list[tuple[float, str, Proposal, Array]] = []
-    for (kind, proposal), (own, old) in zip(proposed, means, strict=True):
-        if own is None:
-            continue
-        if not old:
-            memory.keep(proposal.effect, state, own)
-        if any(alike(state, own, other) for other in apart):
-            continue
-        found.append((predictor.loglik(own), kind, proposal, own))
+    means = _means(state, [proposal.effect for _, proposal in proposed], memory, step)
+    for (kind, proposal), mean in zip(proposed, means, strict=True):
+        if mean is not None and not any(alike(state, mean, other) for other in apart):
+            found.append((predictor.loglik(mean), kind, proposal, mean))
     # Of one kind, each that changes other numbers: memory of one lag says nothing of another's.
     best: list[tuple[float, str, Proposal, Array]] = []
     for one in sorted(found, key=lambda one: -one[0]):
         if not any(one[1] == other[1] and alike(state, one[3], other[3]) for other in best):
             best.append(one)
     return [(value, kind, proposal) for value, kind, proposal, _ in best]
+
+
+def _means(
+    state: State, effects: Sequence[Effect], memory: Memory, step: Callable[[], None]
+) -> list[Array | None]:
+    """Return the numbers with each effect added, remembered or simulated; None: it is no camera."""
+    predictor = state.predictor(state.setting.screening)
+    by_frame = state.predictor(replicates_for(state.setting, effects))
+    found = [memory.recalled(effect, state) for effect in effects]
+    fresh = [
+        (
+            i,
+            effect,
+            with_effects(state.camera, [effect]),
+            by_frame if _sparse(effect) else predictor,
+        )
+        for i, effect in enumerate(effects)
+        if found[i] is None
+    ]
+    for asked in (predictor, by_frame):
+        asked.ready(camera for _, _, camera, own in fresh if own is asked)
+    for i, effect, camera, asked in fresh:
+        step()
+        if camera is not None:
+            mean = asked.mean(camera)
+            memory.keep(effect, state, mean)
+            found[i] = mean
+    return found
 
 
 def alike(state: State, one: Array, other: Array) -> bool:

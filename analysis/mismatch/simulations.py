@@ -2,12 +2,13 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.layout import Layout
-from analysis.mismatch.model import Model, in_threads, simulate
+from analysis.mismatch.model import Model, each, simulate, simulated
 from analysis.mismatch.observe import Observation
 from dsis.camera import Camera
 
@@ -52,15 +53,11 @@ class Simulations:
         if self.jobs < 2 or len(missing) < 2:
             return
 
-        def made(one: tuple[str, int]) -> Array:
-            key, number = one
-            model = self.model.with_camera(wanted[key])
-            (seen,) = simulate(model, self.layout, [number], self.seed, 1)
-            return self.numbers_of(seen)
-
+        work = [(self.model.with_camera(wanted[key]), number) for key, number in missing]
+        made = each(partial(simulated, self.layout, self.seed), work, self.jobs)
         ahead: dict[str, list[Array]] = {}
-        for (key, _), numbers in zip(missing, in_threads(made, missing, self.jobs), strict=True):
-            ahead.setdefault(key, []).append(numbers)
+        for (key, _), seen in zip(missing, made, strict=True):
+            ahead.setdefault(key, []).append(self.numbers_of(seen))
         for key, more in ahead.items():
             known = self.kept.get(key, [])
             self.kept[key] = [*known[: replicates - len(more)], *more]

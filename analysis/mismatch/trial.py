@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,13 +10,15 @@ from numpy.typing import NDArray
 from analysis.mismatch.finding import Change, Gain, Proof
 from analysis.mismatch.given import Ratio
 from analysis.mismatch.heldnumbers import HeldNumbers
-from analysis.mismatch.model import in_threads, simulate
+from analysis.mismatch.model import each, in_threads, simulate
 from analysis.mismatch.null import null_of
 from analysis.mismatch.observe import Observation, observe
 from analysis.mismatch.prove.gain import heldout_gain
 from analysis.mismatch.prove.gap import gap_closed
 from analysis.mismatch.prove.held import Held, hold
+from analysis.mismatch.prove.likelihood import Loglik
 from analysis.mismatch.prove.proof import loglik_of, prove_held
+from analysis.mismatch.prove.virtual import Signals
 from analysis.mismatch.source import Source
 from analysis.mismatch.split import Split
 from analysis.mismatch.state import Setting, State
@@ -62,6 +65,10 @@ def _denied(gain: Gain, frames: int) -> bool:
     return sure or not np.isfinite(gain.nats_per_frame)
 
 
+def _loglik(held: Held, signals: Signals, seed: int, camera: Camera) -> Loglik:
+    return loglik_of(held, camera, signals, seed=seed)
+
+
 def _per_frame(told: Ratio, frames: int) -> Gain:
     value, error = told.nats / frames, _NORMAL * told.error / frames
     return Gain(value, (value - error, value + error))
@@ -106,9 +113,10 @@ class Trial:
         signals = final.calibrated.model.signals
         held, jobs = self.held, self.numbers.setting.jobs
         cameras = [final.camera, *without.values()]
-        whole, *rest = in_threads(
-            lambda camera: loglik_of(held, camera, signals, seed=self.seed), cameras, jobs
-        )
+        likely = partial(_loglik, held, signals, self.seed)
+        # Of large frames more would be sent to processes than is won.
+        spread = in_threads if self.numbers.setting.layout.large else each
+        whole, *rest = spread(likely, cameras, jobs)
         frames = sum(own.size for own in whole.frames.values())
         found = {}
         for (kind, camera), less in zip(without.items(), rest, strict=True):

@@ -8,7 +8,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from analysis.mismatch.phase import aliases, keeps_phase, strongest
+from analysis.mismatch.phase import WholeFrames, aliases, keeps_phase, strongest
+from dsis.effects.bistable_pattern import BistablePattern
+from dsis.effects.dsnu import Dsnu
+from dsis.effects.periodic_noise import PeriodicNoise
 
 ROWS, COLUMNS, FRAMES, SD = 48, 64, 12, 2.0
 FramesOf = Callable[[str], Iterator[NDArray[np.float64]]]
@@ -62,3 +65,33 @@ def test_the_mosaic_tells_aliases_that_its_planes_cannot(which: int, free: bool)
 
 def test_a_mean_is_no_line() -> None:
     assert sorted(aliases((0.0, 0.0))) == [(-0.5, -0.5), (-0.5, 0.0), (0.0, -0.5)]
+
+
+@pytest.mark.parametrize("free", [True, False])
+def test_a_line_is_denied_as_the_kind_that_it_is_not_and_frames_are_read_once(free: bool) -> None:
+    frames, read = _frames((0.11, -0.23), free), []
+
+    def reading(name: str) -> Iterator[NDArray[np.float64]]:
+        read.append(name)
+        return frames(name)
+
+    whole = WholeFrames(reading)
+    one = PeriodicNoise(kind="periodic_noise", amplitude_dn=0.8, frequency=(0.11, -0.23))
+    other = BistablePattern(kind="bistable_pattern", amplitude_dn=0.8, frequency=(0.11, -0.23))
+    right, wrong = (one, other) if free else (other, one)
+    words = "another in every frame" if free else "the same in all frames"
+    for _ in range(2):
+        assert whole.denial(LAYOUT, right) is None
+        assert words in str(whole.denial(LAYOUT, wrong))
+    assert read == ["dark", "flat"]
+
+
+def test_of_a_mosaic_only_the_alias_that_whole_frames_show_is_possible() -> None:
+    whole = WholeFrames(_frames((0.11, -0.23), free=True))
+    line = {fx: PeriodicNoise(kind="periodic_noise", amplitude_dn=0.8, frequency=(fx, -0.23))
+            for fx in (0.11, -0.39)}  # fmt: skip
+    assert whole.shown(LAYOUT, line[0.11])
+    assert not whole.shown(LAYOUT, line[-0.39])
+    no_line = Dsnu(kind="dsnu", sigma_dn=1.0)
+    assert whole.shown(LAYOUT, no_line)
+    assert whole.denial(LAYOUT, no_line) is None

@@ -1,11 +1,14 @@
 """Simulations that are made ahead, side by side: the same as one by one, and each made once."""
 
+import os
+from functools import partial
 from typing import Any
 
 import numpy as np
 import pytest
 
 import analysis.mismatch.simulations as module
+from analysis.mismatch.model import each, processes
 from analysis.mismatch.simulations import Simulations
 from mismatch_recordings import camera
 
@@ -31,7 +34,11 @@ def made(monkeypatch: pytest.MonkeyPatch) -> list[tuple[float, int]]:
         found.extend((model.camera.black_level, number) for number in replicates)
         return [(model.camera.black_level, number) for number in replicates]
 
+    def simulated(layout: Any, seed: int, which: tuple[Any, int]) -> Any:
+        return simulate(which[0], layout, [which[1]], seed, 1)[0]
+
     monkeypatch.setattr(module, "simulate", simulate)
+    monkeypatch.setattr(module, "simulated", simulated)
     return found
 
 
@@ -57,3 +64,24 @@ def test_a_single_one_is_left_to_who_asks(made: list[tuple[float, int]]) -> None
     own = simulations(2)
     own.ready(CAMERAS[:1], 1)
     assert not made
+
+
+def _twice(offset: int, item: int) -> tuple[int, int]:
+    return os.getpid(), offset + 2 * item
+
+
+def test_processes_give_the_results_in_order_and_only_where_they_are_asked_for() -> None:
+    work = partial(_twice, 5)
+    with processes(2):
+        apart = each(work, range(6), 2)
+        alone = each(work, [3], 2)
+    after = each(work, range(6), 2)
+    assert [value for _, value in apart] == [5, 7, 9, 11, 13, 15]
+    assert os.getpid() not in {own for own, _ in apart}
+    assert alone == [(os.getpid(), 11)]
+    assert after == [(os.getpid(), value) for _, value in apart]
+
+
+def test_one_job_starts_no_process() -> None:
+    with processes(1):
+        assert each(partial(_twice, 0), range(3), 2) == [(os.getpid(), 2 * i) for i in range(3)]

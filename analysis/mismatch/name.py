@@ -25,7 +25,7 @@ from dsis.effects import Effect
 
 Array = NDArray[np.float64]
 Step = Callable[[], None]
-_WEAK = 20.0  # gain below which an effect may be what others, fitted one by one, left over
+_WEAK = 30.0  # gain below which an effect may be what others, fitted one by one, left over
 LEAST_GAIN = 2.0  # of log-likelihood, for an effect to be taken in where something is located
 _MOST_EFFECTS = 14  # some may have to go again
 _CHOSEN = frozenset({"adc_memory"})  # its period

@@ -13,6 +13,8 @@ from analysis.mismatch.state import State
 from dsis.camera import Camera
 
 _NU = 6.0
+_SHAPES = frozenset({"skewness", "kurtosis", "kurtosis_within_pixels"})
+_OFF, _CLEAR = 4.0, 10.0  # standard errors of a variance that departs, and of a shape
 _PENALTY = 4.0  # two numbers, and the choice among the gaps
 
 
@@ -33,7 +35,7 @@ def second_path(state: State) -> Path | None:
     the variances: its error is the root mean square distance.
     """
     calibrated, layout = state.calibrated, state.setting.layout
-    if len(calibrated.switches) > 0:
+    if len(calibrated.switches) > 0 or _misshapen(state):
         return None
     means = sorted(
         {
@@ -50,6 +52,22 @@ def second_path(state: State) -> Path | None:
     chances = np.exp([path.gain - best.gain for path in paths])
     squares = [path.error_dn**2 + (path.switch_dn - best.switch_dn) ** 2 for path in paths]
     return replace(best, error_dn=sqrt(float(np.average(squares, weights=chances))))
+
+
+def _misshapen(state: State) -> bool:
+    """Return whether noise has another shape where its variance departs, and more clearly so.
+
+    A second path scales noise. What bends or clips the distribution bends its variance, too.
+    """
+    shape: dict[tuple[str, str], float] = {}
+    variance: dict[tuple[str, str], float] = {}
+    for key, z in zip(state.null.keys, np.abs(state.departures), strict=True):
+        place = (key.exposure, key.channel)
+        if key.scope == "exposure" and key.statistic in _SHAPES:
+            shape[place] = max(shape.get(place, 0.0), float(z))
+        elif key.scope == "exposure" and key.statistic == "pixel_variance":
+            variance[place] = float(z)
+    return any(z > _OFF and shape.get(at, 0.0) > max(_CLEAR, z) for at, z in variance.items())
 
 
 def _path(state: State, low: float, high: float) -> Path | None:

@@ -310,7 +310,7 @@ def _finding(
             would_settle(kind_of(name), other),
         )
         for name, other in tied.items()
-        if name not in named
+        if name not in named and kind_of(name) in search.vocabulary
     )
     considered = tuple(
         f"Considered and not named: {name}: {why}."

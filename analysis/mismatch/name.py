@@ -14,7 +14,7 @@ from analysis.mismatch.named import Named, camera_without, renewed
 from analysis.mismatch.phase import WholeFrames
 from analysis.mismatch.polish import polish, with_effects
 from analysis.mismatch.predict import Predictor
-from analysis.mismatch.rank import Memory, Ranked, ranked, replicates_for, ties
+from analysis.mismatch.rank import Memory, Ranked, ranked, replicates_for, ties, twin
 from analysis.mismatch.recalibrate import calibrate
 from analysis.mismatch.resolved import resolved
 from analysis.mismatch.segments import bent, second_path
@@ -259,6 +259,7 @@ class Search:
                 return fitted
             rival = next((one for one in fitted[1:] if ties(state, fitted[0], one)), None)
             rival = rival or self._named_otherwise(fitted[0])
+            rival = rival or twin(state, fitted[0], self.vocabulary, self.memory, self.step)
             if rival is None:
                 return fitted
             self.ties.append((fitted[0], rival))

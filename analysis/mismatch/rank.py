@@ -1,6 +1,6 @@
 """Effects that could explain what is off, each with fitted parameters, the best first."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Container, Iterable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -25,6 +25,7 @@ _BY_FRAME = frozenset({"frame_variance"})
 # A sign: half of the pairs of frames show nothing, half show it twice. A band: one bin's phase.
 # Pink noise: most of it in a frame's mean and in the first few bins.
 _BY_DRAW = frozenset({"bistable_pattern", "line_flicker", "pink_noise"})
+_TWINS = {"channel_imbalance": "tap_mismatch", "tap_mismatch": "channel_imbalance"}
 _FAR_OFF, _LITTLE = 8.0, 0.3  # departures, and the share of one that is little
 _SHARED = 0.1  # share of an effect's change that may lie where the model moved since
 
@@ -244,6 +245,22 @@ def ties(state: State, best: Ranked, other: Ranked) -> bool:
     if not near or _other_line(state, best, other):
         return False
     return alike(state, best.polished.mean, other.polished.mean)
+
+
+def twin(
+    state: State, best: Ranked, vocabulary: Container[str], memory: Memory, step: Callable[[], None]
+) -> Ranked | None:
+    """Return the effect that the best can never be told from, though nobody asked for it.
+
+    Amplifiers of even and odd rows, and greens that differ, do the same to a mosaic whose light is
+    of unknown colour.
+    """
+    other = _TWINS.get(best.kind)
+    if other is None or other in vocabulary:
+        return None
+    return next(
+        (one for one in ranked(state, [other], memory, step) if ties(state, best, one)), None
+    )
 
 
 def _other_line(state: State, best: Ranked, other: Ranked) -> bool:

@@ -69,7 +69,7 @@ def test_a_mean_is_no_line() -> None:
 
 @pytest.mark.parametrize("free", [True, False])
 def test_a_line_is_denied_as_the_kind_that_it_is_not_and_frames_are_read_once(free: bool) -> None:
-    frames, read = _frames((0.11, -0.23), free), []
+    frames, read = _frames((0.11, -0.23), free, 40), []
 
     def reading(name: str) -> Iterator[NDArray[np.float64]]:
         read.append(name)

@@ -192,7 +192,11 @@ CANDIDATES = (
     Candidate("black_level_drift", ("frame_variance", "level"), _drift),
     Candidate("flicker", ("frame_variance", "level"), _flicker),
     Candidate("line_flicker", ("row_spectrum_peak", "row_variance"), _line_flicker),
-    Candidate("pink_noise", ("row_variance", "line_correlation", "frame_variance"), _pink),
+    Candidate(  # most of its power is in the slowest waves along rows: one of them may stand out
+        "pink_noise",
+        ("row_variance", "line_correlation", "frame_variance", "row_spectrum_peak"),
+        _pink,
+    ),
     _patterns("periodic_noise"),
     _patterns("bistable_pattern"),
 )

@@ -254,7 +254,8 @@ def _pooled(
     pooled = {name: {**persistent.get(name, {}), **own.numbers()} for name, own in spectra.items()}
     peaks = {(name, kind): peak for name, own in spectra.items() for kind, peak in own.peaks()}
     all_of_it = "" if whole.mosaic else whole.layout.channels[0]
-    pooled.setdefault(all_of_it, {}).update(whole.numbers())
+    slow = spectra[all_of_it].slow_rows() if not whole.mosaic and all_of_it in spectra else {}
+    pooled.setdefault(all_of_it, {}).update({**whole.numbers(), **slow})
     peaks |= {(all_of_it, kind): peak for kind, peak in whole.peaks().items()}
     return dict(pooled), peaks
 

@@ -32,6 +32,7 @@ _FOLLOWS = {
     "alternation_variance": frozenset({"spectral_peak"}) | _LINES | _CORRELATIONS,
     "column_spectrum_peak": frozenset({"column_variance"}),
     "row_spectrum_peak": frozenset({"row_spectrum_peak", "row_variance"}),
+    "slow_row_variance": frozenset({"row_spectrum_peak", "row_variance"}),
     "half_seam": _FIXED | _LINES,
     "fixed_edge": _FIXED | _LINES,
     "fixed_smooth_tilt": _FIXED | _LINES,

@@ -26,6 +26,7 @@ STATISTICS = {
     "alternation_variance": "power that alternates from pixel to pixel or line to line",
     "spectral_peak": "strongest line of the noise spectrum",
     "row_spectrum_peak": "strongest line of the spectrum of row means",
+    "slow_row_variance": "slow waves of row means",
     "column_spectrum_peak": "strongest line of the spectrum of column means",
     "phase": "phase of the pattern from frame to frame",
     "frame_correlation": "correlation with the next frame",

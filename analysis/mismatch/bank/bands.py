@@ -10,7 +10,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.mismatch.bank.coherent import Peak, largest_line, line_top
+from analysis.mismatch.bank.coherent import Peak, largest_line, line_top, slow_lines
 from analysis.mismatch.bank.scalars import Number
 from dsis.measures import Channel
 
@@ -66,12 +66,16 @@ class Bands:
                 self.weight[key][1] += told**2 * seen
 
     def numbers(self) -> dict[str, Number]:
-        """Return the largest of each weighting."""
-        return {
+        """Return the largest of each weighting, and the slow waves of one amplitude in DN."""
+        found = {
             _LABELS[key]: largest_line(self.power[key] / total, total**2 / squares)
             for key, (total, squares) in self.weight.items()
             if total
         }
+        total, squares = self.weight[""]
+        if total:
+            found["slow_row_variance"] = slow_lines(self.power[""] / total, total**2 / squares)
+        return found
 
     def peaks(self) -> dict[str, Peak]:
         """Return where each is largest: cycles per row of a plane, power as a plane shows it."""

@@ -167,6 +167,13 @@ class SpectrumSums:
         """Return the power of a bin of white noise: from the median, that lines do not raise."""
         return white_level(self.power[1:, 1:], max(round(self.degrees("")), 1))
 
+    def slow_rows(self) -> dict[str, Number]:
+        """Return the slow waves of row means."""
+        total = self.weight[""][0]
+        if not total:
+            return {}
+        return {"slow_row_variance": slow_lines(self.fine[""] / total, self.degrees(""))}
+
     def row_peak(self, key: str) -> Peak | None:
         """Return where the spectrum of row means is largest."""
         if not self.weight[key][0]:
@@ -248,6 +255,19 @@ def largest_line(power: Array, degrees: float) -> Number:
     From one cycle a frame on: less is much like the frame's mean, which is off.
     """
     return _largest(power[np.newaxis, 2:-1], max(round(degrees), 1), blocks=_SINGLE)
+
+
+def slow_lines(power: Array, degrees: float) -> Number:
+    """Return the cube root of the power of waves down the frame, one of k cycles by 1 / k.
+
+    So pink noise is seen best: in white noise the mean of the bins is 1.
+    """
+    whole = power[2:-1:2]
+    if not whole.size:
+        return UNKNOWN
+    weights = 1 / np.arange(1, whole.size + 1)
+    ratio = float(weights @ whole) / weights.sum()
+    return ratio_root(ratio, 2 * degrees * weights.sum() ** 2 / (weights @ weights))
 
 
 def line_top(power: Array) -> tuple[float, float, float]:

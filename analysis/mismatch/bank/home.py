@@ -69,9 +69,11 @@ _POOLED = frozenset(
         ("row_spectrum_peak", "all", ""),
         ("row_spectrum_peak", "all", "light"),
         ("column_spectrum_peak", "all", ""),
+        ("slow_row_variance", "all", ""),
     }
 )
-_SPECTRA = frozenset({"spectral_peak", "row_spectrum_peak", "column_spectrum_peak"})
+_SPECTRA = frozenset({"spectral_peak", "row_spectrum_peak", "column_spectrum_peak",
+                      "slow_row_variance"})  # fmt: skip
 _SHARED = frozenset({"fixed_row_variance", "fixed_column_variance", "fixed_smooth_variance",
                      "fixed_smooth_tilt", "fixed_smooth_falloff", "fixed_edge",
                      "half_seam"})  # fmt: skip

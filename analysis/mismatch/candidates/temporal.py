@@ -11,6 +11,9 @@ from analysis.mismatch.clues import Clues, alike
 from analysis.mismatch.instance import Frequency, same_line
 
 _ALTERNATING = {"checkerboard": (0.5, 0.5), "rows": (0.0, 0.5), "columns": (0.5, 0.0)}
+# Most of pink noise is in the slowest waves down the frame: one of them may stand out.
+_SLOW = ("row_variance", "slow_row_variance", "line_correlation", "frame_variance",
+         "row_spectrum_peak")  # fmt: skip
 _BANDS = {"rows of light": "row_spectrum_peak of light", "rows": "row_spectrum_peak"}
 _TINY = 1e-300
 _PARABOLA = 1.3  # scatter of a parabola's top on half bins, over the bound (Rife & Boorstyn, 1974)
@@ -192,11 +195,7 @@ CANDIDATES = (
     Candidate("black_level_drift", ("frame_variance", "level"), _drift),
     Candidate("flicker", ("frame_variance", "level"), _flicker),
     Candidate("line_flicker", ("row_spectrum_peak", "row_variance"), _line_flicker),
-    Candidate(  # most of its power is in the slowest waves along rows: one of them may stand out
-        "pink_noise",
-        ("row_variance", "line_correlation", "frame_variance", "row_spectrum_peak"),
-        _pink,
-    ),
+    Candidate("pink_noise", _SLOW, _pink),
     _patterns("periodic_noise"),
     _patterns("bistable_pattern"),
 )

@@ -9,7 +9,7 @@ import scipy.stats
 from numpy.typing import NDArray
 
 from analysis.mismatch.bank.bands import Bands
-from analysis.mismatch.bank.coherent import SpectrumSums
+from analysis.mismatch.bank.coherent import SpectrumSums, slow_lines
 from analysis.mismatch.candidates import temporal
 from analysis.mismatch.candidates.response import skewness_below
 from analysis.mismatch.clues import Clues
@@ -84,6 +84,36 @@ def test_a_fit_starts_where_the_band_is_and_at_its_depth(cycles: float) -> None:
     assert proposal.free == ("depth_percent",)
     error = proposal.errors["cycles_per_frame"]
     assert abs(found["cycles_per_frame"] - cycles) < max(4 * error, 0.1)
+
+
+def test_slow_waves_of_white_rows_have_the_spread_that_is_said() -> None:
+    """Mean square 1 + share of row noise; its cube root scatters as in closed form."""
+    rng = np.random.default_rng(8)
+    numbers = [bands_of(recorded(rng, 0.0, 5.0)).numbers() for _ in range(60)]
+    values, errors = np.array([one["slow_row_variance"] for one in numbers]).T
+    assert values.std(ddof=1) == pytest.approx(errors.mean(), rel=0.25)
+    assert values.mean() == pytest.approx(1.0, abs=4 * errors.mean() / 60**0.5 + 0.02)
+
+
+@pytest.mark.parametrize(("exponent", "clearer"), [(1.0, True), (0.0, False)])
+def test_pink_rows_are_clearer_in_their_slow_waves_and_white_ones_in_their_variance(
+    exponent: float, clearer: bool
+) -> None:
+    """z of sum w_k P_k is largest for w_k in proportion to the signal's power."""
+    rng, rows, degrees = np.random.default_rng(9), 128, 40.0
+    cycles = np.arange(1, rows // 2)
+    drift = 0.4 * cycles**-exponent / (cycles**-exponent).mean()
+    slow, plain = [], []
+    for _ in range(40):
+        power = np.zeros(rows + 1)
+        power[2:-1:2] = rng.gamma(degrees, 1 / degrees, cycles.size) + drift
+        value, error = slow_lines(power, degrees)
+        slow.append((value - 1) / error)
+        plain.append(
+            (np.cbrt(power[2:-1:2].mean()) - 1) / (2 / 9 / (2 * degrees * cycles.size)) ** 0.5
+        )
+    assert (np.mean(slow) > 1.3 * np.mean(plain)) == clearer
+    assert (np.mean(plain) > 1.3 * np.mean(slow)) != clearer
 
 
 def test_noise_alone_is_scored_as_a_normal_deviate_or_less() -> None:

@@ -131,6 +131,46 @@ def test_numbers_are_settled_where_the_search_has_touched_them(
     assert search.calls == calls
 
 
+def test_what_gained_little_is_asked_first_and_the_rest_only_where_all_of_it_stays() -> None:
+    asked: list[list[str]] = []
+
+    def gains(_state: Any, without: Any) -> dict[str, Any]:
+        asked.append(sorted(without))
+        return {
+            name: Stub(certain=name != "weak", gain=Stub(nats_per_frame=1.0)) for name in without
+        }
+
+    strong = Named("strong", None, {}, 500.0, ())
+    search: Any = Proving([strong])
+    search.named = [strong, *search.named]
+    trial: Any = Stub(gains=gains)
+    _, found = _proven(search, OPEN, trial, judged=True)
+    assert asked == [["kept", "weak"], ["kept"], ["strong"]]
+    assert sorted(found) == ["kept", "strong"]
+
+
+def test_with_more_frames_all_is_judged_again_and_a_period_chosen_anew(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(search_module, "camera_without", lambda *_: None)
+    search = _search(monkeypatch, "denied", "wrong", "adc_memory")
+    search.named = [_named("wrong"), _named("adc_memory")]
+    search.refused = {"other": "too few frames said so"}
+    search.resumed(Stub(camera=None, mismatches=["something"]))  # type: ignore[arg-type] # a stub
+    assert [n.kind for n in search.named] == ["adc_memory"]
+    assert search.seen[0] == frozenset({"adc_memory"})  # type: ignore[attr-defined] # its own
+    assert search.refused == {"wrong": "denied"}
+
+
+def test_with_more_frames_what_is_named_is_pruned_though_nothing_is_added(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    search = _search(monkeypatch, "denied", "wrong")
+    search.named = [_named("wrong")]
+    search.resumed(Stub(camera=None, mismatches=[]))  # type: ignore[arg-type] # a stub
+    assert search.named == []
+
+
 class Refitted(Scripted):
     """A search whose joint fits explain what `feigned` seemed to, and are counted."""
 

@@ -1,7 +1,7 @@
-"""Which numbers hang on a few pairs of spikes, so that their spread says little."""
+"""Which numbers hang on a few pairs of spikes, and how much farther they scatter for it."""
 
-from collections.abc import Sequence
-from math import sqrt
+from collections.abc import Mapping, Sequence
+from math import inf, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,10 +13,12 @@ _TAILED = 1.0  # excess kurtosis of a sum of products, from which it is not near
 _OF_PRODUCTS = ("correlation", "spectr", "alternation")
 
 
-def of_few_pairs(keys: Sequence[Key], values: Array, errors: Array) -> NDArray[np.bool_]:
-    """Return which sums of products cannot be judged by their spread under a model.
+def widening(keys: Sequence[Key], values: Array, errors: Array) -> Array:
+    """Return by how much sums of products depart farther by chance than a normal law says.
 
-    A sum of N products of samples of excess kurtosis K has an excess kurtosis of (3 + K)^2 / N.
+    A sum of N products of samples of excess kurtosis K has an excess kurtosis of (3 + K)^2 / N. Of
+    spikes that is what pairs of them bring: 1 / that is how many there are, and one moves the sum
+    by the root of it in standard deviations. inf: of unknown law.
 
     Parameters
     ----------
@@ -27,17 +29,19 @@ def of_few_pairs(keys: Sequence[Key], values: Array, errors: Array) -> NDArray[n
     errors
         In white noise, (number,): that of a kurtosis is (24 / N)^(1/2).
     """
-    tailed = {
-        key.place
+    pairs = {
+        key.place: (3 + float(np.median(values[:, i]))) * errors[i] / sqrt(24)
         for i, key in enumerate(keys)
         if (key.statistic, key.scope) == ("kurtosis", "exposure")
-        and (3 + float(np.median(values[:, i]))) * errors[i] > sqrt(24 * _TAILED)
     }
-    return np.array([bool(tailed) and _hangs(key, tailed) for key in keys], np.bool_)
+    tailed = {place: wide for place, wide in pairs.items() if wide > sqrt(_TAILED)}
+    return np.array([_widened(key, tailed) for key in keys])
 
 
-def _hangs(key: Key, tailed: set[tuple[str, str]]) -> bool:
-    """Return whether a number is a sum of products, of a place among these or of all."""
-    if key.statistic.startswith("fixed") or not any(w in key.statistic for w in _OF_PRODUCTS):
-        return False
-    return key.scope != "exposure" or key.place in tailed
+def _widened(key: Key, tailed: Mapping[tuple[str, str], float]) -> float:
+    """Return the factor of a number that is a sum of products, of a place among these or of all."""
+    if not tailed or key.statistic.startswith("fixed"):
+        return 1.0
+    if not any(word in key.statistic for word in _OF_PRODUCTS):
+        return 1.0
+    return tailed.get(key.place, 1.0) if key.scope == "exposure" else inf

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from analysis.mismatch.bank.key import Key
 from analysis.mismatch.contrasts import Contrasts, contrasts
-from analysis.mismatch.fewpairs import of_few_pairs
+from analysis.mismatch.fewpairs import widening
 from analysis.mismatch.layout import Layout
 from analysis.mismatch.vector import Vector
 
@@ -85,7 +85,9 @@ def null_of(layout: Layout, simulated: Sequence[Vector], seen: Vector) -> Null:
     # How deep a comb of codes is hangs on the numbers of the camera: on electrons of several DN.
     comb = np.array([key.statistic == "code_imbalance" for key in seen.keys])
     sd = np.where(comb, np.hypot(sd, _COMB * mean), sd)
-    known &= ~of_few_pairs(seen.keys, np.where(known, np.nan_to_num(values), 0.0), error)
+    wide = widening(seen.keys, np.where(known, np.nan_to_num(values), 0.0), error)
+    known &= np.isfinite(wide)
+    sd = np.where(known, sd * wide, sd)
     sums = contrasts(layout, Vector(seen.keys, seen.values, sd), known)
     parts = np.where(known, (np.nan_to_num(values) - mean) / sd, 0.0)
     along = parts @ sums.matrix.T

@@ -75,23 +75,23 @@ def test_a_line_is_denied_as_the_kind_that_it_is_not_and_frames_are_read_once(fr
         read.append(name)
         return frames(name)
 
-    whole = WholeFrames(reading)
+    whole = WholeFrames(LAYOUT, reading)
     one = PeriodicNoise(kind="periodic_noise", amplitude_dn=0.8, frequency=(0.11, -0.23))
     other = BistablePattern(kind="bistable_pattern", amplitude_dn=0.8, frequency=(0.11, -0.23))
     right, wrong = (one, other) if free else (other, one)
     words = "another in every frame" if free else "the same in all frames"
     for _ in range(2):
-        assert whole.denial(LAYOUT, right) is None
-        assert words in str(whole.denial(LAYOUT, wrong))
+        assert whole.denial(right) is None
+        assert words in str(whole.denial(wrong))
     assert read == ["dark", "flat"]
 
 
 def test_of_a_mosaic_only_the_alias_that_whole_frames_show_is_possible() -> None:
-    whole = WholeFrames(_frames((0.11, -0.23), free=True))
+    whole = WholeFrames(LAYOUT, _frames((0.11, -0.23), free=True))
     line = {fx: PeriodicNoise(kind="periodic_noise", amplitude_dn=0.8, frequency=(fx, -0.23))
             for fx in (0.11, -0.39)}  # fmt: skip
-    assert whole.shown(LAYOUT, line[0.11])
-    assert not whole.shown(LAYOUT, line[-0.39])
+    assert whole.shown(line[0.11])
+    assert not whole.shown(line[-0.39])
     no_line = Dsnu(kind="dsnu", sigma_dn=1.0)
-    assert whole.shown(LAYOUT, no_line)
-    assert whole.denial(LAYOUT, no_line) is None
+    assert whole.shown(no_line)
+    assert whole.denial(no_line) is None

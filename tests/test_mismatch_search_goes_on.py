@@ -47,7 +47,7 @@ class Scripted(Search):
 
 def _search(monkeypatch: pytest.MonkeyPatch, why: str, *script: str, **more: Any) -> Scripted:
     monkeypatch.setattr(search_module, "State", Stub(of=lambda *_, **__: OPEN))
-    setting: Any = Stub(drafts=16, layout=None)
+    setting: Any = Stub(nulls=16, drafts=16, layout=None)
     base: Any = OPEN
     camera: Any = None
     made = Scripted(setting, camera, base, frozenset(script), step=lambda: None)
@@ -152,8 +152,8 @@ def test_what_gained_little_is_asked_first_and_the_rest_only_where_all_of_it_sta
 def test_with_more_frames_all_is_judged_again_and_a_period_chosen_anew(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(search_module, "camera_without", lambda *_: None)
     search = _search(monkeypatch, "denied", "wrong", "adc_memory")
+    monkeypatch.setattr(search, "without", lambda *_: None)
     search.named = [_named("wrong"), _named("adc_memory")]
     search.refused = {"other": "too few frames said so"}
     search.resumed(Stub(camera=None, mismatches=["something"]))  # type: ignore[arg-type] # a stub
@@ -194,7 +194,7 @@ def test_all_is_fitted_again_once_before_what_is_weak_is_taken_in(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(search_module, "State", Stub(of=lambda *_, **__: FITTED))
-    setting: Any = Stub(drafts=16, layout=None)
+    setting: Any = Stub(nulls=16, drafts=16, layout=None)
     words = frozenset({"strong", "weak", "weaker"})
     nothing: Any = OPEN
     search = Refitted(setting, nothing, nothing, words, step=lambda: None)

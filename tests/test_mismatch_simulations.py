@@ -1,6 +1,7 @@
 """Simulations that are made ahead, side by side: the same as one by one, and each made once."""
 
 import os
+import time
 from functools import partial
 from typing import Any
 
@@ -80,6 +81,22 @@ def test_processes_give_the_results_in_order_and_only_where_they_are_asked_for()
     assert os.getpid() not in {own for own, _ in apart}
     assert alone == [(os.getpid(), 11)]
     assert after == [(os.getpid(), value) for _, value in apart]
+
+
+def _failing(item: int) -> float:
+    if item == 0:
+        raise ValueError(item)
+    time.sleep(0.2)
+    return time.monotonic()
+
+
+def test_a_failure_calls_off_what_was_not_begun() -> None:
+    with processes(2):
+        each(_failing, [1, 2], 2)
+        begun = time.monotonic()
+        with pytest.raises(ValueError, match="0"):
+            each(_failing, range(40), 2)
+    assert time.monotonic() - begun < 0.2 * 40 / 2
 
 
 def test_one_job_starts_no_process() -> None:

@@ -31,6 +31,7 @@ from analysis.mismatch.phase import WholeFrames
 from analysis.mismatch.pictures import Album, evidence_of
 from analysis.mismatch.recalibrate import Calibrated, calibrate
 from analysis.mismatch.remarks import remarks_on
+from analysis.mismatch.segments import second_path
 from analysis.mismatch.settle import would_settle
 from analysis.mismatch.source import Source
 from analysis.mismatch.split import Split
@@ -46,6 +47,7 @@ Progress = Callable[[int, int, str], None]
 VOCABULARY = frozenset({*CANDIDATES, "dual_gain"})
 _NEAR = 8.0  # of log-likelihood: a rival worth naming a recording that would decide
 _LOCATED = "No physics was looked for: it is only said where recording and model differ."
+_SMALL = 1e6  # samples
 _DOUBTFUL = 30.0  # gain of log-likelihood below which locked frames may not confirm an effect
 
 
@@ -72,6 +74,8 @@ def find_mismatch(
             progress(done, done + 1, what)
 
     words = VOCABULARY if vocabulary is None else vocabulary & VOCABULARY
+    samples = sum(len(e.frames) for e in recording.exposures) * recording.rows * recording.columns
+    jobs = jobs if samples > _SMALL else 1  # processes take longer to start
     with processes(jobs):
         return _found(camera, recording, (seed, jobs), words, step)
 
@@ -118,7 +122,7 @@ def _found(
         replace(base, mismatches=whole.mismatches),
         words,
         step,
-        lines=WholeFrames(frames_of),
+        lines=WholeFrames(stages(layout)[-1][0] if large else layout, frames_of),
     )
     final = _searched(search, source) if large else search.run()
     if large:  # simulations of large recordings tell more, and cost more
@@ -203,17 +207,27 @@ def _searched(search: Search, source: Source) -> State:
         # All states here are on the way: what is found is judged on all frames.
         search.setting = replace(whole, layout=layout, seen=seen, nulls=whole.drafts)
         state = State.of(search.setting, camera, search.step)
-        if search.named:
-            state = search.resumed(state)
-        else:
+        if not search.named:
             search.base = state
-            state = search.run()
-        camera = state.camera
+        found = search.resumed(state)
+        camera = found.camera if search.named else search.camera
     search.setting, search.base = whole, base
     final = State.of(whole, camera, search.step) if search.named else base
-    if layout == whole.layout:
-        return search.resumed(final) if search.named else search.run()
-    return final
+    return search.resumed(final) if layout == whole.layout else _switched(search, final)
+
+
+def _switched(search: Search, state: State) -> State:
+    """Return the state with the switch of a second read-out path as all levels tell it."""
+    for i, named in enumerate(search.named):
+        if named.proposal is not None:
+            continue
+        bare = State.of(search.setting, search.without(state, named), search.step, draft=True)
+        path = second_path(bare)
+        if path is not None:
+            error = {"switch_dn": path.error_dn}
+            search.named[i] = replace(named, errors=error, switch_dn=path.switch_dn)
+            state = State.of(search.setting, path.camera, search.step)
+    return state
 
 
 def _frames_of(

@@ -4,6 +4,7 @@ Simulations of it are made in memory, frame numbers as recorded. Draws are count
 share their noise: the difference that an effect makes is known far better than either.
 """
 
+import multiprocessing
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
@@ -89,8 +90,8 @@ def simulated(layout: Layout, seed: int, which: tuple[Model, int]) -> Observatio
 
 @contextmanager
 def processes(jobs: int) -> Iterator[None]:
-    """Let `each` use so many processes; with one job there are none."""
-    if jobs <= 1:
+    """Let `each` use so many processes; with one job there are none, nor where none may start."""
+    if jobs <= 1 or multiprocessing.current_process().daemon:
         yield
         return
     with workers(jobs, kind="processes") as pool:
@@ -117,7 +118,11 @@ def each(work: Callable[[T], R], items: Sequence[T], jobs: int) -> list[R]:
     if pool is None or jobs <= 1 or len(items) < 2:
         return in_threads(work, items, jobs)
     running = [pool.submit(work, item) for item in items]
-    return [one.result() for one in running]
+    try:
+        return [one.result() for one in running]
+    finally:
+        for one in running:
+            one.cancel()
 
 
 def in_threads(work: Callable[[T], R], items: Sequence[T], jobs: int) -> list[R]:

@@ -28,7 +28,7 @@ Step = Callable[[], None]
 _WEAK = 30.0  # gain below which an effect may be what others, fitted one by one, left over
 LEAST_GAIN = 2.0  # of log-likelihood, for an effect to be taken in where something is located
 _MOST_EFFECTS = 14  # some may have to go again
-_CHOSEN = frozenset({"adc_memory"})  # its period
+_CHOSEN = frozenset({"adc_memory", "dual_gain"})  # a period, a gap between levels
 _MOST_LINES = 3  # further ones stay unexplained, located
 _SPIKY = 10.0  # standard errors from which tails bend the variances
 _TAILS = frozenset({"kurtosis", "kurtosis_within_pixels", "one_off_outliers"})
@@ -68,14 +68,13 @@ class Search:
         frames tell better, is looked for once more, and everything fitted once more.
         """
         self.memory, self.refused, self.tied = Memory(), {}, {}
-        again = [n for n in self.named if n.kind in _CHOSEN]
-        own = [n.proposal.effect for n in again if n.proposal is not None]
-        if again:
-            self.named = [named for named in self.named if named not in again]
-            camera = camera_without(state.camera, own, self.camera)
-            state = State.of(self.setting, camera, self.step, draft=True)
-        self.rough = True
-        return self.further(state, again=True)
+        for named in [n for n in self.named if n.kind in _CHOSEN]:
+            self.named.remove(named)
+            state = State.of(self.setting, self.without(state, named), self.step, draft=True)
+        lines = [frequency_of(n.proposal.effect) for n in self.named if n.proposal is not None]
+        self.settled = [(kind, f) for f in lines if f is not None for kind in sorted(LINES)]
+        self.rough = bool(self.named)
+        return self.further(state, again=bool(self.named))
 
     def further(self, state: State, *, again: bool = False) -> State:
         """Return the final state of a search that goes on from one.
@@ -251,6 +250,8 @@ class Search:
             settled = tuple(self.settled)
             left = self._left() - self.doubted.keys()
             fitted = ranked(state, left, self.memory, self.step, settled, apart, self._possible)
+            if len(self.settled) > len(settled):
+                continue  # a line was refused: behind it another may be
             before = len(self.doubted)
             fitted = self._undoubted(state, fitted)
             if len(self.doubted) > before:
@@ -296,9 +297,9 @@ class Search:
         """Return whether an effect may be tried: not again, and as whole frames show its line."""
         if instance(effect.kind, effect) in self._done() | self.doubted.keys():
             return False
-        if self.lines is None or not self.lines.shown(self.setting.layout, effect):
+        if self.lines is None or not self.lines.shown(effect):
             return self.lines is None
-        denial = self.lines.denial(self.setting.layout, effect)
+        denial = self.lines.denial(effect)
         if denial is not None:
             self._refuse(effect.kind, effect, denial)
         return denial is None
@@ -363,8 +364,8 @@ class Search:
         found = []
         for named in self.named:
             verdict = judged(state, predictor, named)
-            if verdict is not None and self.setting.drafts > predictor.replicates:
-                verdict = judged(state, state.predictor(self.setting.drafts), named)
+            if verdict is not None and self.setting.nulls > predictor.replicates:
+                verdict = judged(state, state.predictor(self.setting.nulls), named)
             if verdict is not None:
                 found.append((verdict[0], named, verdict[1]))
         worst = min(found, key=lambda one: one[0], default=None)

@@ -31,17 +31,18 @@ class WholeFrames:
 
     Attributes
     ----------
-    frames_of
-        Gives the frames of an exposure.
+    layout, frames_of
+        The frames.
     """
 
+    layout: Layout
     frames_of: FramesOf
     _shown: dict[Frequency, bool] = field(default_factory=dict)
     _kept: dict[Frequency, bool | None] = field(default_factory=dict)
 
-    def shown(self, layout: Layout, effect: Effect) -> bool:
+    def shown(self, effect: Effect) -> bool:
         """Return whether an effect is no line of a mosaic, or the one that whole frames show."""
-        frequency = frequency_of(effect)
+        frequency, layout = frequency_of(effect), self.layout
         if frequency is None or len(layout.channels) == 1:
             return True
         wrapped = ((frequency[0] + 0.5) % 1 - 0.5, (frequency[1] + 0.5) % 1 - 0.5)
@@ -52,7 +53,7 @@ class WholeFrames:
                 self._shown[one] = same_line(one, clearest, layout.rows, layout.columns)
         return self._shown[wrapped]
 
-    def denial(self, layout: Layout, effect: Effect) -> str | None:
+    def denial(self, effect: Effect) -> str | None:
         """Return why a line's phase says that it is of the other kind; None: it does not.
 
         Interference and a bistable pattern are alike in power.
@@ -61,7 +62,7 @@ class WholeFrames:
         if frequency is None:
             return None
         if frequency not in self._kept:
-            self._kept[frequency] = keeps_phase(layout, self.frames_of, frequency)
+            self._kept[frequency] = keeps_phase(self.layout, self.frames_of, frequency)
         kept = self._kept[frequency]
         return (
             None

@@ -71,7 +71,7 @@ class Predictor:
         self.base = simulations.of(reference.camera, replicates)
 
     def ready(self, cameras: Iterable[Camera | None]) -> None:
-        """Simulate side by side, as far as there are threads, what will be asked for one by one."""
+        """Simulate side by side, where processes are, what will be asked for one by one."""
         self.simulations.ready([own for own in cameras if own is not None], self.replicates)
 
     def changes(self, camera: Camera) -> Array:

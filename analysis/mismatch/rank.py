@@ -250,10 +250,10 @@ def ties(state: State, best: Ranked, other: Ranked) -> bool:
 def twin(
     state: State, best: Ranked, vocabulary: Container[str], memory: Memory, step: Callable[[], None]
 ) -> Ranked | None:
-    """Return the effect that the best can never be told from, though nobody asked for it.
+    """Return the effect that the best cannot be told from, though it must not be named itself.
 
-    Amplifiers of even and odd rows, and greens that differ, do the same to a mosaic whose light is
-    of unknown colour.
+    Amplifiers of even and odd rows, and greens that differ, do nearly the same to a mosaic whose
+    light is of unknown colour: only the noise of each channel tells.
     """
     other = _TWINS.get(best.kind)
     if other is None or other in vocabulary:

@@ -29,7 +29,7 @@ _WORDS = {
     "alternation_variance": "the noise alternates from pixel to pixel, or from line to line",
     "spectral_peak": "the noise has a periodic component",
     "row_spectrum_peak": "row means have a periodic component",
-    "slow_row_variance": "row means drift slowly down the frame",
+    "slow_row_variance": "row means have slow waves",
     "column_spectrum_peak": "column means have a periodic component",
     "frame_correlation": "the noise of a frame is correlated with that of the next",
     "code_spacing": "not every code occurs: codes come in steps",

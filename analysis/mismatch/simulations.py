@@ -70,7 +70,6 @@ class Simulations:
         if missing:
             model = self.model.with_camera(camera)
             made = simulate(model, self.layout, missing, self.seed, self.jobs)
-            # A list of its own: another thread may ask for the same camera meanwhile.
             known = [*known, *(self.numbers_of(one) for one in made)]
             self.kept[key] = known
         return np.stack(known[:replicates])

@@ -166,7 +166,7 @@ def _spectrum(m: Mismatch, name: str, evidence: Evidence) -> Iterator[Picture]:
         (1, "row", evidence.row_spectra),
         (0, "column", evidence.column_spectra),
     ):
-        if name == f"{stem}_spectrum_peak" and stored:
+        if name in (f"{stem}_spectrum_peak", f"slow_{stem}_variance") and stored:
             key, lines = _at(m, stored)
             draw = partial(spectra.draw_lines, spectra=lines, where=m.where, axis=axis)
             size = spectra.LINE_SIZE_INCHES

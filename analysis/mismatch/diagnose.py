@@ -31,7 +31,7 @@ from analysis.mismatch.phase import WholeFrames
 from analysis.mismatch.pictures import Album, evidence_of
 from analysis.mismatch.recalibrate import Calibrated, calibrate
 from analysis.mismatch.remarks import remarks_on
-from analysis.mismatch.segments import second_path
+from analysis.mismatch.segments import bent, second_path
 from analysis.mismatch.settle import would_settle
 from analysis.mismatch.source import Source
 from analysis.mismatch.split import Split
@@ -44,6 +44,7 @@ from dsis.camera import Camera
 from dsis.recording import Recording
 
 Progress = Callable[[int, int, str], None]
+Array = NDArray[np.float64]
 VOCABULARY = frozenset({*CANDIDATES, "dual_gain"})
 _NEAR = 8.0  # of log-likelihood: a rival worth naming a recording that would decide
 _LOCATED = "No physics was looked for: it is only said where recording and model differ."
@@ -300,7 +301,7 @@ def _finding(
     proof: Proof,
 ) -> Finding:
     errors = parameter_errors(camera, final.calibrated, final.setting.layout, final.fits)
-    explanations = explained(base, final, search.changes(base, final))
+    explanations = explained(base, final, _changes(search, base, final))
     mismatches = tuple(
         replace(m, explained_by=None if name is None else kind_of(name), z_after=after)
         for m in base.mismatches
@@ -342,6 +343,21 @@ def _finding(
         final.camera,
         considered,
     )
+
+
+def _changes(search: Search, base: State, final: State) -> dict[str, Array]:
+    """Return what each effect named changes in the numbers, in deviations of the base null."""
+    null, predictor, found = base.null, final.predictor(), {}
+    bare = {n.name: search.without(final, n) for n in search.named if n.proposal is not None}
+    predictor.ready(bare.values())
+    for named in search.named:
+        if named.name in bare:
+            change = final.null.mean - predictor.mean(bare[named.name])
+        else:
+            change = bent(base, final)
+        known = null.known & np.isfinite(change)
+        found[named.name] = np.where(known, change, 0.0) / null.sd
+    return found
 
 
 def _omitted(named: Named, why: tuple[str, ...], gain: Gain) -> OmittedEffect:

@@ -16,8 +16,8 @@ from analysis.mismatch.polish import polish, with_effects
 from analysis.mismatch.predict import Predictor
 from analysis.mismatch.rank import Memory, Ranked, ranked, replicates_for, ties, twin
 from analysis.mismatch.recalibrate import calibrate
-from analysis.mismatch.resolved import resolved
-from analysis.mismatch.segments import bent, second_path
+from analysis.mismatch.resolved import opened, resolved
+from analysis.mismatch.segments import second_path
 from analysis.mismatch.state import Setting, State
 from analysis.mismatch.uncertainty import settled
 from dsis.camera import Camera
@@ -32,7 +32,7 @@ _CHOSEN = frozenset({"adc_memory", "dual_gain"})  # a period, a gap between leve
 _MOST_LINES = 3  # further ones stay unexplained, located
 _SPIKY = 10.0  # standard errors from which tails bend the variances
 _TAILS = frozenset({"kurtosis", "kurtosis_within_pixels", "one_off_outliers"})
-_LITTLE = "it would explain"
+_LITTLE, _NEEDLESS = "it would explain", "the others explain what it would explain"
 _RESOLVED = 0.7  # share of what an effect touches that it must explain
 
 
@@ -179,25 +179,13 @@ class Search:
 
     def drop(self, state: State, named: Named, why: str) -> State:
         """Return the state without an effect, which is refused from now on."""
+        bare = State.of(self.setting, self.without(state, named), self.step)
+        return self._dropped(bare, named, why)
+
+    def _dropped(self, bare: State, named: Named, why: str) -> State:
         self._refuse(named.kind, None if named.proposal is None else named.proposal.effect, why)
         self.named.remove(named)
-        return State.of(self.setting, self.without(state, named), self.step)
-
-    def changes(self, base: State, final: State) -> dict[str, Array]:
-        """Return what each effect named changes in the numbers, in deviations of the base null."""
-        null = base.null
-        found = {}
-        predictor = final.predictor() if self.named else None
-        if predictor is not None:
-            predictor.ready(self.without(final, n) for n in self.named if n.proposal is not None)
-        for named in self.named:
-            if named.proposal is None or predictor is None:
-                change = bent(base, final)
-            else:
-                change = final.null.mean - predictor.mean(self.without(final, named))
-            known = null.known & np.isfinite(change)
-            found[named.name] = np.where(known, change, 0.0) / null.sd
-        return found
+        return bare
 
     def _best(self, state: State) -> tuple[Named, Camera] | None:
         """Return the effect that explains most, and the camera with it."""
@@ -338,15 +326,25 @@ class Search:
         return self._worst(state, state.predictor(), self._denial)
 
     def _pruned(self, state: State) -> State:
-        """Drop effects that the others make needless, and those that leave what they touch."""
+        """Drop effects that the others make needless, and those that leave what they touch.
+
+        Where few pixels make a number, a model with them allows it anything: what would be left
+        open without an effect, clearly, needs it whatever the likelihoods say.
+        """
+        needed: set[str] = set()
         while any(n.proposal is not None for n in self.named):
             predictor = state.predictor()
             # Denied ones first: they may explain what is another's.
             worst = self._worst(state, predictor, self._denial)
-            worst = worst or self._worst(state, predictor, self._needless)
+            least = [n for n in self.named if n.name not in needed]
+            worst = worst or self._worst(state, predictor, self._needless, least)
             if worst is None:
                 break
-            state = self.drop(state, *worst)
+            bare = State.of(self.setting, self.without(state, worst[0]), self.step)
+            if worst[1] == _NEEDLESS and opened(state, bare):
+                needed.add(worst[0].name)
+                continue
+            state = self._dropped(bare, *worst)
         return state
 
     def _worst(
@@ -354,15 +352,17 @@ class Search:
         state: State,
         predictor: Predictor,
         judged: Callable[[State, Predictor, Named], tuple[float, str] | None],
+        some: Sequence[Named] | None = None,
     ) -> tuple[Named, str] | None:
         """Return the effect that is judged worst, and why.
 
         A few simulated recordings may show next to nothing of what one number a frame does: what
         they judge badly is judged once more by as many as a null takes.
         """
-        predictor.ready(self.without(state, named) for named in self.named)
+        asked = self.named if some is None else some
+        predictor.ready(self.without(state, named) for named in asked)
         found = []
-        for named in self.named:
+        for named in asked:
             verdict = judged(state, predictor, named)
             if verdict is not None and self.setting.nulls > predictor.replicates:
                 verdict = judged(state, state.predictor(self.setting.nulls), named)
@@ -390,7 +390,7 @@ class Search:
         mean = predictor.mean(self.without(state, named))
         share = resolved(predictor, state, mean)
         if predictor.worth(mean) < LEAST_GAIN:
-            return share, "the others explain what it would explain"
+            return share, _NEEDLESS
         if share < _RESOLVED:
             return share, f"{_LITTLE} {max(share, 0):.0%} of what it changes"
         return None

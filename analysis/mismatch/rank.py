@@ -25,6 +25,7 @@ _BY_FRAME = frozenset({"frame_variance"})
 # A sign: half of the pairs of frames show nothing, half show it twice. A band: one bin's phase.
 # Pink noise: most of it in a frame's mean and in the first few bins.
 _BY_DRAW = frozenset({"bistable_pattern", "line_flicker", "pink_noise"})
+_BY_BIN = frozenset({"periodic_noise"})  # of few frames: the noise of one bin comes on top
 _TWINS = {"channel_imbalance": "tap_mismatch", "tap_mismatch": "channel_imbalance"}
 _FAR_OFF, _LITTLE = 8.0, 0.3  # departures, and the share of one that is little
 _SHARED = 0.1  # share of an effect's change that may lie where the model moved since
@@ -65,7 +66,8 @@ def replicates_for(setting: Setting, effects: Iterable[Effect]) -> int:
 
     Of one number or sign a frame, few frames of few simulations may hold next to nothing.
     """
-    if any(_sparse(effect) for effect in effects):
+    of_few = _BY_BIN if setting.replicates > 1 else frozenset()
+    if any(_sparse(effect) or effect.kind in of_few for effect in effects):
         return min(_SPARSE * setting.replicates, setting.drafts)
     return setting.replicates
 

@@ -9,6 +9,7 @@ from analysis.mismatch.state import State
 Array = NDArray[np.float64]
 _CLEAR = 3.0  # departures below are chance
 _MOST_OF, _LEAST_CHANGE = 0.7, 1.0
+_OPEN = 8.0  # standard errors
 _MINOR = 0.3  # share of a departure
 
 
@@ -38,3 +39,9 @@ def resolved(predictor: Predictor, state: State, without: Array) -> float:
     left = np.maximum(np.abs(after[clear]) - allowed, 0.0).sum()
     total = np.maximum(np.maximum(before, np.abs(change[clear])) - limit, 0.0).sum()
     return float(1 - left / total) if total > 0 else 0.0
+
+
+def opened(state: State, bare: State) -> bool:
+    """Return whether a state without an effect leaves open what the state with it explains."""
+    known = {m.statistic for m in state.mismatches}
+    return any(m.statistic not in known and abs(m.z) > _OPEN for m in bare.mismatches)

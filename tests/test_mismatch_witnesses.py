@@ -38,7 +38,7 @@ def test_who_decides(
     monkeypatch.setattr(trial, "loglik_of", lambda *_, **__: frames)
     monkeypatch.setattr(trial, "heldout_gain", lambda *_, **__: of_pixels)
     numbers = SimpleNamespace(
-        setting=SimpleNamespace(jobs=1),
+        setting=SimpleNamespace(jobs=1, layout=SimpleNamespace(large=False)),
         frames=FRAMES,
         gain=lambda *_: Ratio(nats, 1.0, nats > 0),
     )

@@ -10,7 +10,12 @@ from analysis.mismatch.candidates.candidate import Candidate, Proposal, proposal
 from analysis.mismatch.clues import Clues, alike
 from analysis.mismatch.instance import Frequency, same_line
 
-_ALTERNATING = {"checkerboard": (0.5, 0.5), "rows": (0.0, 0.5), "columns": (0.5, 0.0)}
+_ALTERNATING = {"checkerboard": ((0.5, 0.5),), "rows": ((0.0, 0.5),), "columns": ((0.5, 0.0),)}
+_BY_PLANE = {  # of a mosaic: what alternates in each of its planes
+    "checkerboard": ((0.25, 0.25), (0.25, -0.25)),
+    "rows": ((0.0, 0.25), (0.5, 0.25)),
+    "columns": ((0.25, 0.0), (0.25, 0.5)),
+}
 # Most of pink noise is in the slowest waves down the frame: one of them may stand out.
 _SLOW = ("row_variance", "slow_row_variance", "line_correlation", "frame_variance",
          "row_spectrum_peak")  # fmt: skip
@@ -142,12 +147,12 @@ def frequencies(clues: Clues, kind: str) -> list[tuple[float, float, float]]:
         frame, _ = clues.amplitude("frame_variance", alike)
         stripes = ((0.5, 0.0), (0.0, 0.5), (0.5, 0.5)) if frame > 0 else ()
         found += [(*own, 2 * sqrt(frame)) for own in stripes if not _settled(clues, kind, own, 1)]
-    else:
-        n, m = clues.shape("MONO")
-        for name, own in _ALTERNATING.items():
-            ratio = clues.value("alternation_variance", "all", name) ** 3
-            if ratio > _LEAST_POWER and not _settled(clues, kind, own, 1):
-                found.append((*own, 2 * sqrt((ratio - 1) * v / (n * m))))
+    n, m = clues.shape(place[1])
+    for name, lines in (_ALTERNATING if place[1] == "MONO" else _BY_PLANE).items():
+        ratio = clues.value("alternation_variance", "all", name) ** 3
+        if ratio > _LEAST_POWER:
+            amplitude = 2 * sqrt((ratio - 1) * v / (n * m))
+            found += [(*at, amplitude) for at in lines if not _settled(clues, kind, at, 1)]
     return found
 
 

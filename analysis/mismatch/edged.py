@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.bank.edges import decays, line_square_beside
-from analysis.mismatch.bank.seams import beyond_smooth
+from analysis.mismatch.bank.seams import Rest, beyond_smooth, centred
 from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.state import State
 from dsis.effects import Effect
@@ -52,6 +52,18 @@ def single(state: State, effect: Effect) -> Denial | None:
     """
     if not isinstance(effect, LineSettling):
         return None
+    rests: list[Rest] = [beyond_smooth]
+    if all(own.kind != "shading" for own in state.camera.effect):
+        rests.append(centred)  # of few lines the smooth part of a decay is most of it
+    shares = [_shown(state, effect, rest) for rest in rests]
+    if any(share is None for share in shares):
+        return None
+    most = max(share for share in shares if share is not None)
+    return Denial(most, "beyond the line at the edge nothing is seen of the decay")
+
+
+def _shown(state: State, effect: LineSettling, rest: Rest) -> float | None:
+    """Return the share of a decay that lines beyond the first show; None: enough of it."""
     layout, images = state.setting.layout, state.setting.seen.images
     axis = int(effect.edge in ("left", "right"))
     size = (layout.rows, layout.columns)[axis]
@@ -68,15 +80,14 @@ def single(state: State, effect: Effect) -> Denial | None:
         line = layout.sites[channel][axis] + step * np.arange(image.shape[axis])
         distance = line if effect.edge in ("left", "top") else size - 1 - line
         beyond = distance >= step
-        means = beyond_smooth(image.mean(1 - axis)[beyond])
-        shape = beyond_smooth(np.exp(-distance[beyond] / length))
+        means = rest(image.mean(1 - axis)[beyond])
+        shape = rest(np.exp(-distance[beyond] / length))
         square = line_square_beside(means, shape, noise, image.shape[1 - axis])
         top += amplitude * scale * float(shape @ means) / square
         bottom += (amplitude * scale) ** 2 * float(shape @ shape) / square
     if bottom > 0 and (top + _SURE * bottom**0.5) / bottom >= _MOST and bottom > _SEEN**2:
         return None
-    share = max(top / bottom, 0.0) if bottom > 0 else 0.0
-    return Denial(share, "beyond the line at the edge nothing is seen of the decay")
+    return max(top / bottom, 0.0) if bottom > 0 else 0.0
 
 
 def _designs(size: int) -> tuple[Array, Array]:

@@ -1,5 +1,6 @@
 """Steps of a map: between its halves, and between even and odd lines."""
 
+from collections.abc import Callable
 from functools import lru_cache
 from math import sqrt
 
@@ -9,6 +10,8 @@ from numpy.typing import NDArray
 from analysis.mismatch.bank.scalars import Number
 
 Array = NDArray[np.float64]
+Rest = Callable[[Array], Array]
+"""What is left of means of lines (line,): of a decay beside uneven light, or of one alone."""
 SMOOTH_DEGREE = 4  # of the polynomials along an axis
 WHOLE = "halves as a whole"
 
@@ -41,6 +44,11 @@ def seam_shapes(size: int) -> tuple[Array, Array]:
     rest = beyond_smooth(np.stack([step, comb], 1))
     rest /= np.linalg.norm(rest, axis=0)
     return np.ascontiguousarray(rest[:, 0]), np.ascontiguousarray(rest[:, 1])
+
+
+def centred(values: Array) -> Array:
+    """Return means of lines about theirs."""
+    return np.asarray(values - values.mean())
 
 
 def beyond_smooth(values: Array) -> Array:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.bank.edges import line_square_beside
-from analysis.mismatch.bank.seams import beyond_smooth
+from analysis.mismatch.bank.seams import Rest, beyond_smooth, centred
 from analysis.mismatch.candidates.candidate import Candidate, Proposal, proposals
 from analysis.mismatch.clues import Clues
 from dsis.effects.line_settling import LineSettling
@@ -25,10 +25,20 @@ _NUMBERS = {"offset": "offset_dn", "gain": "gain_percent"}
 def _settling(clues: Clues) -> Sequence[Proposal]:
     """Start from the decays that fit the maps best: of long ones both ends are much alike.
 
-    Offset and gain may come to rest after different lengths, each to be seen in its own map.
+    Offset and gain may come to rest after different lengths, each to be seen in its own map: in
+    what no smooth surface has, beside uneven light, and in all of it, where the decay is alone.
     """
+    return [one for rest in (beyond_smooth, centred) for one in _of_rest(clues, rest)]
+
+
+def _of_rest(clues: Clues, rest: Rest) -> list[Proposal]:
+    """Return the proposals by what is left of means of lines."""
     best = [
-        {name: max(fits, key=_clear) for name in _NUMBERS if (fits := _decays(clues, edge, name))}
+        {
+            name: max(fits, key=_clear)
+            for name in _NUMBERS
+            if (fits := _decays(clues, edge, name, rest))
+        }
         for edge in _EDGES
     ]
     worth = [sum(_clear(fit) for fit in own.values()) for own in best]
@@ -58,9 +68,9 @@ class _Fit:
     z: float
 
 
-def _decays(clues: Clues, edge: str, name: str) -> list[_Fit]:
+def _decays(clues: Clues, edge: str, name: str, rest: Rest) -> list[_Fit]:
     """Return the decay of each length that fits a map best; none where there is no such map."""
-    made = [_fitted(clues, edge, name, length) for length in _lengths(clues, edge)]
+    made = [_fitted(clues, edge, name, length, rest) for length in _lengths(clues, edge)]
     return [fit for fit in made if fit is not None]
 
 
@@ -75,7 +85,7 @@ def _clear(fit: _Fit) -> float:
     return fit.z**2
 
 
-def _fitted(clues: Clues, edge: str, name: str, length: float) -> _Fit | None:
+def _fitted(clues: Clues, edge: str, name: str, length: float, rest: Rest) -> _Fit | None:
     """Return the decay of a length that fits a map best; None where there is no such map."""
     axis, end = _EDGES[edge]
     top = bottom = 0.0
@@ -84,9 +94,9 @@ def _fitted(clues: Clues, edge: str, name: str, length: float) -> _Fit | None:
         line = _places(clues, channel, axis)
         size = clues.layout.columns if axis == "columns" else clues.layout.rows
         distance = line if end == "first" else size - 1 - line
-        own = beyond_smooth(image.mean(0 if axis == "columns" else 1))
-        own -= beyond_smooth(_had(clues, axis, name, line, size)) * scale
-        shape = beyond_smooth(np.exp(-distance / length))
+        own = rest(image.mean(0 if axis == "columns" else 1))
+        own -= rest(_had(clues, axis, name, line, size)) * scale
+        shape = rest(np.exp(-distance / length))
         # Lines scatter beyond the noise of their pixels: a decay must stand out of that.
         square = line_square_beside(own, shape, noise, image.size // own.size)
         top += scale * float(shape @ own) / square

@@ -66,14 +66,14 @@ def replicates_for(setting: Setting, effects: Iterable[Effect]) -> int:
 
     Of one number or sign a frame, few frames of few simulations may hold next to nothing.
     """
-    of_few = _BY_BIN if setting.replicates > 1 else frozenset()
-    if any(_sparse(effect) or effect.kind in of_few for effect in effects):
+    if any(_sparse(setting, effect) for effect in effects):
         return min(_SPARSE * setting.replicates, setting.drafts)
     return setting.replicates
 
 
-def _sparse(effect: Effect) -> bool:
-    return effect.measures == _BY_FRAME or effect.kind in _BY_DRAW
+def _sparse(setting: Setting, effect: Effect) -> bool:
+    few = setting.replicates > 1 and effect.kind in _BY_BIN
+    return few or effect.measures == _BY_FRAME or effect.kind in _BY_DRAW
 
 
 def _near(one: Effect, other: Effect) -> bool:
@@ -214,7 +214,7 @@ def _means(
             i,
             effect,
             with_effects(state.camera, [effect]),
-            by_frame if _sparse(effect) else predictor,
+            by_frame if _sparse(state.setting, effect) else predictor,
         )
         for i, effect in enumerate(effects)
         if found[i] is None

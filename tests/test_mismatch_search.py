@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from analysis.mismatch import name
+from analysis.mismatch import judge, name, rank
 from analysis.mismatch.candidates import Proposal
 from analysis.mismatch.contradicted import Denial
+from analysis.mismatch.judge import Judge
 from analysis.mismatch.name import Search
 from analysis.mismatch.named import Named
 from analysis.mismatch.rank import Ranked, _near, alike, ties
@@ -37,12 +38,16 @@ def _ranked(kind: str, gain: float, *changed: int) -> Any:
     )
 
 
+def _proposal(kind: str, **values: float) -> Proposal:
+    return Proposal(registry()[kind](**values), tuple(values))
+
+
 def _search(**values: Any) -> Search:
     vocabulary = frozenset(
         {"crosstalk", "spatial_filtering", "readout_memory", "row_noise", "adc_dnl"}
     )
     bare: dict[str, Any] = {
-        "setting": SimpleNamespace(nulls=16, drafts=16, layout=None),
+        "setting": SimpleNamespace(nulls=16, drafts=16, layout=None, large=False),
         "camera": None,
         "base": None,
         "vocabulary": vocabulary,
@@ -157,20 +162,67 @@ def test_what_a_statistic_denies_waits_until_more_is_named(
     assert search.doubted == {}
 
 
-def test_an_effect_is_dropped_only_where_many_simulations_say_so() -> None:
+def test_an_effect_is_dropped_only_where_many_simulations_say_so(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """Two recordings may hold next to nothing of one number a frame; sixteen do."""
-    effect = Named("flicker", None, {}, 10.0, ())
-    state: Any = SimpleNamespace(predictor=lambda count: SimpleNamespace(replicates=count))
-    search = _search(named=[effect])
-    ahead: list[Any] = []
-    few: Any = SimpleNamespace(replicates=2, ready=ahead.append)
+    effect = Named("row_noise", _proposal("row_noise", sigma_dn=1.0), {}, 10.0, ())
 
-    def needless(*of: Any) -> tuple[float, str] | None:
-        predictor = of[1]
-        return (0.0, "needless") if predictor.replicates < 16 else None
+    def predictor(count: int = 2) -> Any:
+        worth = 0.0 if count < said["from"] else 50.0
+        return SimpleNamespace(
+            replicates=count, ready=list, mean=lambda _: None, worth=lambda _: worth
+        )
 
-    assert search._worst(state, few, needless) is None
-    assert search._worst(state, few, lambda *_: (0.0, "needless")) == (effect, "needless")
+    state: Any = SimpleNamespace(predictor=predictor)
+    monkeypatch.setattr(judge, "resolved", lambda *_: 1.0)
+    asked = Judge(state, lambda _: None, 16)  # type: ignore[arg-type, return-value] # no camera
+    said = {"from": 16}
+    assert asked.needless([effect]) is None
+    said = {"from": 17}
+    assert asked.needless([effect]) == (effect, judge.NEEDLESS)
+
+
+def test_beside_what_gains_much_only_what_gained_enough_is_tried_anew(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    gains = {"row_noise": 200.0, "crosstalk": 90.0, "flicker": 50.0, "prnu": 3.0, "rts": 1.0}
+    calls, tried = ("row_variance",), []
+
+    def propose(kind: str) -> Any:
+        def proposed(_clues: Any) -> list[Any]:
+            tried.append(kind)
+            return [_proposal("row_noise", sigma_dn=gains[kind])]
+
+        return SimpleNamespace(calls=calls, propose=proposed)
+
+    monkeypatch.setattr(rank, "CANDIDATES", {kind: propose(kind) for kind in gains})
+    monkeypatch.setattr(
+        rank, "_means", lambda _s, effects, *_: [np.array([e.sigma_dn]) for e in effects]
+    )
+    monkeypatch.setattr(rank, "alike", lambda *_: False)
+    state: Any = SimpleNamespace(
+        mismatches=[SimpleNamespace(statistic="row_variance")],
+        clues=lambda _: None,
+        predictor=lambda _: SimpleNamespace(loglik=lambda mean: float(mean[0])),
+        null=SimpleNamespace(mean=np.zeros(1)),
+        setting=SimpleNamespace(screening=1),
+    )
+    memory = rank.Memory()
+
+    def look(*without: str) -> list[str]:
+        tried.clear()
+        kinds = gains.keys() - set(without)
+        rank._tried(state, kinds, memory, lambda: None, (), (), lambda _: True)
+        return sorted(tried)
+
+    assert look() == sorted(gains)  # none was tried before
+    assert look("row_noise") == ["crosstalk", "flicker"]
+    gains |= {"crosstalk": 40.0, "flicker": 10.0}  # less than before: what gained 3 still may wait
+    assert look("row_noise") == ["crosstalk", "flicker"]
+    assert look("row_noise", "crosstalk") == sorted(gains.keys() - {"row_noise", "crosstalk"})
+    memory.gains.clear()  # something was dropped
+    assert look("row_noise") == sorted(gains.keys() - {"row_noise"})
 
 
 def test_a_switch_may_part_the_colours_of_one_exposure() -> None:
@@ -231,7 +283,7 @@ def test_a_denied_decay_waits_as_others_do_and_leaves_other_edges(
     monkeypatch.setattr(name, "replicates_for", lambda *_: 2)
     layout = SimpleNamespace(channels=("MONO",))
     search = _search(
-        setting=SimpleNamespace(nulls=16, drafts=16, layout=layout),
+        setting=SimpleNamespace(nulls=16, drafts=16, layout=layout, large=False),
         vocabulary=frozenset({"line_settling", "row_noise"}),
     )
     assert [one.name for one in search._decided(STATE)] == ["line_settling (top)"]

@@ -19,8 +19,16 @@ class Staged:
         self.script, self.least, self.named = list(names), 0.0, []
         self.setting, self.base = Setting(WHOLE), Stub(camera="given", mismatches=["something"])
         self.camera, self.step, self.asked = "given", None, []
+        self.how: list[str] = []
+
+    def begun(self, state: Any) -> Any:
+        return self._looked("begun", state)
 
     def resumed(self, state: Any) -> Any:
+        return self._looked("resumed", state)
+
+    def _looked(self, how: str, state: Any) -> Any:
+        self.how.append(how)
         self.asked.append((self.setting.layout.name, state.camera, self.least))
         self.named = self.script.pop(0)
         return Stub(camera=f"found on {self.setting.layout.name}")
@@ -61,6 +69,7 @@ def test_what_few_frames_name_is_where_more_begin_and_all_frames_judge(
 ) -> None:
     search, final = _run(monkeypatch, [FEW, MORE], [_effect()], [_effect()])
     assert search.asked == [("few", "given", 10.0), ("more", "found on few", 9.0)]
+    assert search.how == ["begun", "resumed"]  # what is fitted together is fitted once
     assert (final.camera, final.of) == ("found on more", "whole")
     assert search.setting.layout is WHOLE
 

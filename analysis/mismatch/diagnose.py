@@ -22,6 +22,7 @@ from analysis.mismatch.finding import (
     Verdict,
 )
 from analysis.mismatch.instance import kind_of
+from analysis.mismatch.layout import Layout
 from analysis.mismatch.model import processes
 from analysis.mismatch.name import Search
 from analysis.mismatch.named import Named
@@ -48,7 +49,7 @@ Array = NDArray[np.float64]
 VOCABULARY = frozenset({*CANDIDATES, "dual_gain"})
 _NEAR = 8.0  # of log-likelihood: a rival worth naming a recording that would decide
 _LOCATED = "No physics was looked for: it is only said where recording and model differ."
-_SMALL = 1e6  # samples
+_SMALL, _MEDIUM = 1e6, 2e6  # samples
 _DOUBTFUL = 30.0  # gain of log-likelihood below which locked frames may not confirm an effect
 
 
@@ -105,8 +106,7 @@ def _found(
     album, frames_of = Album(layout), partial(_frames_of, source, numbers)
     seen = observe(layout, frames_of, album, keep=True)
     large = layout.large
-    counts = (8, 4, 1, 1, 2) if large else (16, 8, 2, 2, 4)
-    setting = Setting(layout, seen, split.interpolated, *how, *counts)
+    setting = Setting(layout, seen, split.interpolated, *how, *_counts(layout), large)
     remarks = remarks if words else (*remarks, _LOCATED)
 
     trial = Trial.of(recording, split, source, setting)
@@ -140,6 +140,13 @@ def _found(
         departures = Change(len(whole.mismatches), len(final.mismatches))
         proof = replace(proof, discrepancies=departures)
     return _said(_finding(camera, whole, final, search, gains, proof), remarks, evidence, words)
+
+
+def _counts(layout: Layout) -> tuple[int, int, int, int, int]:
+    """Return how many simulations are for what (`Setting`): of large recordings each tells more."""
+    if layout.large:
+        return 8, 4, 1, 1, 2
+    return (16, 8, 1, 1, 2) if layout.samples > _MEDIUM else (16, 8, 2, 2, 4)
 
 
 def _said(
@@ -200,7 +207,8 @@ def _searched(search: Search, source: Source) -> State:
     What is strong is found on few frames, and what is weak beside it on more.
     """
     whole, base, camera = search.setting, search.base, search.camera
-    for layout, search.least in stages(whole.layout):
+    *_, last = looks = stages(whole.layout)
+    for layout, search.least in looks:
         if layout == whole.layout:
             break
         numbers = {e.name: e.numbers for e in layout.exposures}
@@ -210,7 +218,7 @@ def _searched(search: Search, source: Source) -> State:
         state = State.of(search.setting, camera, search.step)
         if not search.named:
             search.base = state
-        found = search.resumed(state)
+        found = (search.resumed if layout == last[0] else search.begun)(state)
         camera = found.camera if search.named else search.camera
     search.setting, search.base = whole, base
     final = State.of(whole, camera, search.step) if search.named else base

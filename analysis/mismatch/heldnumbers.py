@@ -158,10 +158,6 @@ def _shared(parts: Sequence[Vector]) -> tuple[list[Key], list[list[int]]]:
     return keys, [[own[key] for key in keys] for own in places]
 
 
-def _samples(layout: Layout) -> int:
-    return sum(len(e.numbers) for e in layout.exposures) * layout.rows * layout.columns
-
-
 def _two(
     model: Model, whole: Layout, rest: Layout, seed: int, replicate: int
 ) -> tuple[Observation, Observation]:
@@ -177,7 +173,7 @@ def _observed(
 
     Frames are simulated once and kept, or again where there are too many to keep.
     """
-    if _samples(rest) > _MOST_KEPT:
+    if rest.samples > _MOST_KEPT:
         return observe(whole, frames), observe(rest, again)
     numbers = {e.name: e.numbers for e in whole.exposures}
     wanted = {e.name: frozenset(e.numbers) for e in rest.exposures}

@@ -72,10 +72,14 @@ class Layout:
     still: frozenset[Place] = frozenset()
 
     @property
+    def samples(self) -> int:
+        """How many there are, of all frames."""
+        return sum(len(e.numbers) for e in self.exposures) * self.rows * self.columns
+
+    @property
     def large(self) -> bool:
         """Whether there are so many samples that few simulations must do, and tell enough."""
-        frames = sum(len(e.numbers) for e in self.exposures)
-        return frames * self.rows * self.columns > _LARGE
+        return self.samples > _LARGE
 
     @property
     def channels(self) -> tuple[str, ...]:

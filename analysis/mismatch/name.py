@@ -7,16 +7,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.candidates import CANDIDATES
-from analysis.mismatch.contradicted import contradicted, refuted
-from analysis.mismatch.feigned import of_another
+from analysis.mismatch.contradicted import refuted
 from analysis.mismatch.instance import LINES, Frequency, frequency_of, instance
+from analysis.mismatch.judge import LITTLE, NEEDLESS, Judge
 from analysis.mismatch.named import Named, camera_without, renewed
 from analysis.mismatch.phase import WholeFrames
 from analysis.mismatch.polish import polish, with_effects
 from analysis.mismatch.predict import Predictor
-from analysis.mismatch.rank import Memory, Ranked, ranked, replicates_for, ties, twin
+from analysis.mismatch.rank import (
+    LEAST_GAIN,
+    Memory,
+    Ranked,
+    ranked,
+    replicates_for,
+    ties,
+    twin,
+)
 from analysis.mismatch.recalibrate import calibrate
-from analysis.mismatch.resolved import opened, resolved
+from analysis.mismatch.resolved import opened
 from analysis.mismatch.segments import second_path
 from analysis.mismatch.state import Setting, State
 from analysis.mismatch.uncertainty import settled
@@ -26,14 +34,11 @@ from dsis.effects import Effect
 Array = NDArray[np.float64]
 Step = Callable[[], None]
 _WEAK = 30.0  # gain below which an effect may be what others, fitted one by one, left over
-LEAST_GAIN = 2.0  # of log-likelihood, for an effect to be taken in where something is located
 _MOST_EFFECTS = 14  # some may have to go again
 _CHOSEN = frozenset({"adc_memory", "dual_gain"})  # a period, a gap between levels
 _MOST_LINES = 3  # further ones stay unexplained, located
 _SPIKY = 10.0  # standard errors from which tails bend the variances
 _TAILS = frozenset({"kurtosis", "kurtosis_within_pixels", "one_off_outliers"})
-_LITTLE, _NEEDLESS = "it would explain", "the others explain what it would explain"
-_RESOLVED = 0.7  # share of what an effect touches that it must explain
 
 
 @dataclass
@@ -60,6 +65,10 @@ class Search:
     def run(self) -> State:
         """Return the final state."""
         return self.further(self.base)
+
+    def begun(self, state: State) -> State:
+        """Return the state with what is strong: parameters are fitted, and all is judged, later."""
+        return self._sought(state)
 
     def resumed(self, state: State) -> State:
         """Return the final state of a search that goes on with more frames than before.
@@ -106,7 +115,7 @@ class Search:
         """Let effects be proposed again that explained too little of what they change, and why."""
         found = {}
         for one in dropped:
-            if self.refused.get(one.name, "").startswith(_LITTLE):
+            if self.refused.get(one.name, "").startswith(LITTLE):
                 found[one.name] = self.refused.pop(one.name)
                 line = frequency_of(None if one.proposal is None else one.proposal.effect)
                 self.settled = [own for own in self.settled if own != (one.kind, line)]
@@ -185,6 +194,7 @@ class Search:
     def _dropped(self, bare: State, named: Named, why: str) -> State:
         self._refuse(named.kind, None if named.proposal is None else named.proposal.effect, why)
         self.named.remove(named)
+        self.memory.gains.clear()  # what it hid may gain more than before
         return bare
 
     def _best(self, state: State) -> tuple[Named, Camera] | None:
@@ -302,7 +312,7 @@ class Search:
         sparse = replicates_for(self.setting, [p.effect for _, p in mine])
         predictor = state.predictor(max(self.setting.polishing, sparse))
         # Of a large recording each simulation tells much and costs much: `settle` steps once more.
-        rounds = 2 if self.setting.replicates > 1 else 1
+        rounds = 1 if self.setting.large else 2
         polished = polish(predictor, bare, [p for _, p in mine], rounds, self._slopes(state))
         self.polished = state
         if polished is None:
@@ -323,7 +333,7 @@ class Search:
 
     def denied(self, state: State) -> tuple[Named, str] | None:
         """Return the effect that the recording denies most, and why; None: it denies none."""
-        return self._worst(state, state.predictor(), self._denial)
+        return self._judge(state).denied(self.named)
 
     def _pruned(self, state: State) -> State:
         """Drop effects that the others make needless, and those that leave what they touch.
@@ -333,64 +343,18 @@ class Search:
         """
         needed: set[str] = set()
         while any(n.proposal is not None for n in self.named):
-            predictor = state.predictor()
+            judge = self._judge(state)
             # Denied ones first: they may explain what is another's.
-            worst = self._worst(state, predictor, self._denial)
-            least = [n for n in self.named if n.name not in needed]
-            worst = worst or self._worst(state, predictor, self._needless, least)
+            worst = judge.denied(self.named)
+            worst = worst or judge.needless([n for n in self.named if n.name not in needed])
             if worst is None:
                 break
             bare = State.of(self.setting, self.without(state, worst[0]), self.step)
-            if worst[1] == _NEEDLESS and opened(state, bare):
+            if worst[1] == NEEDLESS and opened(state, bare):
                 needed.add(worst[0].name)
                 continue
             state = self._dropped(bare, *worst)
         return state
 
-    def _worst(
-        self,
-        state: State,
-        predictor: Predictor,
-        judged: Callable[[State, Predictor, Named], tuple[float, str] | None],
-        some: Sequence[Named] | None = None,
-    ) -> tuple[Named, str] | None:
-        """Return the effect that is judged worst, and why.
-
-        A few simulated recordings may show next to nothing of what one number a frame does: what
-        they judge badly is judged once more by as many as a null takes.
-        """
-        asked = self.named if some is None else some
-        predictor.ready(self.without(state, named) for named in asked)
-        found = []
-        for named in asked:
-            verdict = judged(state, predictor, named)
-            if verdict is not None and self.setting.nulls > predictor.replicates:
-                verdict = judged(state, state.predictor(self.setting.nulls), named)
-            if verdict is not None:
-                found.append((verdict[0], named, verdict[1]))
-        worst = min(found, key=lambda one: one[0], default=None)
-        return None if worst is None else worst[1:]
-
-    def _denial(self, state: State, predictor: Predictor, named: Named) -> tuple[float, str] | None:
-        without = self.without(state, named)
-        denial = contradicted(state, predictor, named.kind, without)
-        if denial is None and named.proposal is not None:
-            denial = of_another(state, named.proposal.effect, predictor.mean(without))
-        return None if denial is None else (denial.share, denial.why)
-
-    def _needless(
-        self, state: State, predictor: Predictor, named: Named
-    ) -> tuple[float, str] | None:
-        """Return the share that an effect explains of what it changes, and why that is too little.
-
-        None: it is needed.
-        """
-        if named.proposal is None:
-            return None
-        mean = predictor.mean(self.without(state, named))
-        share = resolved(predictor, state, mean)
-        if predictor.worth(mean) < LEAST_GAIN:
-            return share, _NEEDLESS
-        if share < _RESOLVED:
-            return share, f"{_LITTLE} {max(share, 0):.0%} of what it changes"
-        return None
+    def _judge(self, state: State) -> Judge:
+        return Judge(state, lambda named: self.without(state, named), self.setting.nulls)

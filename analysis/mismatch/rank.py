@@ -13,6 +13,7 @@ from analysis.mismatch.state import Setting, State
 from dsis.effects import Effect
 
 Array = NDArray[np.float64]
+LEAST_GAIN = 2.0  # of log-likelihood, for an effect to be taken in where something is located
 _MOST = 4  # kinds that are fitted, after all were tried as proposed
 _FAR = 15.0  # of log-likelihood behind the best as proposed: fitting does not make up for it
 _SHARE = 0.03  # or that share of what the best gains
@@ -28,6 +29,8 @@ _BY_DRAW = frozenset({"bistable_pattern", "line_flicker", "pink_noise"})
 _BY_BIN = frozenset({"periodic_noise"})  # of few frames: the noise of one bin comes on top
 _TWINS = {"channel_imbalance": "tap_mismatch", "tap_mismatch": "channel_imbalance"}
 _FAR_OFF, _LITTLE = 8.0, 0.3  # departures, and the share of one that is little
+_STRONG = 30.0  # gain of log-likelihood beside which what gained little before needs no new trial
+_WORTH_IT = 0.3  # share of it
 _SHARED = 0.1  # share of an effect's change that may lie where the model moved since
 
 
@@ -39,9 +42,12 @@ class Memory:
     ----------
     changes
         Effect, the numbers' means then, and its change of them.
+    gains
+        What each kind gained when it was tried last, as it was proposed then.
     """
 
     changes: list[tuple[Effect, Array, Array]] = field(default_factory=list)
+    gains: dict[str, float] = field(default_factory=dict)
 
     def recalled(self, effect: Effect, state: State) -> Array | None:
         """Return the numbers with an effect added, as remembered; None: it must be simulated."""
@@ -72,7 +78,7 @@ def replicates_for(setting: Setting, effects: Iterable[Effect]) -> int:
 
 
 def _sparse(setting: Setting, effect: Effect) -> bool:
-    few = setting.replicates > 1 and effect.kind in _BY_BIN
+    few = not setting.large and effect.kind in _BY_BIN
     return few or effect.measures == _BY_FRAME or effect.kind in _BY_DRAW
 
 
@@ -133,7 +139,7 @@ def ranked(
             continue
         own = state.predictor(replicates_for(state.setting, [proposal.effect]))
         rounds = 1 + len(proposal.free)
-        if state.setting.replicates == 1:  # of a large recording steps are long and sure
+        if state.setting.large:  # of a large recording steps are long and sure
             rounds = min(rounds, _ROUNDS)
         polished = polish(own, state.camera, [proposal], rounds=rounds)
         if polished is not None and not any(alike(state, polished.mean, one) for one in apart):
@@ -178,28 +184,46 @@ def _tried(
     apart: Sequence[Array],
     possible: Callable[[Effect], bool],
 ) -> list[tuple[float, str, Proposal]]:
-    """Return the best proposals of each kind as they are proposed, the most likely first."""
+    """Return the best proposals of each kind as they are proposed, the most likely first.
+
+    Beside one that gains much, what gained little before is not tried anew: what others explain
+    gains no more than before, as a rule, and is tried once nothing gains much.
+    """
     off = {m.statistic for m in state.mismatches}
     clues = state.clues(settled)
-    proposed = [
-        (kind, proposal)
-        for kind in sorted(kinds)
-        if kind in CANDIDATES and off & set(CANDIDATES[kind].calls)
-        for proposal in CANDIDATES[kind].propose(clues)
-        if possible(proposal.effect)
-    ]
     predictor = state.predictor(state.setting.screening)
+    before = predictor.loglik(state.null.mean)
+    left = {k for k in kinds if k in CANDIDATES and off & set(CANDIDATES[k].calls)}
+    best = max((memory.gains.get(kind, 0.0) for kind in left), default=0.0)
     found: list[tuple[float, str, Proposal, Array]] = []
-    means = _means(state, [proposal.effect for _, proposal in proposed], memory, step)
-    for (kind, proposal), mean in zip(proposed, means, strict=True):
-        if mean is not None and not any(alike(state, mean, other) for other in apart):
-            found.append((predictor.loglik(mean), kind, proposal, mean))
+    while True:
+        worth = _WORTH_IT * best if best > _STRONG else -np.inf
+        chosen = sorted(kind for kind in left if memory.gains.get(kind, np.inf) >= worth)
+        if not chosen:
+            break
+        left -= set(chosen)
+        proposed = [
+            (kind, proposal)
+            for kind in chosen
+            for proposal in CANDIDATES[kind].propose(clues)
+            if possible(proposal.effect)
+        ]
+        means = _means(state, [proposal.effect for _, proposal in proposed], memory, step)
+        memory.gains |= dict.fromkeys(chosen, -np.inf)
+        for (kind, proposal), mean in zip(proposed, means, strict=True):
+            if mean is None:
+                continue
+            value = predictor.loglik(mean)
+            memory.gains[kind] = max(memory.gains[kind], value - before)
+            if not any(alike(state, mean, other) for other in apart):
+                found.append((value, kind, proposal, mean))
+        best = max((value - before for value, *_ in found), default=0.0)
     # Of one kind, each that changes other numbers: memory of one lag says nothing of another's.
-    best: list[tuple[float, str, Proposal, Array]] = []
+    kept: list[tuple[float, str, Proposal, Array]] = []
     for one in sorted(found, key=lambda one: -one[0]):
-        if not any(one[1] == other[1] and alike(state, one[3], other[3]) for other in best):
-            best.append(one)
-    return [(value, kind, proposal) for value, kind, proposal, _ in best]
+        if not any(one[1] == other[1] and alike(state, one[3], other[3]) for other in kept):
+            kept.append(one)
+    return [(value, kind, proposal) for value, kind, proposal, _ in kept]
 
 
 def _means(

@@ -39,6 +39,8 @@ class Setting:
     nulls, drafts, screening, replicates, polishing
         Simulations for a null, for that of a model on the way, for a first look at candidates, for
         their comparison and for the parameters of all effects together.
+    large
+        Whether the recording, of which this may be a part, is large: simulations take long.
     """
 
     layout: Layout
@@ -51,6 +53,7 @@ class Setting:
     screening: int
     replicates: int
     polishing: int
+    large: bool = False
 
 
 @dataclass(frozen=True)

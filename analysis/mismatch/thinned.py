@@ -31,7 +31,7 @@ class Stage:
     least: float
 
 
-STAGES = (Stage(6, 6, 10.0), Stage(12, 10, 2.0))
+STAGES = (Stage(6, 6, 30.0), Stage(12, 10, 2.0))
 
 
 def stages(layout: Layout) -> list[tuple[Layout, float]]:

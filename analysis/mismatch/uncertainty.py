@@ -93,8 +93,7 @@ def _information(
     Sensors are added until their scatter is little beside the slopes, or as many as of a null.
     """
     replicates = max(state.setting.replicates, _LEAST_SENSORS)
-    large = state.setting.replicates < _LEAST_SENSORS  # each simulation tells much and takes long
-    most = replicates if large else min(state.setting.nulls, len(state.simulated))
+    most = replicates if state.setting.large else min(state.setting.nulls, len(state.simulated))
     while True:
         predictor = state.predictor(replicates)
         slopes = _slopes(predictor, bare, effects, free)

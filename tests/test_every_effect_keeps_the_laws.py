@@ -3,6 +3,7 @@
 The test walks the registry: a new file in `dsis/effects` is tested the moment it exists.
 """
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -42,6 +43,23 @@ class TestLaws:
         margin = effect.reach_pixels()
         inside = (slice(margin, 25 - margin), slice(margin, 37 - margin))
         np.testing.assert_array_equal(crop[inside], whole[5:30, 7:44][inside])
+
+    def test_what_draws_nothing_is_the_same_on_every_sensor_and_in_every_frame(
+        self, name: str
+    ) -> None:
+        effect = example_of(KINDS[name])
+        grid = PixelGrid(40, 50, Cfa.RGGB)
+        image = np.random.default_rng(0).uniform(0, 3000, grid.shape).astype(np.float32)
+        one = self.exposure(grid, 4, image)
+        others = [replace(one, frame=i, temporal=Draw(i), sensor=Draw(2 * i)) for i in range(5, 15)]
+        deviates = np.random.default_rng(1).normal(size=grid.shape).astype(np.float32)
+
+        def made(exposure: Exposure) -> np.ndarray:
+            image_after = effect.apply(image, exposure)
+            return np.stack([image_after, effect.reshape(deviates, exposure)])
+
+        alike = all(np.array_equal(made(one), made(other)) for other in others)
+        assert alike == (not effect.draws)
 
     def test_a_mosaic_is_the_sampled_planes(self, name: str) -> None:
         effect = example_of(KINDS[name])

@@ -66,7 +66,9 @@ def polish(
     best = predictor.loglik(mean)
     errors: Array = np.full(len(free), np.inf)
     for _ in range(rounds if free else 0):
-        step, errors = _newton(predictor, camera, effects, free, mean, slopes)
+        step, errors, promised = _newton(predictor, camera, effects, free, mean, slopes)
+        if promised < _SMALL:
+            break
         better = _along(predictor, camera, effects, free, step, best)
         if better is None:
             break
@@ -100,12 +102,14 @@ def _newton(
     free: Sequence[Free],
     mean: Array,
     slopes: Callable[[Effect], Predictor] | None,
-) -> tuple[Array, Array]:
-    """Return the Gauss-Newton step of the free parameters and their standard errors."""
+) -> tuple[Array, Array, float]:
+    """Return the Gauss-Newton step of the free parameters, their standard errors and its gain."""
     j = jacobian(predictor if slopes is None else slopes, camera, effects, free)
     score, inverse = information(predictor, mean, j)
     rest, _, _ = predictor.weights(mean)
-    return inverse @ (score @ rest), np.sqrt(np.diag(inverse))
+    along = score @ rest
+    step = inverse @ along
+    return step, np.sqrt(np.diag(inverse)), float(step @ along) / 2
 
 
 def jacobian(

@@ -24,7 +24,6 @@ from analysis.mismatch.polish import (
     shifted,
     with_effects,
 )
-from analysis.mismatch.predict import Predictor
 from analysis.mismatch.state import State
 from dsis.camera import Camera
 from dsis.effects import Effect
@@ -96,7 +95,7 @@ def _information(
     most = replicates if state.setting.large else min(state.setting.nulls, len(state.simulated))
     while True:
         predictor = state.predictor(replicates)
-        slopes = _slopes(predictor, bare, effects, free)
+        slopes = _slopes(state, replicates, bare, effects, free)
         j = slopes.mean(0)
         weights = precisions(predictor, state.null.mean, j)
         slopes = np.where(weights[:, None] > 0, np.nan_to_num(slopes), 0.0)
@@ -108,14 +107,23 @@ def _information(
 
 
 def _slopes(
-    predictor: Predictor, bare: Camera, effects: tuple[Effect, ...], free: Sequence[Free]
+    state: State, replicates: int, bare: Camera, effects: tuple[Effect, ...], free: Sequence[Free]
 ) -> Array:
-    """Return how numbers move with each parameter: (replicate, number, parameter)."""
+    """Return how numbers move with each parameter: (replicate, number, parameter).
+
+    In a large recording, what draws nothing at random moves them alike on every sensor.
+    """
+    alike = [state.setting.large and not effects[i].draws for i, _, _ in free]
     beside = list(shifted(bare, effects, free))
-    predictor.ready(other for other, _ in beside)
+    asked = {same: state.predictor(1 if same else replicates) for same in set(alike)}
+    for same, predictor in asked.items():
+        predictor.ready(other for own, (other, _) in zip(alike, beside, strict=True) if own == same)
+    size = state.null.mean.size
     columns = [
-        np.zeros_like(predictor.base) if other is None else predictor.changes(other) / step
-        for other, step in beside
+        np.zeros((replicates, size))
+        if other is None
+        else np.broadcast_to(asked[same].changes(other) / step, (replicates, size))
+        for same, (other, step) in zip(alike, beside, strict=True)
     ]
     return np.stack(columns, 2)
 

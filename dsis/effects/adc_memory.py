@@ -27,6 +27,7 @@ class AdcMemory(Effect):
 
     stage: ClassVar[Stage] = Stage.READ_OUT
     rank: ClassVar[int] = 90  # what the converter is given
+    draws: ClassVar[bool] = False
     reference: ClassVar[str] = (
         "Chiu, Gray & Nikolic, A 14-b 12-MS/s CMOS pipeline ADC with over 100-dB SFDR, IEEE J. "
         "Solid-State Circuits 39, 2004 (memory of shared capacitors); IEEE Std 1241-2010"

@@ -43,6 +43,7 @@ class AmpGlow(Effect):
 
     stage: ClassVar[Stage] = Stage.LIGHT
     rank: ClassVar[int] = 50  # after what acts on light alone
+    draws: ClassVar[bool] = False
     reference: ClassVar[str] = "Janesick, Scientific Charge-Coupled Devices, SPIE Press, 2001"
     measures: ClassVar[frozenset[str]] = frozenset(
         {

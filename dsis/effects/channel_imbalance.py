@@ -21,6 +21,7 @@ class ChannelImbalance(Effect):
     gain_percent: Annotated[float, Field(gt=-100, lt=100, examples=[2.0])]
 
     stage: ClassVar[Stage] = Stage.LIGHT
+    draws: ClassVar[bool] = False
     reference: ClassVar[str] = "Hirakawa, Cross-talk explained, IEEE ICIP 2008"
     measures: ClassVar[frozenset[str]] = frozenset({"level", "pixel_variance"})
     confounders: ClassVar[str] = (

@@ -20,6 +20,7 @@ class DarkCurrent(Effect):
 
     stage: ClassVar[Stage] = Stage.LIGHT
     rank: ClassVar[int] = 50  # after what acts on light alone
+    draws: ClassVar[bool] = False
     reference: ClassVar[str] = "EMVA Standard 1288, release 3.1, section 7"
     measures: ClassVar[frozenset[str]] = frozenset({"level", "pixel_variance"})
     grows_with_time: ClassVar[bool] = True

@@ -21,6 +21,7 @@ class DualGainMismatch(Effect):
 
     stage: ClassVar[Stage] = Stage.READ_OUT
     rank: ClassVar[int] = -50  # the path's amplifier scales its read noise; lines come later
+    draws: ClassVar[bool] = False
     reference: ClassVar[str] = (
         "Seybold et al., CIC 22, 2014, section 'Camera noise characteristics' (dual-gain read-out)"
     )

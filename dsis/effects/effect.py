@@ -228,6 +228,8 @@ class Effect(Model, ABC):
         Kind of the base link whose deviates it redraws; empty: none.
     grows_with_time
         Whether it needs the exposure time.
+    draws
+        Whether it draws anything at random; what does not is the same on every sensor.
     """
 
     kind: str
@@ -238,6 +240,7 @@ class Effect(Model, ABC):
     confounders: ClassVar[str]
     reshapes: ClassVar[str] = ""
     grows_with_time: ClassVar[bool] = False
+    draws: ClassVar[bool] = True
 
     @abstractmethod
     def apply(self, image: Image, exposure: Exposure) -> Image:

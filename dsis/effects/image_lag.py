@@ -21,6 +21,7 @@ class ImageLag(Effect):
 
     stage: ClassVar[Stage] = Stage.CHARGE
     rank: ClassVar[int] = 20
+    draws: ClassVar[bool] = False
     reference: ClassVar[str] = (
         "Fossum & Hondongwa, A review of the pinned photodiode for CCD and CMOS image sensors, "
         "IEEE J. Electron Devices Society 2, 2014"

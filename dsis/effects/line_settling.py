@@ -29,6 +29,7 @@ class LineSettling(Effect):
 
     stage: ClassVar[Stage] = Stage.READ_OUT
     rank: ClassVar[int] = -190  # behind the gains of amplifiers, before the read noise
+    draws: ClassVar[bool] = False
     reference: ClassVar[str] = "Janesick, Scientific Charge-Coupled Devices, SPIE Press, 2001"
     measures: ClassVar[frozenset[str]] = frozenset(
         {

@@ -22,6 +22,7 @@ class Quantisation(Effect):
 
     stage: ClassVar[Stage] = Stage.CODE
     rank: ClassVar[int] = 60
+    draws: ClassVar[bool] = False
     reference: ClassVar[str] = "Widrow & Kollar, Quantization Noise, Cambridge, 2008"
     measures: ClassVar[frozenset[str]] = frozenset(
         {

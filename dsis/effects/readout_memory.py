@@ -27,6 +27,7 @@ class ReadoutMemory(Effect):
 
     stage: ClassVar[Stage] = Stage.READ_OUT
     rank: ClassVar[int] = 50
+    draws: ClassVar[bool] = False
     reference: ClassVar[str] = (
         "White, Lampe, Blaha & Mack, Characterization of surface channel CCD image arrays at low "
         "light levels, IEEE J. Solid-State Circuits 9, 1974"

@@ -21,6 +21,7 @@ class Saturation(Effect):
     full_well_dn: Annotated[float, Field(gt=0, examples=[5010.0])]
 
     stage: ClassVar[Stage] = Stage.CHARGE
+    draws: ClassVar[bool] = False
     reference: ClassVar[str] = "Janesick, Photon Transfer, SPIE Press, 2007"
     measures: ClassVar[frozenset[str]] = frozenset(
         {

@@ -29,6 +29,7 @@ class Shading(Effect):
     bow_right_percent: Annotated[float, Field(ge=-100, le=100)] = 0.0
 
     stage: ClassVar[Stage] = Stage.LIGHT
+    draws: ClassVar[bool] = False
     reference: ClassVar[str] = "EMVA Standard 1288, release 3.1 (homogeneity of the light)"
     measures: ClassVar[frozenset[str]] = frozenset(
         {

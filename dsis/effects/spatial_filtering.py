@@ -23,6 +23,7 @@ class SpatialFiltering(Effect):
 
     stage: ClassVar[Stage] = Stage.CODE
     rank: ClassVar[int] = -50
+    draws: ClassVar[bool] = False
     reference: ClassVar[str] = "EMVA Standard 1288, release 3.1 (no preprocessing in the camera)"
     measures: ClassVar[frozenset[str]] = frozenset(
         {

@@ -229,7 +229,7 @@ class Effect(Model, ABC):
     grows_with_time
         Whether it needs the exposure time.
     draws
-        Whether it draws anything at random; what does not is the same on every sensor.
+        Whether it draws, or redraws, anything at random; what does not is the same on every sensor.
     """
 
     kind: str

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from analysis.mismatch.layout import Layout, Place
 from analysis.mismatch.observe import Level
+from dsis.measures.median import median
 
 Array = NDArray[np.float64]
 CLIPPED_SHARE = 1e-3
@@ -267,7 +268,7 @@ def _piece(
         w = 1 / sd**2
         if free:
             rest = (v - parameters[0] * x - parameters[1]) / sd if parameters.any() else 0 * v
-            spread = max(1.0, float(np.median(np.abs(rest))) * 1.4826)
+            spread = max(1.0, median(np.abs(rest)) * 1.4826)
             w = w * np.minimum(1, _HUBER * spread / np.maximum(np.abs(rest), 1e-12))
             design = np.stack([x, np.ones_like(x)], 1)
             normal = (design * w[:, None]).T @ design

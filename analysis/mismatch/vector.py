@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from math import inf, log, nan, sqrt
 
 import numpy as np
@@ -19,6 +20,10 @@ from analysis.mismatch.scenes import SCENE
 Array = NDArray[np.float64]
 RELATIVE_LIGHT = 3e-5  # light is stated, and a lamp is stable, no better than this
 RELATIVE_RATIO = 3e-5
+
+
+_key = lru_cache(maxsize=None)(Key)  # the same in every simulation
+_split = lru_cache(maxsize=None)(split_name)
 
 
 @dataclass(frozen=True)
@@ -46,13 +51,13 @@ def vector(layout: Layout, seen: Observation, fit: BaseFit) -> Vector:
     for exposure in layout.uniform:
         for channel in layout.channels:
             place = (exposure.name, channel)
-            rows += [(Key(name, "exposure", *place), seen.scalars[place][name]) for name in NAMES]
+            rows += [(_key(name, "exposure", *place), seen.scalars[place][name]) for name in NAMES]
             variance = UNKNOWN if place in layout.still else _variance(place, seen, fit)
-            rows.append((Key("pixel_variance", "exposure", *place), variance))
+            rows.append((_key("pixel_variance", "exposure", *place), variance))
             level = _level(layout, exposure.name, channel, seen, fit)
-            rows.append((Key("level", "exposure", *place), level))
+            rows.append((_key("level", "exposure", *place), level))
         if "Gr" in layout.channels and exposure.kind == "flat":
-            rows.append((Key("channel_ratio", "exposure", exposure.name, "G"),
+            rows.append((_key("channel_ratio", "exposure", exposure.name, "G"),
                          _ratio(exposure.name, seen, fit)))  # fmt: skip
         rows += _in_common(exposure.name, seen)
     for exposure in layout.pictures:
@@ -60,12 +65,12 @@ def vector(layout: Layout, seen: Observation, fit: BaseFit) -> Vector:
         rows += _in_common(exposure.name, seen)
     for (channel, name), numbers in seen.maps.items():
         for label, number in numbers.items():
-            statistic, detail = split_name(label)
-            rows.append((Key(statistic, name, "", channel, detail), number))
+            statistic, detail = _split(label)
+            rows.append((_key(statistic, name, "", channel, detail), number))
     for channel, numbers in seen.pooled.items():
         for label, number in numbers.items():
-            statistic, detail = split_name(label)
-            rows.append((Key(statistic, "all", "", channel, detail), number))
+            statistic, detail = _split(label)
+            rows.append((_key(statistic, "all", "", channel, detail), number))
     keys = tuple(key for key, _ in rows)
     values, errors = np.array([number for _, number in rows]).T
     unknown = ~(np.isfinite(values) & np.isfinite(errors) & (errors > 0))
@@ -74,8 +79,8 @@ def vector(layout: Layout, seen: Observation, fit: BaseFit) -> Vector:
 
 def _in_common(name: str, seen: Observation) -> Iterator[tuple[Key, Number]]:
     for label, number in seen.common.get(name, {}).items():
-        statistic, detail = split_name(label)
-        yield Key(statistic, MOSAIC, name, "", detail), number
+        statistic, detail = _split(label)
+        yield _key(statistic, MOSAIC, name, "", detail), number
 
 
 def _of_scene(
@@ -85,9 +90,9 @@ def _of_scene(
     for channel, local in layout.scenes[name].channels.items():
         for statistic in LOCAL_NAMES:
             number = seen.scalars[name, channel][statistic]
-            yield Key(statistic, SCENE, name, channel), number
+            yield _key(statistic, SCENE, name, channel), number
         for label in local.bins:
-            key = Key("pixel_variance", SCENE, name, channel, label)
+            key = _key("pixel_variance", SCENE, name, channel, label)
             level, expected = seen.local[key.place], expected_dn2(layout, key.place, fit)
             told = _told(layout.range_dn(key.place), fit)
             known = told and level.variance_dn2 > 0 and expected > 0

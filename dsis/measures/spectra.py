@@ -7,6 +7,7 @@ import scipy.special
 from numpy.typing import NDArray
 
 from dsis.measures.estimate import Estimate, estimate, unknown
+from dsis.measures.median import median
 
 Array = NDArray[np.float64]
 
@@ -44,7 +45,7 @@ def _peak(inner: Array, edge: Array, alone: Array, degrees: int) -> Estimate:
     if inner.size < 4:
         return unknown()
     middle, density = _median_of_white(degrees)
-    white = _median(inner) / middle
+    white = median(inner) / middle
     if white == 0:
         return unknown()
     value = max(float(part.max()) for part in (inner, edge, alone) if part.size) / white
@@ -55,15 +56,6 @@ def _peak(inner: Array, edge: Array, alone: Array, degrees: int) -> Estimate:
     # A line of fixed amplitude and free phase in white noise: non-central chi-squared.
     excess = max(value - null_value - 3 * null**0.5, 0.0)
     return estimate(value, null * (1 + excess) ** 2 + 2 * excess / (degrees + 1), null_value, null)
-
-
-def _median(values: Array) -> float:
-    """Return the median; `numpy.median` takes longer to ask what it was given."""
-    half = values.size // 2
-    if values.size % 2:
-        return float(np.partition(values, half)[half])
-    middle = np.partition(values, (half - 1, half))[half - 1 : half + 1]
-    return float(middle[0] + middle[1]) / 2
 
 
 @lru_cache(maxsize=256)

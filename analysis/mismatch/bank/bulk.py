@@ -7,12 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.layout import Layout
-from dsis.compiled import kernel
+from dsis.compiled import inlined, kernel
+from dsis.measures.median import median
 
 _FARTHEST = 5.0  # standard deviations of a difference: normal ones lie within
 _MOST_FAR = 0.2  # share of differences: more are no spikes
 _SAMPLES = 4096  # that tell by how much a frame moved as a whole
-Plane = NDArray[np.float32]
+Image = NDArray[np.float32]
 Sums = NDArray[np.float64]
 
 
@@ -21,41 +22,39 @@ class Bulk:
 
     Parameters
     ----------
-    planes
-        Rows and columns of each channel.
+    places
+        First row, first column and step of each channel.
     expected_dn2
         Variance of each channel's pixels, roughly: differences farther than five standard
         deviations are left out.
     """
 
     def __init__(
-        self, planes: dict[str, tuple[slice, slice]], expected_dn2: dict[str, float]
+        self, places: dict[str, tuple[int, int, int]], expected_dn2: dict[str, float]
     ) -> None:
-        self.planes = planes
+        self.places = places
         self.farthest = {c: _FARTHEST * sqrt(2 * v) for c, v in expected_dn2.items()}
-        self.sums = {channel: np.zeros(4) for channel in planes}
+        self.sums = {channel: np.zeros(4) for channel in places}
         self.pairs = 0
 
     @classmethod
     def of(cls, layout: Layout, exposure: str) -> "Bulk":
         """Return empty sums for an exposure; its recorded frames say what is far."""
         step = 1 if len(layout.sites) == 1 else 2
-        planes = {
-            c: (slice(y, None, step), slice(x, None, step)) for c, (y, x) in layout.sites.items()
-        }
-        return cls(planes, {c: layout.variance_dn2[exposure, c] for c in planes})
+        places = {c: (y, x, step) for c, (y, x) in layout.sites.items()}
+        return cls(places, {c: layout.variance_dn2[exposure, c] for c in places})
 
     def watching(self, frames: Iterable[NDArray[np.generic]]) -> Iterator[NDArray[np.generic]]:
         """Yield frames (row, column) as they come, and take their differences."""
-        before: dict[str, Plane] = {}
+        last: Image | None = None
         for frame in frames:
-            self.pairs += bool(before)
-            for channel, place in self.planes.items():
-                own = np.ascontiguousarray(frame[place], np.float32)
-                if channel in before:
-                    last, farthest = before[channel], self.farthest[channel]
-                    self.sums[channel] += _within(last, own, _moved(last, own), farthest)
-                before[channel] = own
+            own = np.ascontiguousarray(frame, np.float32)
+            if last is not None:
+                self.pairs += 1
+                for channel, place in self.places.items():
+                    moved = _moved(last, own, place)
+                    self.sums[channel] += _within(last, own, place, moved, self.farthest[channel])
+            last = own
             yield frame
 
     def variance_dn2(self, channel: str, plain_dn2: float) -> float:
@@ -77,42 +76,93 @@ class Bulk:
         return float(1 - kept / whole) if whole else 0.0
 
 
-def _moved(one: Plane, other: Plane) -> float:
-    """Return by how much most pixels moved: light flickers, offsets drift."""
-    step = max(one.size // _SAMPLES, 1)
-    return float(np.median(other.reshape(-1)[::step] - one.reshape(-1)[::step]))
+def _moved(one: Image, other: Image, place: tuple[int, int, int]) -> float:
+    """Return by how much most pixels of a channel moved: light flickers, offsets drift."""
+    return median(_sampled(one, other, place))
 
 
 @kernel
-def _within(one: Plane, other: Plane, moved: float, farthest: float) -> Sums:
+def _sampled(one: Image, other: Image, place: tuple[int, int, int]) -> Image:
+    """Return the change of every so many pixels of a channel."""
+    y0, x0, step = place
+    rows, columns = -((y0 - one.shape[0]) // step), -((x0 - one.shape[1]) // step)
+    every = max(rows * columns // _SAMPLES, 1)
+    found = np.empty((rows * columns + every - 1) // every, np.float32)
+    y = x = 0
+    for i in range(found.size):
+        while x >= columns:
+            x -= columns
+            y += 1
+        at, along = y0 + y * step, x0 + x * step
+        found[i] = other[at, along] - one[at, along]
+        x += every
+    return found
+
+
+@kernel
+def _within(
+    one: Image, other: Image, place: tuple[int, int, int], moved: float, farthest: float
+) -> Sums:
     """Return the sum of squared differences about means of lines, and its degrees of freedom.
 
-    Then how many differences were taken, of how many.
+    Then how many differences were taken, of how many. Loops over `lines` alone are vector
+    instructions, whatever the step.
     """
-    rows, columns = one.shape
-    by_column, met = np.zeros(columns), np.zeros(columns)
-    squares, across, total, count, lines = 0.0, 0.0, 0.0, 0.0, 0.0
+    y0, x0, step = place
+    rows, columns = -((y0 - one.shape[0]) // step), -((x0 - one.shape[1]) // step)
+    lines = np.zeros((5, columns))
+    change, near, by_column, met, squares = lines[0], lines[1], lines[2], lines[3], lines[4]
+    across, total, count, taken = 0.0, 0.0, 0.0, 0.0
     for y in range(rows):
-        own, n = 0.0, 0.0
+        _differ(one[y0 + y * step], other[y0 + y * step], x0, step, moved, change)
         for x in range(columns):
-            d = float(other[y, x]) - float(one[y, x]) - moved
-            if abs(d) > farthest:
-                continue
-            squares += d * d
-            own += d
-            n += 1
-            by_column[x] += d
-            met[x] += 1
+            far = abs(change[x]) > farthest
+            near[x] = 0.0 if far else 1.0
+            change[x] = 0.0 if far else change[x]
+        for x in range(columns):
+            squares[x] += change[x] * change[x]
+            by_column[x] += change[x]
+            met[x] += near[x]
+        own, n = _summed(change), _summed(near)
         if n > 0:
             across += own * own / n
-            lines += 1
+            taken += 1
         total += own
         count += n
     for x in range(columns):
         if met[x] > 0:
             across += by_column[x] * by_column[x] / met[x]
-            lines += 1
+            taken += 1
+    size = float(rows * columns)
     if count < 1:
-        return np.array([0.0, 0.0, 0.0, one.size])
-    own = squares - across + total * total / count
-    return np.array([own, count - lines + 1, count, one.size])
+        return np.array([0.0, 0.0, 0.0, size])
+    return np.array(
+        [_summed(squares) - across + total * total / count, count - taken + 1, count, size]
+    )
+
+
+@inlined
+def _differ(one: Image, other: Image, x0: int, step: int, moved: float, change: Sums) -> None:
+    """Write by how much samples of a line changed beyond what most did."""
+    if step == 1:
+        for x in range(change.size):
+            change[x] = np.float64(other[x]) - np.float64(one[x]) - moved
+    else:
+        for x in range(change.size):
+            at = x0 + x * step
+            change[x] = np.float64(other[at]) - np.float64(one[at]) - moved
+
+
+@inlined
+def _summed(line: Sums) -> float:
+    """Return the sum of a line; of four parts, which do not wait for one another."""
+    a = b = c = d = 0.0
+    end = line.size // 4 * 4
+    for i in range(0, end, 4):
+        a += line[i]
+        b += line[i + 1]
+        c += line[i + 2]
+        d += line[i + 3]
+    for i in range(end, line.size):
+        a += line[i]
+    return (a + b) + (c + d)

@@ -101,15 +101,15 @@ class CarryOver:
             yield frame
 
     def _take(self, one: Frame, other: Frame) -> None:
-        moved = (one - other).astype(np.float32)
         self.size = {"rows": one.shape[1], "columns": one.shape[0]}
-        # Whole lines move for other reasons.
-        still = moved - moved.mean(1, keepdims=True) - moved.mean(0) + moved.mean()
+        still = _still(one, other)
+        every = max(one.size // _SAMPLES, 1) | 1  # odd: no colour is left out
+        found = _sums(one, other, still, every)
         for axis in AXES:
-            down, right = _BEFORE[axis]
-            every = max(one.size // _SAMPLES, 1) | 1  # odd: no colour is left out
-            _add(one, other, still, down, right, every, self.by_code[axis], self.squares[axis])
+            self.by_code[axis] += found[axis][0]
+            self.squares[axis] += found[axis][1]
             if self.keep:
+                down, right = _BEFORE[axis]
                 rows, columns = one.shape[0] - down, one.shape[1] - right
                 parts = (one, other, still[down:, right:], still)
                 flat = [part[:rows, :columns].reshape(-1) for part in parts]
@@ -267,36 +267,90 @@ def _against(
 
 
 @kernel
-def _add(
+def _still(one: Frame, other: Frame) -> NDArray[np.float32]:
+    """Return the change of samples less that of rows and columns: lines move for other reasons."""
+    rows, columns = one.shape
+    by_column, whole = np.zeros(columns, np.int64), np.int64(0)
+    found = np.empty(one.shape, np.float32)
+    of_row = np.empty(rows, np.float32)
+    for y in range(rows):
+        first, second, total = one[y], other[y], np.int64(0)
+        for x in range(columns):
+            change = first[x] - second[x]
+            by_column[x] += change
+            total += change
+        of_row[y] = np.float32(total) / np.float32(columns)
+        whole += total
+    of_column = by_column.astype(np.float32) / np.float32(rows)
+    mean = np.float32(whole) / np.float32(one.size)
+    for y in range(rows):
+        first, second, line, own = one[y], other[y], found[y], of_row[y]
+        for x in range(columns):
+            line[x] = np.float32(first[x] - second[x]) - own - of_column[x] + mean
+    return found
+
+
+def _sums(
+    one: Frame, other: Frame, still: NDArray[np.float32], every: int
+) -> dict[str, tuple[Array, Array]]:
+    """Return `by_code` and `squares` of two frames, by axis, of every so many lines.
+
+    Most samples stand before one to their right and one below: what both have in common is summed
+    once. The last column stands before what is below alone, the last line before what is beside.
+    """
+    rows, columns = one.shape
+    inner = _by_code(one, other, still, (0, rows - 1, every), (0, columns - 1))
+    last = (rows - 1) % every  # 0: it is looked at
+    bottom = _by_code(one, other, still, (rows - 1, rows - last, every), (0, columns - 1))
+    side = _by_code(one, other, still, (0, rows - 1, every), (columns - 1, columns))
+    found = {}
+    for axis, edge, own in (("rows", bottom, 0), ("columns", side, 1)):
+        codes, squares = inner[0] + edge[0], inner[1] + edge[1]
+        found[axis] = (codes[[0, 1, 2, 4 + own, 3]], squares[[0, 2 + own, 4 + own, 1]])
+    return found
+
+
+@kernel
+def _by_code(
     one: Frame,
     other: Frame,
-    moved: NDArray[np.float32],
-    down: int,
-    right: int,
-    every: int,
-    by_code: Array,
-    squares: Array,
-) -> None:
-    rows, columns = one.shape
-    mask = by_code.shape[1] - 1
-    count = square = product = before = 0.0
-    for y in range(down, rows, every):
-        for x in range(right, columns):
-            a, b = one[y - down, x - right], other[y - down, x - right]
-            d, own = float(moved[y, x]), float(moved[y - down, x - right])
-            by_code[0, a & mask] += 1
-            by_code[0, b & mask] += 1
-            by_code[1, (a - b) & mask] += 1
-            by_code[2, (a + b) & mask] += 1
-            by_code[3, a & mask] += d
-            by_code[3, b & mask] -= d
-            by_code[4, a & mask] += own
-            by_code[4, b & mask] -= own
+    still: NDArray[np.float32],
+    lines: tuple[int, int, int],
+    columns: tuple[int, int],
+) -> tuple[Array, Array]:
+    """Return sums over some lines and columns of samples: by their code, and of squares.
+
+    By code: how often codes, their differences and sums occur; sums of the sample's own change, of
+    that of the one to its right, and of the one below. Of squares: count, own squared, the others
+    squared, and their products with the own.
+    """
+    mask = _FOLDED - 1
+    moved = np.zeros((_FOLDED, 3))  # of a code side by side
+    counts = np.zeros((3, _FOLDED), np.int64)
+    count = before = squared_right = squared_below = by_right = by_below = 0.0
+    end = still.shape[1] - 1
+    for y in range(lines[0], lines[1], lines[2]):
+        first, second, line, after = one[y], other[y], still[y], still[min(y + 1, len(still) - 1)]
+        for x in range(columns[0], columns[1]):
+            a, b = first[x], second[x]
+            counts[0, a & mask] += 1
+            counts[0, b & mask] += 1
+            counts[1, (a - b) & mask] += 1
+            counts[2, (a + b) & mask] += 1
+            own, right, below = line[x], line[min(x + 1, end)], after[x]  # products: float32
+            into, off = moved[a & mask], moved[b & mask]
+            into[0] += own
+            into[1] += right
+            into[2] += below
+            off[0] -= own
+            off[1] -= right
+            off[2] -= below
             count += 1
-            square += d * d
-            product += d * own
             before += own * own
-    squares[0] += count
-    squares[1] += square
-    squares[2] += product
-    squares[3] += before
+            squared_right += right * right
+            squared_below += below * below
+            by_right += right * own
+            by_below += below * own
+    codes = np.empty((6, _FOLDED))
+    codes[:3], codes[3:] = counts, moved.T
+    return codes, np.array([count, before, squared_right, squared_below, by_right, by_below])

@@ -13,6 +13,7 @@ from scipy.special import gammaincinv
 from analysis.mismatch.bank.lines import log_chance, separate, without_lines
 from analysis.mismatch.bank.scalars import UNKNOWN, Number, ratio_root, score_of_log
 from dsis.measures import Channel
+from dsis.measures.median import median
 
 Array = NDArray[np.float64]
 _SINGLE = ((1, 1),)
@@ -314,7 +315,7 @@ def _largest(
 
 def white_level(power: Array, degrees: float) -> float:
     """Return the power of a bin of white noise, Gamma(degrees): by the median, without lines."""
-    return float(np.median(power)) * degrees / float(gammaincinv(degrees, 0.5))
+    return median(power) * degrees / float(gammaincinv(degrees, 0.5))
 
 
 def _summed(power: Array, block: tuple[int, int]) -> Array:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from analysis.mismatch.bank.scalars import UNKNOWN, Number
 from analysis.mismatch.bank.seams import beyond_smooth
+from dsis.measures.median import median
 
 Array = NDArray[np.float64]
 ENDS = ("first", "last")
@@ -46,7 +47,7 @@ def line_square(means: Array, noise: float, across: int) -> float:
 
     `means` are less what is smooth; each is over so many pixels `across`.
     """
-    return max(noise**2 / across, float(np.median(means**2)) / _MEDIAN)
+    return max(noise**2 / across, median(means**2) / _MEDIAN)
 
 
 def line_square_beside(means: Array, shape: Array, noise: float, across: int) -> float:

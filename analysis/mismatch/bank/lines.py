@@ -36,8 +36,8 @@ def without_lines(power: Array, degrees: int) -> Array:
     near = np.arange(-(_AROUND // 2), _AROUND // 2 + 1)
     u = np.abs(x[:, np.newaxis] + near)
     u = np.minimum(u, 2 * (half - 1) - u) % half  # beyond its ends a half plane is mirrored
-    down = np.median(power[(y[:, np.newaxis] + near) % rows, x[:, np.newaxis]], 1)
-    level = np.maximum(down, np.median(power[y[:, np.newaxis], u], 1))
+    down = _middle(power[(y[:, np.newaxis] + near) % rows, x[:, np.newaxis]])
+    level = np.maximum(down, _middle(power[y[:, np.newaxis], u]))
     level /= float(gammaincinv(degrees, 0.5)) / degrees
     limit = float(gammainccinv(degrees, _CHANCE / power.size)) / degrees
     found = power.copy()
@@ -96,6 +96,11 @@ def _log_above(shape: float, x: float) -> float:
     if chance > _HELD:
         return float(np.log(chance))
     return float((shape - 1) * np.log(x) - x - gammaln(shape) - np.log1p(-max(shape - 1, 0.0) / x))
+
+
+def _middle(values: Array) -> Array:
+    """Return the median of each row of `_AROUND` values, an odd number."""
+    return np.asarray(np.sort(values, 1)[:, _AROUND // 2])
 
 
 def _highest(power: Array) -> tuple[NDArray[np.int_], NDArray[np.int_]]:

@@ -12,6 +12,8 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from dsis.compiled import kernel
+
 Array = NDArray[np.float64]
 MAPS = ("offset", "gain", "time")
 ALONE = ("offset", "gain")
@@ -87,10 +89,7 @@ class PatternSums:
     def add(self, exposure: str, mean_frame: Array, variance_dn2: float, frames: int) -> None:
         """Take the mean frame of an exposure and the variance of a pixel over time."""
         row, weight = self.regressors.rows[exposure], self.regressors.weights[exposure]
-        flat = mean_frame - mean_frame.mean()
-        for i, share in enumerate(weight * row):
-            if share:  # darks have no gain
-                self.moments[i] += share * flat
+        _add(mean_frame, float(mean_frame.mean()), weight * row, self.moments)
         self.gram += weight * np.outer(row, row)
         self.noise += weight**2 * np.outer(row, row) * variance_dn2 / frames
 
@@ -115,3 +114,15 @@ class PatternSums:
                     sqrt(max(float(self.noise[i, i]), 1e-300)) / own,
                 )
         return found
+
+
+@kernel
+def _add(mean_frame: Array, mean: float, shares: Array, moments: Array) -> None:
+    """Add shares of a mean frame less its mean to the moments (regressor, row, column)."""
+    for y in range(mean_frame.shape[0]):
+        line = mean_frame[y]
+        for i in range(shares.size):
+            share, into = shares[i], moments[i, y]
+            if share != 0:  # darks have no gain
+                for x in range(line.size):
+                    into[x] += share * (line[x] - mean)

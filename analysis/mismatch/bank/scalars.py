@@ -12,6 +12,7 @@ import scipy.special
 
 from dsis.measures import Channel, Estimate
 from dsis.measures.fixed_pattern import Smooth
+from dsis.measures.median import median
 
 Number = tuple[float, float]
 """Transformed value and its standard deviation in white noise; nan where unknown."""
@@ -177,7 +178,7 @@ def _largest(channel: Channel, frames: int) -> Number:
     if frames < 3:
         return UNKNOWN
     dof = frames - 1
-    ratio = float(channel.variance_map.max()) / float(np.median(channel.variance_map))
+    ratio = float(channel.variance_map.max()) / median(channel.variance_map)
     largest = ratio * 2 * float(scipy.special.gammaincinv(dof / 2, 0.5))
     single = float(scipy.special.gammaincc(dof / 2, largest / 2))
     chance = -np.expm1(channel.variance_map.size * np.log1p(-min(single, 0.5)))

@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from analysis.mismatch.bank.coherent import Peak, frequency, top, white_level
 from analysis.mismatch.bank.lines import log_chance
 from analysis.mismatch.bank.scalars import UNKNOWN, Number, score_of_log
-from dsis.compiled import kernel
+from dsis.compiled import inlined, kernel
 from dsis.measures import Channel
+from dsis.measures.median import median
 
 Array = NDArray[np.float64]
 Image = NDArray[np.float32]
@@ -120,20 +121,20 @@ class WaveSums:
 
     def peak(self) -> Peak | None:
         """Return where the power is largest: cycles per pixel of a plane, power as one shows it."""
-        if not self.weight or not all(np.median(own) > 0 for own in self.power.reshape(4, -1)):
+        middles = [median(own) for own in self.power.reshape(4, -1)]
+        if not self.weight or not min(middles) > 0:
             return None
         rows, columns = self.shape
         fine = np.zeros((2 * rows, 2 * self.power.shape[3]))
         for down in (0, 1):
             for right in (0, 1):
                 own = self.power[down, right]
-                fine[down::2, right::2] = own * (np.median(self.power[0, 0]) / np.median(own))
+                fine[down::2, right::2] = own * (middles[0] / middles[2 * down + right])
         fine[~self._looked_at()] = 0.0
         y, x = (int(i) for i in np.unravel_index(int(fine.argmax()), fine.shape))
-        around = np.pad(fine, 1)
         # At half a cycle per pixel both sides are alike: each is the other's conjugate.
-        across = x / 2 + (top(around[y + 1], x + 1) / 2 if x < columns else 0.0)
-        along = y / 2 + top(around[:, x + 1], y + 1) / 2
+        across = x / 2 + (top(np.pad(fine[y], 1), x + 1) / 2 if x < columns else 0.0)
+        along = y / 2 + top(np.pad(fine[:, x], 1), y + 1) / 2
         fx = frequency(across, columns)
         fy = frequency(along, rows)
         fy -= float(fy > 1 / 2)
@@ -178,17 +179,32 @@ def _add(transform: NDArray[np.complexfloating], weight: float, power: Array) ->
     """Add the weighted power of bins, and of neighbours' differences: down, right, both."""
     rows, columns = transform.shape
     down, right, both = weight / 2, weight / 2, weight / 4
+    lines = np.empty((6, columns))  # real and imaginary parts: of two rows, and their difference
+    here, below, apart = lines[0:2], lines[2:4], lines[4:6]
+    for x in range(columns):
+        below[0, x], below[1, x] = transform[0, x].real, transform[0, x].imag
     for y in range(rows):
-        here, below = transform[y], transform[(y + 1) % rows]
-        b, d = np.complex128(here[0]), np.complex128(below[0])
+        here, below = below, here
+        after = transform[(y + 1) % rows]
         for x in range(columns):
-            a, c = b, d
-            e = a - c
-            power[0, 0, y, x] += weight * (a.real * a.real + a.imag * a.imag)
-            power[1, 0, y, x] += down * (e.real * e.real + e.imag * e.imag)
-            if x + 1 < columns:
-                b, d = np.complex128(here[x + 1]), np.complex128(below[x + 1])
-                f = a - b
-                g = e - b + d
-                power[0, 1, y, x] += right * (f.real * f.real + f.imag * f.imag)
-                power[1, 1, y, x] += both * (g.real * g.real + g.imag * g.imag)
+            below[0, x], below[1, x] = after[x].real, after[x].imag
+        for x in range(columns):
+            apart[0, x], apart[1, x] = here[0, x] - below[0, x], here[1, x] - below[1, x]
+        _square(here[0], here[1], weight, power[0, 0, y])
+        _square(apart[0], apart[1], down, power[1, 0, y])
+        _square_next(here[0], here[1], right, power[0, 1, y])
+        _square_next(apart[0], apart[1], both, power[1, 1, y])
+
+
+@inlined
+def _square(real: Array, imaginary: Array, weight: float, power: Array) -> None:
+    for x in range(real.size):
+        power[x] += weight * (real[x] * real[x] + imaginary[x] * imaginary[x])
+
+
+@inlined
+def _square_next(real: Array, imaginary: Array, weight: float, power: Array) -> None:
+    """Add the weighted power of the differences of neighbours in a line."""
+    for x in range(real.size - 1):
+        re, im = real[x] - real[x + 1], imaginary[x] - imaginary[x + 1]
+        power[x] += weight * (re * re + im * im)

@@ -80,8 +80,22 @@ def offsets(by_row: Sums, by_column: Sums, single: bool) -> tuple[Sums, Sums, Su
 
 def split(image: Frame, places: NDArray[np.int64], means: Sums, out: Frame) -> None:
     """Write planes less their means: (plane, row, column); `places`: first row, column and step."""
-    for (y, x, step), plane in zip(places.tolist(), out, strict=True):
-        np.subtract(image[y::step, x::step], np.float32(means[y, x]), out=plane)
+    _split(image, places, means, out)
+
+
+@kernel
+def _split(image: Frame, places: NDArray[np.int64], means: Sums, out: Frame) -> None:
+    for k in range(len(places)):
+        y0, x0, step = places[k]
+        mean = np.float32(means[y0, x0])
+        for y in range(out.shape[1]):
+            line, into = image[y0 + y * step], out[k, y]
+            if step == 1:
+                for x in range(into.size):
+                    into[x] = line[x] - mean
+            else:
+                for x in range(into.size):
+                    into[x] = line[x0 + 2 * x] - mean
 
 
 @kernel
@@ -200,14 +214,29 @@ def mean_frame(
     (n, m), first = mean.shape, base[y::step, x::step]
     rows, columns = row_means.sum(0) / frames, column_means.sum(0) / frames
     level = rows.sum() / n
-    np.divide(sums[y::step, x::step], frames, out=change)
-    change += (rows - level)[:, np.newaxis]
-    change += columns - level
-    np.add(change, level, out=mean)
-    mean += first
-    mean += shift
+    _mean_frame(first, sums[y::step, x::step], frames, rows, columns, level, shift, mean, change)
     by_row, by_column = (first.sum(axis, dtype=np.float64) for axis in (1, 0))
     return by_row / m + shift, by_column / n + shift
+
+
+@kernel
+def _mean_frame(
+    first: Frame,
+    sums: Sums,
+    frames: int,
+    rows: Sums,
+    columns: Sums,
+    level: float,
+    shift: float,
+    mean: Sums,
+    change: Sums,
+) -> None:
+    for y in range(mean.shape[0]):
+        beyond = rows[y] - level
+        for x in range(mean.shape[1]):
+            own = sums[y, x] / frames + beyond + (columns[x] - level)
+            change[y, x] = own
+            mean[y, x] = own + level + first[y, x] + shift
 
 
 def temporal_power(

@@ -1,14 +1,11 @@
 """What an image, or its lines, hold beyond coarser parts of the pattern."""
 
-from collections.abc import Iterator
-
 import numpy as np
 from numpy.typing import NDArray
 
-from dsis.compiled import kernel, over_rows
+from dsis.compiled import inlined, kernel, over_rows
 
 Array = NDArray[np.float64]
-_PIXELS_IN_CACHE = 1 << 15
 
 
 def pixel_residuals(
@@ -32,9 +29,7 @@ def pixel_residuals(
     squares = float(by_line[0].sum())
 
     def scatter(first: int, last: int) -> None:
-        for part in _in_cache(first, last, m):
-            beyond = pixels[part] * pixels[part] - squares / pixels.size
-            by_line[1, part] = np.einsum("yx,yx->y", beyond, beyond)
+        _scatter(pixels, squares / pixels.size, by_line[1], first, last)
 
     over_rows(scatter, n, threads)
     return by_row, by_column, pixels, squares, float(by_line[1].sum()) / pixels.size
@@ -58,21 +53,48 @@ def _residual(
         line, out = image[y], pixels[y]
         for x in range(out.size):
             out[x] = line[x] - by_row[y] - by_column[x] + mean
-        for degree in range(1, across.shape[0]):
+        degree = 1
+        while degree + 3 <= across.shape[0]:  # three at a time: a line is written less often
+            a, b, c = weights[y, degree], weights[y, degree + 1], weights[y, degree + 2]
+            one, two, three = across[degree], across[degree + 1], across[degree + 2]
+            for x in range(out.size):
+                out[x] = out[x] - a * one[x] - b * two[x] - c * three[x]
+            degree += 3
+        while degree < across.shape[0]:
             weight, shape = weights[y, degree], across[degree]
             for x in range(out.size):
                 out[x] -= weight * shape[x]
-        total = 0.0
-        for x in range(out.size):
-            total += out[x] * out[x]
-        squares[y] = total
+            degree += 1
+        squares[y] = _squares(out, 0.0, 1)
 
 
-def _in_cache(first: int, last: int, columns: int) -> Iterator[slice]:
-    """Yield runs of rows first..last-1 whose intermediate results stay in the cache."""
-    rows = max(1, _PIXELS_IN_CACHE // columns)
-    for top in range(first, last, rows):
-        yield slice(top, min(top + rows, last))
+@kernel
+def _scatter(pixels: Array, mean: float, out: Array, first: int, last: int) -> None:
+    """Write sums over lines of the squares' squares about their mean."""
+    for y in range(first, last):
+        out[y] = _squares(pixels[y], mean, 2)
+
+
+@inlined
+def _squares(line: Array, mean: float, power: int) -> float:
+    """Return the sum of squares of a line, or of its squares about their mean.
+
+    Of four parts, which do not wait for one another.
+    """
+    a = b = c = d = 0.0
+    end = line.size // 4 * 4
+    for i in range(0, end, 4):
+        p, q, r, s = line[i], line[i + 1], line[i + 2], line[i + 3]
+        if power > 1:
+            p, q, r, s = p * p - mean, q * q - mean, r * r - mean, s * s - mean
+        a += p * p
+        b += q * q
+        c += r * r
+        d += s * s
+    for i in range(end, line.size):
+        p = line[i] * line[i] - mean if power > 1 else line[i]
+        a += p * p
+    return (a + b) + (c + d)
 
 
 def line_residuals(means: Array, series: Array, basis: Array) -> tuple[float, float]:

@@ -20,7 +20,7 @@ from mismatch_recordings import camera, recorded
 
 ROWS, COLUMNS, FRAMES = 32, 48, 8
 SIGMA = 3.0
-PLANES = {"MONO": (slice(None), slice(None))}
+PLACES = {"MONO": (0, 0, 1)}
 IMPULSE = registry()["impulse"](per_megapixel_frame=500.0, mean_dn=1500.0)
 
 
@@ -29,7 +29,7 @@ def _noise(rng: np.random.Generator) -> NDArray[np.float64]:
 
 
 def _bulk(frames: NDArray[np.float64]) -> Bulk:
-    sums = Bulk(PLANES, {"MONO": SIGMA**2})
+    sums = Bulk(PLACES, {"MONO": SIGMA**2})
     assert len(list(sums.watching(frames))) == len(frames)
     return sums
 
@@ -68,10 +68,10 @@ def test_spikes_are_left_out_and_counted() -> None:
 
 def test_what_is_not_rare_is_no_spike() -> None:
     """The scale was wrong, say: then the plain variance is all that is known."""
-    found = Bulk(PLANES, {"MONO": SIGMA**2 / 100})
+    found = Bulk(PLACES, {"MONO": SIGMA**2 / 100})
     list(found.watching(_noise(np.random.default_rng(5))))
     assert found.variance_dn2("MONO", 7.0) == 7.0
-    one = Bulk(PLANES, {"MONO": SIGMA**2})
+    one = Bulk(PLACES, {"MONO": SIGMA**2})
     list(one.watching(_noise(np.random.default_rng(5))[:1]))
     assert one.variance_dn2("MONO", 7.0) == 7.0
 

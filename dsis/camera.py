@@ -183,7 +183,7 @@ class Camera(Model):
         """
         if exposure_time_s is None:
             self._refuse_growth()
-        chain = list(_drawn(self.chain(), temporal, sensor))
+        chain, read_out = list(_drawn(self.chain(), temporal, sensor)), self.read_out
 
         def after(links: int, back: int) -> Image:
             """Return what the first `links` links make of the frame `back` frames earlier."""
@@ -199,7 +199,7 @@ class Camera(Model):
                     own_temporal,
                     own_sensor,
                     expected,
-                    self.read_out,
+                    read_out,
                     partial(before, place, back),
                     exposure_time_s or 0.0,
                     threads,

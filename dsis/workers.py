@@ -28,6 +28,7 @@ from threading import Lock
 from typing import Any, Literal, TypeVar, cast
 
 from dsis.errors import DsisError, Fault, InputError
+from dsis.freed import keep_freed
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -173,13 +174,17 @@ def workers(
         return Workers(partial(ThreadPoolExecutor, count), count, apart=False)
     # A fork would copy locks that other threads hold.
     afresh = multiprocessing.get_context("spawn")
-    start = partial(ProcessPoolExecutor, count, mp_context=afresh, initializer=_die_without_a_word)
+    start = partial(ProcessPoolExecutor, count, mp_context=afresh, initializer=_begin)
     return Workers(start, count)
 
 
-def _die_without_a_word() -> None:
-    """Let Ctrl-C end this process: who handed out its work says that it was interrupted."""
+def _begin() -> None:
+    """Make a process ready.
+
+    Ctrl-C ends it without a word: who handed out its work says that it was interrupted.
+    """
     signal.signal(signal.SIGINT, signal.SIG_DFL)
+    keep_freed()
 
 
 def completed(pool: Workers, work: Callable[[T], R], items: Iterable[T]) -> Iterator[tuple[T, R]]:

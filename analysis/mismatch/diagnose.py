@@ -42,6 +42,7 @@ from analysis.mismatch.thinned import stages
 from analysis.mismatch.trial import Gained, Trial
 from analysis.mismatch.wholecells import whole_cells
 from dsis.camera import Camera
+from dsis.freed import keep_freed
 from dsis.recording import Recording
 
 Progress = Callable[[int, int, str], None]
@@ -78,6 +79,7 @@ def find_mismatch(
     words = VOCABULARY if vocabulary is None else vocabulary & VOCABULARY
     samples = sum(len(e.frames) for e in recording.exposures) * recording.rows * recording.columns
     jobs = jobs if samples > _SMALL else 1  # processes take longer to start
+    keep_freed()
     with processes(jobs):
         return _found(camera, recording, (seed, jobs), words, step)
 

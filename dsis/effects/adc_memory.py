@@ -51,10 +51,13 @@ class AdcMemory(Effect):
     def apply(self, image: Image, exposure: Exposure) -> Image:
         """Add the residue of the sample before."""
         first = np.float32(exposure.read_out.black_level_dn - self.at_code)
-        before = np.roll(image, 1, axis=1 if self.along == "rows" else 0)
-        phase = (before + first) / np.float32(self.period_codes)
-        residue = phase - np.floor(phase) - np.float32(0.5)
-        return np.asarray(image + np.float32(self.step_dn) * residue)
+        phase = np.roll(image, 1, axis=1 if self.along == "rows" else 0)
+        phase += first
+        phase /= np.float32(self.period_codes)
+        phase -= np.floor(phase)
+        phase -= np.float32(0.5)
+        phase *= np.float32(self.step_dn)
+        return np.asarray(image + phase)
 
     def reach_pixels(self) -> int:
         """Return how far away a pixel may matter."""

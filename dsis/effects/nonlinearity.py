@@ -36,7 +36,9 @@ class Nonlinearity(Effect):
         full_scale = exposure.read_out.full_scale_dn
         bend, end = np.float32(self._bend(full_scale)), np.float32(0.85 * full_scale)
         bent: Image = np.minimum(image, np.float32(full_scale))
-        return image + bend * bent * (end - bent)
+        shift = bend * bent
+        shift *= end - bent
+        return image + shift
 
     def contributions(self, point: OperatingPoint) -> Mapping[str, float]:
         """Return the shift of the mean, and what the local gain makes of shot noise."""

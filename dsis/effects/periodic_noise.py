@@ -66,9 +66,11 @@ class PeriodicNoise(Effect):
         # cos(a + b) from rows and columns: one product per pixel instead of one cosine.
         along = np.exp(2j * np.pi * (u * grid.column_numbers() + turn)).astype(np.complex64)
         down = np.exp(2j * np.pi * w * grid.row_numbers()).astype(np.complex64)
-        wave = down.real * along.real - down.imag * along.imag
-        made: Image = image + np.float32(self.amplitude_dn) * wave
-        return made
+        cosine, sine = np.ascontiguousarray(along.real), np.ascontiguousarray(along.imag)
+        wave: Image = down.real * cosine
+        wave -= down.imag * sine
+        wave *= np.float32(self.amplitude_dn)
+        return image + wave
 
     def contributions(self, point: OperatingPoint) -> Mapping[str, float]:
         """Return A^2 / 2, split between pixels and means of lines, and its covariances."""

@@ -1,6 +1,7 @@
 """Pink noise: 1/f noise of the amplifier along the order of read-out."""
 
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
@@ -57,11 +58,11 @@ class PinkNoise(Effect):
         lines = PixelGrid(-(-(length // 2 + 1) // columns), 2 * columns, Cfa.MONO)
         white = exposure.temporal.normal("pink_noise", lines, exposure.frame, exposure.threads)
         bins = white.reshape(-1).view(np.complex64)[: length // 2 + 1]
-        # Two standard normal parts of amplitude a add 4 a^2 / length^2 to the variance.
-        spectrum = bins * (np.sqrt(_power(length)) * length / 2).astype(np.float32)
-        series = np.float32(self.sigma_dn) * fft.irfft(spectrum, length)[: rows * columns]
+        bins *= _amplitudes(length)
+        series = fft.irfft(bins, length, overwrite_x=True)[: rows * columns]
         first, left = grid.first_row, grid.first_column
         part = series.reshape(rows, columns)[first : first + grid.rows, left : left + grid.columns]
+        part *= np.float32(self.sigma_dn)
         made: Image = image + part.reshape(*part.shape, *(1,) * (image.ndim - 2))
         return made
 
@@ -84,6 +85,17 @@ class PinkNoise(Effect):
 def _length(rows: int, columns: int) -> int:
     """Return the samples of the series: two frames, so that its ends do not meet."""
     return 2 * int(fft.next_fast_len(rows * columns, real=True))
+
+
+@lru_cache(maxsize=2)
+def _amplitudes(length: int) -> NDArray[np.float32]:
+    """Return what makes standard normal parts of each bin a series of variance 1.
+
+    Two parts of amplitude a add 4 a^2 / length^2 to the variance.
+    """
+    amplitudes: NDArray[np.float32] = (np.sqrt(_power(length)) * length / 2).astype(np.float32)
+    amplitudes.flags.writeable = False
+    return amplitudes
 
 
 def _power(length: int) -> NDArray[np.float64]:

@@ -56,7 +56,8 @@ class ReadoutMemory(Effect):
 
     def apply(self, image: Image, exposure: Exposure) -> Image:
         """Add the remembered noise."""
-        made, noise = image.copy(), np.float32(self.fraction) * (image - exposure.expected_dn)
+        made, noise = image.copy(), image - exposure.expected_dn
+        noise *= np.float32(self.fraction)
         k = self.lag_pixels
         if self.along == "rows":
             made[:, k:] += noise[:, :-k]

@@ -1,7 +1,7 @@
 """The locked frames: what they say of the base model, the final model and every effect."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
@@ -88,6 +88,8 @@ class Trial:
         The bank's numbers of all frames: a witness where single pixels see too little.
     seed
         Of everything random.
+    likely
+        Log-likelihoods by camera and signals: the final camera is asked again and again.
     """
 
     recording: Recording
@@ -95,6 +97,7 @@ class Trial:
     held: Held | None
     numbers: HeldNumbers
     seed: int
+    likely: dict[tuple[str, bytes], Loglik] = field(default_factory=dict)
 
     @classmethod
     def of(cls, recording: Recording, split: Split, source: Source, setting: Setting) -> "Trial":
@@ -110,13 +113,8 @@ class Trial:
             return {kind: Gained(nothing, certain=False) for kind in without}
         if not without:
             return {}
-        signals = final.calibrated.model.signals
-        held, jobs = self.held, self.numbers.setting.jobs
         cameras = [final.camera, *without.values()]
-        likely = partial(_loglik, held, signals, self.seed)
-        # Of large frames more would be sent to processes than is won.
-        spread = in_threads if self.numbers.setting.layout.large else each
-        whole, *rest = spread(likely, cameras, jobs)
+        whole, *rest = self._logliks(self.held, cameras, final.calibrated.model.signals)
         frames = sum(own.size for own in whole.frames.values())
         found = {}
         for (kind, camera), less in zip(without.items(), rest, strict=True):
@@ -127,6 +125,18 @@ class Trial:
                 if told is not None and told.certain:
                     found[kind] = Gained(_per_frame(told, self.numbers.frames), certain=True)
         return found
+
+    def _logliks(self, held: Held, cameras: Sequence[Camera], signals: Signals) -> list[Loglik]:
+        """Return the log-likelihood of the locked frames under each camera."""
+        light = b"".join(name.encode() + own.tobytes() for name, own in sorted(signals.items()))
+        keys = [(camera.model_dump_json(), light) for camera in cameras]
+        missing = {k: c for k, c in zip(keys, cameras, strict=True) if k not in self.likely}
+        likely = partial(_loglik, held, signals, self.seed)
+        # Of large frames more would be sent to processes than is won.
+        spread = in_threads if self.numbers.setting.layout.large else each
+        made = spread(likely, list(missing.values()), self.numbers.setting.jobs)
+        self.likely.update(zip(missing, made, strict=True))
+        return [self.likely[key] for key in keys]
 
     def proof(self, base: State, final: State, step: Callable[[], None], source: Source) -> Proof:
         """Return base and final model side by side."""

@@ -1,7 +1,7 @@
 """Pink noise: 1/f noise of the amplifier along the order of read-out."""
 
 from collections.abc import Mapping
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
@@ -12,6 +12,9 @@ from scipy import fft
 from dsis.cfa import Cfa
 from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, Stage
 from dsis.grid import PixelGrid
+from dsis.kept import Kept
+
+_SERIES = Kept(96 << 20)  # many cameras are simulated on the same draws; all frames of a proof fit
 
 
 class PinkNoise(Effect):
@@ -51,19 +54,10 @@ class PinkNoise(Effect):
 
     def apply(self, image: Image, exposure: Exposure) -> Image:
         """Add the series in the order of read-out."""
-        grid = exposure.grid
-        rows, columns = grid.sensor_shape
-        length = _length(rows, columns)
-        # Bin k of the spectrum is drawn at row k // columns: real part left, imaginary part right.
-        lines = PixelGrid(-(-(length // 2 + 1) // columns), 2 * columns, Cfa.MONO)
-        white = exposure.temporal.normal("pink_noise", lines, exposure.frame, exposure.threads)
-        bins = white.reshape(-1).view(np.complex64)[: length // 2 + 1]
-        bins *= _amplitudes(length)
-        series = fft.irfft(bins, length, overwrite_x=True)[: rows * columns]
-        first, left = grid.first_row, grid.first_column
-        part = series.reshape(rows, columns)[first : first + grid.rows, left : left + grid.columns]
-        part *= np.float32(self.sigma_dn)
-        made: Image = image + part.reshape(*part.shape, *(1,) * (image.ndim - 2))
+        key = exposure.temporal, exposure.frame, exposure.grid
+        series = _SERIES.of(key, partial(_series, exposure))
+        own = np.float32(self.sigma_dn) * series
+        made: Image = image + own.reshape(*own.shape, *(1,) * (image.ndim - 2))
         return made
 
     def contributions(self, point: OperatingPoint) -> Mapping[str, float]:
@@ -80,6 +74,22 @@ class PinkNoise(Effect):
             for k, v in zip(y, in_columns, strict=True)
         )
         return point.components(float(covariance[0]), row, column, frame)
+
+
+def _series(exposure: Exposure) -> NDArray[np.float32]:
+    """Return the series of variance 1 at the pixels of a frame: float32 (row, column)."""
+    grid = exposure.grid
+    rows, columns = grid.sensor_shape
+    length = _length(rows, columns)
+    # Bin k of the spectrum is drawn at row k // columns: real part left, imaginary part right.
+    lines = PixelGrid(-(-(length // 2 + 1) // columns), 2 * columns, Cfa.MONO)
+    white = exposure.temporal.normal("pink_noise", lines, exposure.frame, exposure.threads)
+    bins = white.reshape(-1).view(np.complex64)[: length // 2 + 1]
+    bins *= _amplitudes(length)
+    series = fft.irfft(bins, length, overwrite_x=True)[: rows * columns].reshape(rows, columns)
+    first, left = grid.first_row, grid.first_column
+    seen = series[first : first + grid.rows, left : left + grid.columns]
+    return np.array(seen, np.float32)  # a copy: the whole series is not kept
 
 
 def _length(rows: int, columns: int) -> int:

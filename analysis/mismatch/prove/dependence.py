@@ -33,7 +33,7 @@ def with_dependence(own: Residuals, base: Residuals, held: Held) -> Law:
         w = base.standardised(name, held)
         product = (q[1:] * q[:-1]).mean(0)
         # About the frames' mean: an error of the pattern is no memory of one frame.
-        seen, other = (((a - a.mean(0))[1:] * (a - a.mean(0))[:-1]).mean(0) for a in (q, w))
+        seen, other = ((a[1:] * a[:-1]).mean(0) for a in (q - q.mean(0), w - w.mean(0)))
         frames = len(q) - 1
         sums += frames * np.bincount(groups.reshape(-1), product.reshape(-1), GROUPS)
         sizes += frames * np.bincount(groups.reshape(-1), minlength=GROUPS)
@@ -61,7 +61,8 @@ def _scores(virtual: Residuals, name: str, held: Held) -> Image:
     made = []
     for u in virtual.standardised(name, held):
         p = below(virtual.law, name, u, virtual.sensed.groups, held)
-        made.append(ndtri(np.clip(p, _FARTHEST, 1 - _FARTHEST)).astype(np.float32))
+        np.clip(p, _FARTHEST, 1 - _FARTHEST, out=p)
+        made.append(ndtri(p, out=p).astype(np.float32))
     return np.stack(made)
 
 

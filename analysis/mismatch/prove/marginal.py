@@ -12,9 +12,7 @@ from analysis.mismatch.prove.shape import (
     EDGES,
     NORMAL,
     Shape,
-    counted,
-    interval_of,
-    moved,
+    Tally,
     shape_of,
 )
 from analysis.mismatch.prove.sites import site_places
@@ -112,26 +110,18 @@ def with_groups(own: Residuals, base: Residuals, held: Held) -> Law:
 def with_shapes(own: Residuals, base: Residuals, held: Held) -> Law:
     """Return the law with the shapes of standardised residuals."""
     many, many_base = (virtual.sensed.groups < CONSPICUOUS for virtual in (own, base))
-    both = many & many_base
     odd, odd_base = np.zeros(EDGES.size - 1), np.zeros(EDGES.size - 1)
     laws = dict(own.law.exposures)
     for e in held.exposures:
-        u, v = (
-            interval_of(virtual.standardised(e.name, held)).reshape(-1, *held.shape)
-            for virtual in (own, base)
-        )
+        u, v = (virtual.standardised(e.name, held) for virtual in (own, base))
         shapes = []
         for place in site_places(held.cfa):
-            one, other = u[:, *place], v[:, *place]
-            counts = counted(one[:, many[place]].reshape(-1))
-            base_counts = counted(other[:, many_base[place]].reshape(-1))
-            shared = both[place]
-            exchanged = moved(one[:, shared].reshape(-1), other[:, shared].reshape(-1))
-            shapes.append(shape_of(counts, base_counts, exchanged))
+            tally = Tally.of(u[:, *place], v[:, *place], many[place], many_base[place])
+            shapes.append(shape_of(tally.ordinary, tally.base_ordinary, tally.exchanged))
+            if not many.all():
+                odd += tally.odd
+                odd_base += tally.base_odd
         laws[e.name] = replace(laws[e.name], shapes=tuple(shapes))
-        if not many.all():
-            odd += counted(u[:, ~many].reshape(-1))
-            odd_base += counted(v[:, ~many_base].reshape(-1))
     few = odd.sum() < _LEAST_SCORES
     shape: Shape = NORMAL if few else shape_of(odd, odd_base, odd + odd_base)
     return replace(own.law, exposures=laws, pixels=replace(own.law.pixels, shape=shape))

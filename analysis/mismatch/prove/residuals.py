@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -33,10 +34,16 @@ class Residuals:
 
     def standardised(self, name: str, held: Held) -> Image:
         """Return residuals in units of their predicted standard deviation."""
-        pattern, groups = self.sensed.patterns[name], self.sensed.groups
-        variance = pixel_variance(self.law, name, pattern, groups, held)
-        sd = np.sqrt(variance).astype(np.float32)
-        return np.asarray(self.residuals[name] / sd, np.float32)
+        if name not in self._sds:
+            pattern, groups = self.sensed.patterns[name], self.sensed.groups
+            variance = pixel_variance(self.law, name, pattern, groups, held)
+            self._sds[name] = np.sqrt(variance).astype(np.float32)
+        return np.asarray(self.residuals[name] / self._sds[name], np.float32)
+
+    @cached_property
+    def _sds(self) -> dict[str, Image]:
+        """Predicted standard deviations that were asked for, by exposure."""
+        return {}
 
 
 def residuals_of(law: Law, held: Held, stacks: Mapping[str, Stack], seed: int) -> Residuals:

@@ -7,17 +7,21 @@ times a step function, beyond it is constant in each interval.
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr, pdtr, pdtrc
 
-from dsis.compiled import kernel
+from dsis.compiled import inlined, kernel
+from dsis.effects import Image
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 _OUTER = np.array([4.5, 5.0, 6.0, 8.0, 12.0, 20.0, 40.0, 80.0, 200.0])
 EDGES: Array = np.concatenate([-_OUTER[::-1], np.arange(-16, 17) / 4, _OUTER])
 _NORMAL: Array = np.diff(ndtr(EDGES))
+_MIDDLE = _OUTER.size + 16  # the interval that begins at 0
 _MANY = 10.0  # residuals expected in an interval, from which their number is nearly normal
 _SURE = 2.5  # standard errors of chi-squared below which departures count as none
 _CHANCE = 0.01  # probability of as many, or as few, below which an interval differs
@@ -64,26 +68,35 @@ class Shape:
 NORMAL = Shape(_NORMAL / _NORMAL.sum(), normal=True)
 
 
-def interval_of(residuals: NDArray[np.floating]) -> NDArray[np.intp]:
-    """Return the interval of each standardised residual; the last ones take all beyond."""
-    flat = residuals.reshape(-1)
-    # The many lie in intervals of 1 / 4.
-    near = np.floor(np.clip(flat, -4.25, 4.0) * 4)
-    found: NDArray[np.intp] = near.astype(np.intp) + (_OUTER.size + 16)
-    far = np.flatnonzero(np.abs(flat) >= 4)
-    found[far] = np.searchsorted(EDGES, np.clip(flat[far], -199.0, 199.0), side="right") - 1
-    return found
+@dataclass(frozen=True)
+class Tally:
+    """How many residuals of a sensor and of its base model's lie in each interval.
 
+    Attributes
+    ----------
+    ordinary, base_ordinary
+        Of ordinary pixels, by interval.
+    exchanged
+        How many came to each interval or left it, of pixels that are ordinary in both.
+    odd, base_odd
+        Of all other pixels.
+    """
 
-def counted(intervals: NDArray[np.intp]) -> Array:
-    """Return how many residuals lie in each interval."""
-    return np.bincount(intervals, minlength=EDGES.size - 1).astype(np.float64)
+    ordinary: Array
+    base_ordinary: Array
+    exchanged: Array
+    odd: Array
+    base_odd: Array
 
+    @classmethod
+    def of(cls, own: Image, base: Image, many: Mask, base_many: Mask) -> "Tally":
+        """Count standardised residuals (frame, row, column) of the same draws.
 
-def moved(own: NDArray[np.intp], base: NDArray[np.intp]) -> Array:
-    """Return how many residuals came to each interval or left it, of the same draws."""
-    other = own != base
-    return counted(own[other]) + counted(base[other])
+        `many` and `base_many` tell the ordinary pixels of each. The last intervals take all beyond.
+        """
+        counts = np.zeros((5, EDGES.size - 1), np.int64)
+        _count(own, base, many, base_many, EDGES, counts)
+        return cls(*counts.astype(np.float64))
 
 
 def shape_of(counts: Array, base_counts: Array, exchanged: Array) -> Shape:
@@ -120,6 +133,36 @@ def _sparse(expected: Array, difference: Array) -> Array:
     met = np.rint(np.maximum(expected + difference, 0))
     crowded = (met > 0) & (pdtrc(np.maximum(met - 1, 0), expected) < _CHANCE)
     return np.where(crowded, met, np.where(pdtr(met, expected) < _CHANCE, met + 1, expected))
+
+
+@inlined
+def _interval(u: Any, edges: Any) -> Any:
+    """Return the interval of a standardised residual; the last ones take all beyond."""
+    if abs(u) < np.float32(4):  # the many lie in intervals of 1 / 4
+        return int(np.floor(u * np.float32(4))) + _MIDDLE
+    last = edges.size - 2
+    k = 0
+    while k < last and u >= edges[k + 1]:
+        k += 1
+    return k
+
+
+@kernel
+def _count(
+    own: Image, base: Image, many: Mask, base_many: Mask, edges: Array, counts: NDArray[np.int64]
+) -> None:
+    frames, rows, columns = own.shape
+    for frame in range(frames):
+        for row in range(rows):
+            for column in range(columns):
+                one = _interval(own[frame, row, column], edges)
+                other = _interval(base[frame, row, column], edges)
+                here, there = many[row, column], base_many[row, column]
+                counts[0 if here else 3, one] += 1
+                counts[1 if there else 4, other] += 1
+                if here and there and one != other:
+                    counts[2, one] += 1
+                    counts[2, other] += 1
 
 
 @kernel

@@ -7,6 +7,7 @@ frame before, and a spectrum; `learning` finds them.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -102,6 +103,11 @@ class Law:
     patterns: tuple[Pattern, ...]
     pixels: Conspicuous
 
+    @cached_property
+    def least_dn2(self) -> float:
+        """The least variance of the base model in any pixel of any exposure."""
+        return min(float(e.variance_dn2.min()) for e in self.exposures.values())
+
 
 @dataclass(frozen=True)
 class Sensed:
@@ -162,14 +168,13 @@ def sense(
 def pixel_variance(law: Law, exposure: str, pattern: Array, groups: Groups, held: Held) -> Array:
     """Return the predictive variance of each pixel, DN^2."""
     own = law.exposures[exposure]
-    least = min(float(e.variance_dn2.min()) for e in law.exposures.values())
     factor = spread_over(own.factor, held.shape, held.cfa)
     variance = own.variance_dn2 * factor
     if own.growth_dn.any():
         grown = variance + spread_over(own.growth_dn, held.shape, held.cfa) * pattern
         variance = np.maximum(grown, 0.1 * variance)
     if law.pixels.excess.any():
-        share = least / own.variance_dn2
+        share = law.least_dn2 / own.variance_dn2
         variance = variance * np.maximum(1 + law.pixels.excess[groups] * share, 0.05)
     odd = law.pixels.outlier_factor.get(exposure, 1.0)
     return np.where(groups == OUTLIER, variance * odd, variance)

@@ -81,11 +81,10 @@ def _growth(squares: Image, pattern: Array, variance: float) -> float:
 
 def with_groups(own: Residuals, base: Residuals, held: Held) -> Law:
     """Return the law with the variances of groups of pixels."""
-    least = min(float(e.variance_dn2.min()) for e in own.law.exposures.values())
     excess, odd = np.zeros(GROUPS), {}
     sums = np.zeros((2, 2, GROUPS))  # of both sensors: excess, its weight
     for e in held.exposures:
-        share = least / own.law.exposures[e.name].variance_dn2
+        share = own.law.least_dn2 / own.law.exposures[e.name].variance_dn2
         for k, virtual in enumerate((own, base)):
             groups = virtual.sensed.groups.reshape(-1)
             square = virtual.standardised(e.name, held) ** 2

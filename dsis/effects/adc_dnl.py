@@ -100,9 +100,9 @@ def _convert(
         return
     for i in range(signal.size):
         v = signal[i] + black
-        code = min(max(int(np.rint(v)), 0), int(last))
-        while code > 0 and v < edges[code]:
-            code -= 1
-        while code < last and v >= edges[code + 1]:
-            code += 1
-        out[i] = np.float32(code) - black
+        found = min(max(int(np.rint(v)), 0), int(last))
+        while found > 0 and v < edges[found]:
+            found -= 1
+        while found < last and v >= edges[found + 1]:
+            found += 1
+        out[i] = np.float32(found) - black

@@ -1,6 +1,6 @@
 """What a camera's own effects add to the level and the variance of every exposure."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 from itertools import islice
 
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from analysis.mismatch.bank.bulk import Bulk
 from analysis.mismatch.basefit import Offsets
-from analysis.mismatch.layout import Layout, Place
+from analysis.mismatch.layout import Layout, Place, Taken
 from analysis.mismatch.model import Model, each
 from dsis.camera import Camera
 from dsis.compiled import kernel
@@ -20,10 +20,9 @@ _BENT = frozenset({"level", "pixel_variance"})
 _SAMPLES = 6e6  # of which both are known well enough, in all replicates
 _REPLICATES = 3
 _FRAMES = 8  # of an exposure: more show neither better
+_PARTS = 4  # of a recording, simulated side by side
 Pair = tuple[float, float]
 """Level and variance."""
-Three = tuple[float, float, float]
-"""Level, variance, and the variance of the bulk."""
 
 
 def bends(effects: Iterable[Effect], bending: frozenset[str] = _BENT) -> bool:
@@ -49,31 +48,45 @@ def bending_offsets(
     samples *= layout.rows * layout.columns
     replicates = min(_REPLICATES, 1 + int(_SAMPLES // samples))
 
-    work = [(camera, replicate) for replicate in range(replicates) for camera in cameras]
-    made = each(partial(_levels, model, layout, seed), work, jobs)
+    parts = [layout.uniform[i::_PARTS] for i in range(_PARTS)]
+    work = [
+        (camera, replicate, part)
+        for replicate in range(replicates)
+        for part in parts
+        for camera in cameras
+    ]
+    made = each(partial(_levels, model, layout, seed, spiky=spiky), work, jobs)
     pairs = list(zip(made[::2], made[1::2], strict=True))
 
     def change(which: int) -> dict[Place, float]:
-        return {
-            place: float(np.mean([a[place][which] - b[place][which] for a, b in pairs]))
-            for place in made[0]
-        }
+        found: dict[Place, list[float]] = {}
+        for with_effects, without in pairs:
+            for place, one in with_effects.items():
+                found.setdefault(place, []).append(one[which] - without[place][which])
+        return {place: float(np.mean(changes)) for place, changes in found.items()}
 
-    return Offsets(change(0), change(1), bulk_dn2=change(2))
+    return Offsets(change(0), change(1), bulk_dn2=change(2) if spiky else {})
 
 
 def _levels(
-    model: Model, layout: Layout, seed: int, work: tuple[Camera, int]
-) -> Mapping[Place, Three]:
+    model: Model,
+    layout: Layout,
+    seed: int,
+    work: tuple[Camera, int, Sequence[Taken]],
+    *,
+    spiky: bool,
+) -> Mapping[Place, tuple[float, ...]]:
     """Return level and variances that a camera's effects give, of one simulated recording."""
-    camera, replicate = work
+    camera, replicate, exposures = work
     frames_of = model.with_camera(camera).frames(layout, replicate, seed)
-    found: dict[Place, Three] = {}
-    for e in layout.uniform:
-        many = Bulk.of(layout, e.name)
-        pairs = _pairs(layout, many.watching(islice(frames_of(e.name), _FRAMES)))
+    found: dict[Place, tuple[float, ...]] = {}
+    for e in exposures:
+        frames: Iterable[NDArray[np.generic]] = islice(frames_of(e.name), _FRAMES)
+        many = Bulk.of(layout, e.name) if spiky else None
+        pairs = _pairs(layout, frames if many is None else many.watching(frames))
         for channel, pair in pairs.items():
-            found[e.name, channel] = (*pair, many.variance_dn2(channel, pair[1]))
+            bulk = () if many is None else (many.variance_dn2(channel, pair[1]),)
+            found[e.name, channel] = (*pair, *bulk)
     return found
 
 

@@ -33,7 +33,7 @@ Array = NDArray[np.float64]
 Simulated = Callable[[str], Iterable[NDArray[np.generic]]]
 _SIMULATIONS = 16
 _FEW = 5  # where simulations are large
-_MOST_KEPT = 2.5e8  # samples, of two bytes
+_MOST_KEPT = 8e7  # samples of simulated frames, two bytes each
 
 
 @dataclass(frozen=True)

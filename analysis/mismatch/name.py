@@ -79,7 +79,8 @@ class Search:
         self.memory, self.refused, self.tied = Memory(), {}, {}
         for named in [n for n in self.named if n.kind in _CHOSEN]:
             self.named.remove(named)
-            state = State.of(self.setting, self.without(state, named), self.step, draft=True)
+            bare = self.without(state, named)
+            state = State.of(self.setting, bare, self.step, draft=True, near=state)
         lines = [frequency_of(n.proposal.effect) for n in self.named if n.proposal is not None]
         self.settled = [(kind, f) for f in lines if f is not None for kind in sorted(LINES)]
         self.rough = bool(self.named)
@@ -133,7 +134,7 @@ class Search:
                     continue
             self._take(added[0])
             self.rough |= added[0].gain >= _WEAK
-            state = State.of(self.setting, added[1], self.step, draft=True)
+            state = State.of(self.setting, added[1], self.step, draft=True, near=state)
         if not state.mismatches:
             self.ties = []  # what was undecided on the way is explained
             self.doubted = {}
@@ -163,7 +164,9 @@ class Search:
             n if n.proposal is None else renewed(n, n.proposal, *next(fitted)) for n in self.named
         ]
         camera = with_effects(bare, effects)
-        return state if camera is None else State.of(self.setting, camera, self.step)
+        if camera is None:
+            return state
+        return State.of(self.setting, camera, self.step, near=state)
 
     def without(self, state: State, named: Named) -> Camera:
         """Return a state's camera without one of the effects named."""
@@ -182,13 +185,19 @@ class Search:
             return camera  # levels and variances know nothing of it
         own = self.setting
         model = calibrate(
-            camera, own.layout, own.seen, own.interpolated, seed=own.seed, jobs=own.jobs
+            camera,
+            own.layout,
+            own.seen,
+            own.interpolated,
+            seed=own.seed,
+            jobs=own.jobs,
+            near=state.calibrated,
         )
         return model.model.camera
 
     def drop(self, state: State, named: Named, why: str) -> State:
         """Return the state without an effect, which is refused from now on."""
-        bare = State.of(self.setting, self.without(state, named), self.step)
+        bare = State.of(self.setting, self.without(state, named), self.step, near=state)
         return self._dropped(bare, named, why)
 
     def _dropped(self, bare: State, named: Named, why: str) -> State:
@@ -323,7 +332,7 @@ class Search:
         ]
         camera = with_effects(bare, polished.effects)
         if camera is not None:
-            self.polished = State.of(self.setting, camera, self.step)
+            self.polished = State.of(self.setting, camera, self.step, near=state)
         return self.polished
 
     def _slopes(self, state: State) -> Callable[[Effect], Predictor]:
@@ -349,7 +358,7 @@ class Search:
             worst = worst or judge.needless([n for n in self.named if n.name not in needed])
             if worst is None:
                 break
-            bare = State.of(self.setting, self.without(state, worst[0]), self.step)
+            bare = State.of(self.setting, self.without(state, worst[0]), self.step, near=state)
             if worst[1] == NEEDLESS and opened(state, bare):
                 needed.add(worst[0].name)
                 continue

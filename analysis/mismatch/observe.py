@@ -143,8 +143,8 @@ class _Channel:
 class _Whole:
     """Sums over exposures of what all channels of the sensor show together."""
 
-    def __init__(self, layout: Layout, *, keep: bool) -> None:
-        self.layout, self.keep = layout, keep
+    def __init__(self, layout: Layout, *, samples: bool) -> None:
+        self.layout, self.samples = layout, samples
         self.mosaic = len(layout.sites) > 1
         self.shape = (layout.rows, layout.columns)
         self.common: dict[str, Mapping[str, Number]] = {}
@@ -156,7 +156,7 @@ class _Whole:
         self, exposure: str, frames: int, seen: Iterable[NDArray[np.generic]], *, still: bool
     ) -> Measured:
         """Return the measures of an exposure's frames; take what moves in them, unless `still`."""
-        lines, after = Waves(self.shape), CarryOver(keep=self.keep)
+        lines, after = Waves(self.shape), CarryOver(keep=self.samples)
         found = measure(self.layout, after.watching(lines.watching(seen)))
         self.memory.add(after, still=still)
         if not still:
@@ -183,7 +183,12 @@ class _Whole:
 
 
 def observe(
-    layout: Layout, frames_of: Frames, watch: Watcher | None = None, *, keep: bool = False
+    layout: Layout,
+    frames_of: Frames,
+    watch: Watcher | None = None,
+    *,
+    keep: bool = False,
+    samples: bool = True,
 ) -> Observation:
     """Return the observation of a recording.
 
@@ -196,12 +201,14 @@ def observe(
     watch
         Sees the measures of every exposure on their way.
     keep
-        Whether to keep the maps.
+        Whether to keep the maps, and of samples those before them.
+    samples
+        Whether to keep the latter, if anything.
     """
     levels: dict[Place, Level] = {}
     found: dict[Place, Mapping[str, Number]] = {}
     sums: dict[str, _Channel] = {}
-    whole = _Whole(layout, keep=keep)
+    whole = _Whole(layout, samples=keep and samples)
     for exposure in layout.uniform:
         many, frames = Bulk.of(layout, exposure.name), len(exposure.numbers)
         still = {name for name in layout.channels if (exposure.name, name) in layout.still}

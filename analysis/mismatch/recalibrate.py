@@ -42,6 +42,10 @@ class Calibrated:
         What rounding, clipping and the camera's own effects add.
     switches
         Where read-out segments change, DN above black.
+    left_out
+        Exposures that were not fitted.
+    bent
+        What the camera's own effects add, of the offsets.
     """
 
     model: Model
@@ -50,6 +54,7 @@ class Calibrated:
     offsets: Offsets
     switches: tuple[float, ...]
     left_out: frozenset[str]
+    bent: Offsets
 
     def refit(self, layout: Layout, levels: Mapping[Place, Level]) -> BaseFit:
         """Return the base numbers of another observation, fitted in the same way."""
@@ -73,15 +78,20 @@ def calibrate(
     *,
     seed: int,
     jobs: int,
+    near: Calibrated | None = None,
 ) -> Calibrated:
-    """Return the base model with its numbers fitted to an observation."""
+    """Return the base model with its numbers fitted to an observation.
+
+    `near` is a model of the same observation with much the same effects: a start.
+    """
     switches = tuple(s.upper_dn for s in camera.noise.segment if s.upper_dn is not None)
     left_out = frozenset([interpolated] if interpolated else [])
     start = camera.black_level - layout.black_dn
     slopes = [s.slope for s in camera.noise.segment]
     spiky = _spiky(seen.levels)
     undone = _undone(layout, seen.levels, code_step(camera), spiky=spiky)
-    effects = Offsets()
+    bending = spiky or bends(camera.effect)
+    effects = near.bent if near is not None and bending else Offsets()
 
     def fitted(
         offsets: Offsets, at: tuple[float, ...], levels: Mapping[Place, Level] = seen.levels
@@ -91,7 +101,7 @@ def calibrate(
         )
 
     before: BaseFit | None = None
-    for _ in range(_ROUNDS if spiky or bends(camera.effect) else 1):
+    for _ in range(_ROUNDS if bending else 1):
         recorded = _sum(undone, effects)
         fit = fitted(recorded, switches)
         if before is not None and _same(before, fit, seen.levels):
@@ -107,7 +117,7 @@ def calibrate(
     if layout.scenes:
         model = with_pictures(model, layout, fit, effects, seed=seed + 1, jobs=jobs)
     offsets = _sum(_rounding(model, layout, fit, spiky=spiky), effects)
-    return Calibrated(model, fit, fitted(offsets, switches), offsets, switches, left_out)
+    return Calibrated(model, fit, fitted(offsets, switches), offsets, switches, left_out, effects)
 
 
 def _same(one: BaseFit, other: BaseFit, levels: Mapping[Place, Level]) -> bool:

@@ -99,12 +99,22 @@ class State:
         progress: Callable[[], None],
         *,
         draft: bool = False,
+        near: "State | None" = None,
     ) -> "State":
-        """Return the state of a camera after its base numbers were fitted again."""
+        """Return the state of a camera after its base numbers were fitted again.
+
+        `draft`: from fewer simulations. `near` has much the same camera: a start for its numbers.
+        """
         nulls = setting.drafts if draft else setting.nulls
         layout, seen = setting.layout, setting.seen
         calibrated = calibrate(
-            camera, layout, seen, setting.interpolated, seed=setting.seed, jobs=setting.jobs
+            camera,
+            layout,
+            seen,
+            setting.interpolated,
+            seed=setting.seed,
+            jobs=setting.jobs,
+            near=None if near is None else near.calibrated,
         )
         vectors, fits = [], []
         for first in range(0, nulls, setting.jobs):

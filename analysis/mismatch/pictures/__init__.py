@@ -1,14 +1,16 @@
 """What a diagnosis draws: the recording beside simulations of both models."""
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 import scipy.stats
 
 from analysis.mismatch.bank.carryover import AXES
 from analysis.mismatch.evidence import Evidence
+from analysis.mismatch.layout import Layout
 from analysis.mismatch.locate import FAMILY, shares
-from analysis.mismatch.model import in_threads
+from analysis.mismatch.model import Model, each, in_threads
 from analysis.mismatch.observe import Observation, observe
 from analysis.mismatch.pictures.album import Album
 from analysis.mismatch.pictures.carried import carried
@@ -44,7 +46,8 @@ def evidence_of(
     """
     layout, seen = base.setting.layout, base.setting.seen
     named = final.camera != base.camera
-    before, *rest = _simulated([base, final] if named else [base])
+    axes = _carrying(base)
+    before, *rest = _simulated([base, final] if named else [base], samples=bool(axes))
     after = rest[0] if rest else []
     first, later = ([album for album, _ in some] for some in (before, after))
     least = threshold_z(base)
@@ -52,7 +55,7 @@ def evidence_of(
     names = {map_name(NOISY), *(one.map for one in shown.values())}
     return Evidence(
         curves=curves(base, final if named else None)
-        | carried(_carrying(base), seen, *([one for _, one in some] for some in (before, after))),
+        | carried(axes, seen, *([one for _, one in some] for some in (before, after))),
         maps=maps(layout, names, seen, before[0][1], after[0][1] if after else None),
         shown_in=shown,
         spectra=spectra(album, first[:1], later[:1]),
@@ -100,19 +103,24 @@ def threshold_z(state: State) -> float:
     return float(scipy.stats.t.isf(chance / 2, null.degrees))
 
 
-def _simulated(states: Sequence[State]) -> list[list[Simulated]]:
-    """Return the simulated recordings of each state, observed as the recording was."""
+def _simulated(states: Sequence[State], *, samples: bool) -> list[list[Simulated]]:
+    """Return the simulated recordings of each state, observed as the recording was.
+
+    `samples`: with those read before each.
+    """
     setting = states[0].setting
     layout = setting.layout
-    samples = sum(len(e.numbers) for e in layout.uniform) * layout.rows * layout.columns
-    replicates = _REPLICATES if samples <= _LARGE else 1
+    replicates = _REPLICATES if layout.samples <= _LARGE else 1
 
-    def one(job: tuple[State, int]) -> Simulated:
-        state, replicate = job
-        album = Album(layout)
-        frames = state.calibrated.model.frames(layout, replicate, setting.seed)
-        return album, observe(layout, frames, album, keep=True)
-
-    jobs = [(state, replicate) for state in states for replicate in range(replicates)]
-    done = in_threads(one, jobs, setting.jobs)
+    work = partial(_one, layout, setting.seed, samples)
+    jobs = [(state.calibrated.model, number) for state in states for number in range(replicates)]
+    # More samples would be sent between processes than is won.
+    done = (in_threads if samples else each)(work, jobs, setting.jobs)
     return [done[i : i + replicates] for i in range(0, len(done), replicates)]
+
+
+def _one(layout: Layout, seed: int, samples: bool, job: tuple[Model, int]) -> Simulated:
+    model, replicate = job
+    album = Album(layout)
+    frames = model.frames(layout, replicate, seed)
+    return album, observe(layout, frames, album, keep=True, samples=samples)

@@ -95,6 +95,17 @@ def needed(camera: Camera, start: Sequence[Proposal]) -> list[Camera | None]:
     return [with_effects(camera, effects), *moved]
 
 
+def stepped(predictor: Predictor, camera: Camera, start: Sequence[Proposal]) -> Camera | None:
+    """Return the camera after the first whole step of a polish, which asks for it next."""
+    effects, free = tuple(p.effect for p in start), free_of(start)
+    built = with_effects(camera, effects)
+    if built is None or not free:
+        return None
+    step, _, promised = _newton(predictor, camera, effects, free, predictor.mean(built), None)
+    own = _moved_by(effects, free, step) if promised >= _SMALL else None
+    return None if own is None else with_effects(camera, own)
+
+
 def _newton(
     predictor: Predictor,
     camera: Camera,
@@ -174,11 +185,7 @@ def _along(
 ) -> tuple[tuple[Effect, ...], Array, float] | None:
     """Return effects, numbers and likelihood after the longest of three steps that gains."""
     for shrink in (1.0, 0.4, 0.15):
-        own: tuple[Effect, ...] | None = effects
-        for (i, name, signed), delta in zip(free, step * shrink, strict=True):
-            limited = delta if signed else float(np.clip(delta, -_LARGEST, _LARGEST))
-            changed = None if own is None else moved(own, i, name, signed, limited, as_is=True)
-            own = None if changed is None else changed[0]
+        own = _moved_by(effects, free, step * shrink)
         built = None if own is None else with_effects(camera, own)
         if own is None or built is None:
             continue
@@ -187,6 +194,18 @@ def _along(
         if value > best:
             return own, mean, value
     return None
+
+
+def _moved_by(
+    effects: tuple[Effect, ...], free: Sequence[Free], step: Array
+) -> tuple[Effect, ...] | None:
+    """Return the effects with all free parameters moved; None where a value is not allowed."""
+    own: tuple[Effect, ...] | None = effects
+    for (i, name, signed), delta in zip(free, step, strict=True):
+        limited = delta if signed else float(np.clip(delta, -_LARGEST, _LARGEST))
+        changed = None if own is None else moved(own, i, name, signed, limited, as_is=True)
+        own = None if changed is None else changed[0]
+    return own
 
 
 def moved(

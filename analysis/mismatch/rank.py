@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from analysis.mismatch.candidates import CANDIDATES, Proposal
 from analysis.mismatch.instance import Frequency, frequency_of, instance, same_line
-from analysis.mismatch.polish import Polished, needed, polish, with_effects
+from analysis.mismatch.polish import Polished, needed, polish, stepped, with_effects
 from analysis.mismatch.state import Setting, State
 from dsis.effects import Effect
 
@@ -129,9 +129,14 @@ def ranked(
     best = max((value for value, _, _ in tried), default=0.0)
     far = max(_FAR, _SHARE * (best - before))
     likely = _likely(tried, best - far)
+    by_count: dict[int, list[Proposal]] = {}
     for start in likely:
-        asked = state.predictor(replicates_for(state.setting, [start.effect]))
-        asked.ready(needed(state.camera, [start]))
+        by_count.setdefault(replicates_for(state.setting, [start.effect]), []).append(start)
+    for count, starts in by_count.items():
+        asked = state.predictor(count)
+        asked.ready(camera for start in starts for camera in needed(state.camera, [start]))
+        if state.setting.jobs > 1 and len(starts) > 1:
+            asked.ready(stepped(asked, state.camera, [start]) for start in starts)
     found: list[tuple[str, Proposal, Polished]] = []
     for value, kind, proposal in tried:
         kinds_so_far = {one[0] for one in found}

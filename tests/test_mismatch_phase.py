@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from analysis.mismatch.phase import WholeFrames, aliases, keeps_phase, strongest
+from analysis.mismatch.phase import WholeFrames, aliases, keeps_phase, look, strongest
 from dsis.effects.bistable_pattern import BistablePattern
 from dsis.effects.dsnu import Dsnu
 from dsis.effects.periodic_noise import PeriodicNoise
@@ -24,7 +24,9 @@ LAYOUT: Any = SimpleNamespace(
 )
 
 
-def _frames(frequency: tuple[float, float], free: bool, frames: int = FRAMES) -> FramesOf:
+def _frames(
+    frequency: tuple[float, float], free: bool, frames: int = FRAMES, amplitude: float = 0.4
+) -> FramesOf:
     y, x = np.arange(ROWS)[:, np.newaxis], np.arange(COLUMNS)
 
     def of(name: str) -> Iterator[NDArray[np.float64]]:
@@ -33,7 +35,7 @@ def _frames(frequency: tuple[float, float], free: bool, frames: int = FRAMES) ->
         for _ in range(frames):
             phase = rng.uniform(0, 1) if free else 0.5 * rng.integers(2)
             wave = np.cos(2 * np.pi * (frequency[0] * x + frequency[1] * y + phase))
-            yield 100 + fixed + 0.4 * SD * wave + rng.normal(0, SD, (ROWS, COLUMNS))
+            yield 100 + fixed + amplitude * SD * wave + rng.normal(0, SD, (ROWS, COLUMNS))
 
     return of
 
@@ -68,7 +70,7 @@ def test_a_mean_is_no_line() -> None:
 
 
 @pytest.mark.parametrize("free", [True, False])
-def test_a_line_is_denied_as_the_kind_that_it_is_not_and_frames_are_read_once(free: bool) -> None:
+def test_a_line_is_denied_as_the_kind_that_it_is_not_and_asked_for_once(free: bool) -> None:
     frames, read = _frames((0.11, -0.23), free, 40), []
 
     def reading(name: str) -> Iterator[NDArray[np.float64]]:
@@ -83,7 +85,7 @@ def test_a_line_is_denied_as_the_kind_that_it_is_not_and_frames_are_read_once(fr
     for _ in range(2):
         assert whole.denial(right) is None
         assert words in str(whole.denial(wrong))
-    assert read == ["dark", "flat"]
+    assert read == ["dark", "flat"] * 2  # the line itself, and what is beside it
 
 
 def test_of_a_mosaic_only_the_alias_that_whole_frames_show_is_possible() -> None:
@@ -95,3 +97,52 @@ def test_of_a_mosaic_only_the_alias_that_whole_frames_show_is_possible() -> None
     no_line = Dsnu(kind="dsnu", sigma_dn=1.0)
     assert whole.shown(no_line)
     assert whole.denial(no_line) is None
+
+
+@pytest.mark.parametrize("free", [True, False])
+def test_the_phase_of_a_weak_line_is_told_by_its_likelihood(free: bool) -> None:
+    """Of 36 samples of noise power 1 and a line of 1.5 the squares alone say too little."""
+    f = (0.11, -0.23)
+    told = [look(LAYOUT, _frames(f, free, n, amplitude=0.045), f) for n in range(36, 46)]
+    assert all(not one.absent and not one.broad for one in told)
+    kept = [one.kept for one in told]
+    assert free not in kept
+    assert kept.count(not free) >= 8
+
+
+def test_noise_holds_no_line() -> None:
+    """The largest of all bins is what chance does: it is not one too often."""
+    frames = [_frames((0.11, -0.23), True, 20, amplitude=0.0)(name) for name in ("dark", "flat")]
+    stack = np.stack([np.stack(list(one)) for one in frames])
+    of = dict(zip(("dark", "flat"), stack, strict=True))
+    centred = stack - stack.mean((1, 2, 3), keepdims=True)
+    centred -= centred.mean(1, keepdims=True)
+    power = (np.abs(np.fft.fft2(centred)) ** 2).sum((0, 1))
+    power[0, 0] = 0
+    y, x = np.unravel_index(power.argmax(), power.shape)
+    assert look(LAYOUT, lambda name: iter(of[name]), (x / COLUMNS, y / ROWS)).absent
+
+
+@pytest.mark.parametrize("row_noise", [0.0, 0.3])
+def test_a_band_is_no_line_and_a_line_beside_noise_of_rows_is(row_noise: float) -> None:
+    """Slow waves of rows raise the bins beside the highest; row noise raises all bins alike."""
+
+    def frames(band: bool) -> FramesOf:
+        def of(name: str) -> Iterator[NDArray[np.float64]]:
+            rng = np.random.default_rng([6, len(name)])
+            for _ in range(20):
+                f = np.arange(1, 7) if band else np.array([3])
+                parts = rng.normal(size=(2, f.size)) / np.sqrt(f if band else 1)
+                turns = 2 * np.pi * np.arange(ROWS)[:, np.newaxis] * f / ROWS
+                lines = (np.cos(turns) * parts[0] + np.sin(turns) * parts[1]).sum(1)
+                lines = lines + row_noise * rng.normal(size=ROWS)
+                yield lines[:, np.newaxis] + rng.normal(0, SD, (ROWS, COLUMNS))
+
+        return of
+
+    at = (0.0, 3 / ROWS)
+    assert look(LAYOUT, frames(band=True), (0.0, 1 / ROWS)).broad
+    assert look(LAYOUT, frames(band=True), at).broad
+    seen = look(LAYOUT, frames(band=False), at)
+    assert not seen.absent
+    assert not seen.broad

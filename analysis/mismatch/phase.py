@@ -1,13 +1,17 @@
-"""What whole frames say of a line: its phase from frame to frame, and which alias it is.
+"""What whole frames say of a line: that it is there, its phase, and which alias it is.
 
 The frames are projected on the pattern. A pattern whose sign alone changes gives numbers on one
 line through zero of the complex plane, free phases give a circle: |sum c^2| / sum |c|^2 is 1 or 0.
+Where noise hides that, the likelihoods of both decide. In white noise |c|^2 is exponential, so that
+the chance of the largest of all frequencies is known.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
+import scipy.special
+import scipy.stats
 from numpy.typing import NDArray
 
 from analysis.mismatch.instance import Frequency, frequency_of, same_line
@@ -18,11 +22,21 @@ FramesOf = Callable[[str], Iterable[NDArray[np.generic]]]
 _ONE_LINE, _CIRCLE = 0.75, 0.45
 _LEAST = 8  # frames, to tell
 _CLEAR = 8.0  # standard errors of the noise's power from which a line's phase is seen
+_SURE = 3.0  # of log-likelihood, to prefer one kind of phase
+_PHASES = 48  # of half a turn that are tried
 _ASIDE = 3  # bins to the neighbours that say what is around
-_PHASES = {
+_NEAR = (-2, -1, 1, 2)  # bins to those that a line leaves as they are
+_FAR = (-23, -17, -13, -9, 9, 13, 17, 23)  # bins to those that say what lines have in common
+_BETWEEN = (-1 / 3, 0.0, 1 / 3)  # bins by which a frequency may be off
+_CHANCE = 0.05  # of a line as strong among all frequencies
+_RAISED, _SHARE = 4.0, 0.3  # standard errors, and of the line's power, from which neighbours are
+_FEW = 8  # multiples of a quarter, at which patterns of single pixels lie
+_PHASE_WORDS = {
     "periodic_noise": "the pattern's phase is the same in all frames but for its sign",
     "bistable_pattern": "the pattern's phase is another in every frame",
 }
+_ABSENT = "whole frames show no more of it than chance does at one of all frequencies"
+_BROAD = "frequencies beside it are raised as well: it is no line"
 
 
 @dataclass(frozen=True)
@@ -38,7 +52,7 @@ class WholeFrames:
     layout: Layout
     frames_of: FramesOf
     _shown: dict[Frequency, bool] = field(default_factory=dict)
-    _kept: dict[Frequency, bool | None] = field(default_factory=dict)
+    _looks: dict[Frequency, "Look"] = field(default_factory=dict)
 
     def shown(self, effect: Effect) -> bool:
         """Return whether an effect is no line of a mosaic, or the one that whole frames show."""
@@ -54,21 +68,83 @@ class WholeFrames:
         return self._shown[wrapped]
 
     def denial(self, effect: Effect) -> str | None:
-        """Return why a line's phase says that it is of the other kind; None: it does not.
+        """Return why an effect is no line, or one of the other kind of phase; None: it may be.
 
         Interference and a bistable pattern are alike in power.
         """
         frequency = frequency_of(effect)
         if frequency is None:
             return None
-        if frequency not in self._kept:
-            self._kept[frequency] = keeps_phase(self.layout, self.frames_of, frequency)
-        kept = self._kept[frequency]
-        return (
-            None
-            if kept is None or kept == (effect.kind == "bistable_pattern")
-            else (_PHASES[effect.kind])
-        )
+        if frequency not in self._looks:
+            self._looks[frequency] = look(self.layout, self.frames_of, frequency)
+        seen = self._looks[frequency]
+        if seen.absent:
+            return _ABSENT
+        if seen.broad:
+            return _BROAD
+        if seen.kept is None or seen.kept == (effect.kind == "bistable_pattern"):
+            return None
+        return _PHASE_WORDS[effect.kind]
+
+
+@dataclass(frozen=True)
+class Look:
+    """What whole frames show at a frequency.
+
+    Attributes
+    ----------
+    absent
+        Whether no more stands out than chance does at one of all frequencies.
+    broad
+        Whether frequencies beside it are raised as well.
+    kept
+        Whether the phase is kept but for its sign; None where the frames cannot tell.
+    """
+
+    absent: bool
+    broad: bool
+    kept: bool | None
+
+
+def look(layout: Layout, frames_of: FramesOf, frequency: Frequency) -> Look:
+    """Return what whole frames show at a frequency, cycles per pixel along x and y."""
+    fx, fy = frequency
+    columns, rows = layout.columns, layout.rows
+    # Stripes and checkerboards of single pixels lie where they lie.
+    exact = all((4 * f) % 1 == 0 for f in frequency)
+    steps = (0.0,) if exact else _BETWEEN
+    tried = [(fx + u / columns, fy + w / rows) for u in steps for w in steps]
+    power = _Power.of(layout, _projections(layout, frames_of, tried))
+    if power.frames < _LEAST:
+        return Look(absent=False, broad=False, kept=None)
+    best = int(power.excess.argmax())
+    own, (fx, fy) = power.at([best]), tried[best]
+    if exact:
+        return Look(own.chance * _FEW > _CHANCE, broad=False, kept=own.keeps_phase())
+    axes = [
+        [(fx + k / columns, fy) for k in (*_NEAR, *_FAR)],
+        [(fx, fy + k / rows) for k in (*_NEAR, *_FAR)],
+    ]
+    around = _Power.of(layout, _projections(layout, frames_of, [f for axis in axes for f in axis]))
+    count = len(axes[0])
+    # What rows or columns have in common is noise beside which a line must stand out.
+    ground = max(
+        float(np.median(around.excess[i * count + len(_NEAR) : (i + 1) * count])) for i in (0, 1)
+    )
+    own, around = own.above(ground), around.above(ground)
+    absent = own.chance * rows * columns / 2 > _CHANCE
+    broad = False
+    for i, axis in enumerate(axes):
+        # The mean of a frame is no neighbour.
+        some = [
+            i * count + k
+            for k, f in enumerate(axis[: len(_NEAR)])
+            if abs(f[0]) * columns > 0.5 or abs(f[1]) * rows > 0.5
+        ]
+        mean = float(around.excess[some].mean())
+        raised = mean / around.error * np.sqrt(len(some)) > _RAISED
+        broad |= bool(raised) and mean > _SHARE * float(own.excess[0])
+    return Look(absent, broad, own.keeps_phase())
 
 
 def keeps_phase(layout: Layout, frames_of: FramesOf, frequency: Frequency) -> bool | None:
@@ -83,16 +159,95 @@ def keeps_phase(layout: Layout, frames_of: FramesOf, frequency: Frequency) -> bo
     frequency
         Cycles per pixel along x and y.
     """
-    total, size, count = 0j, 0.0, 0
-    for found in _projections(layout, frames_of, [frequency]):
-        total += complex((found**2).sum())
-        free = len(found) - 1
-        size += float((np.abs(found) ** 2).sum()) - free  # noise has no phase to keep
-        count += free
-    if count < _LEAST or size < _CLEAR * np.sqrt(count):
-        return None
-    share = abs(total) / size
-    return True if share > _ONE_LINE else (False if share < _CIRCLE else None)
+    return _Power.of(layout, _projections(layout, frames_of, [frequency])).keeps_phase()
+
+
+@dataclass(frozen=True)
+class _Power:
+    """Projections of frames on patterns, and the power beyond white noise.
+
+    Attributes
+    ----------
+    found
+        Of each exposure: (frame, frequency), noise at 1.
+    weights
+        Of each exposure: one over its variance, DN^-2.
+    """
+
+    found: tuple[NDArray[np.complex128], ...]
+    weights: tuple[float, ...]
+
+    @classmethod
+    def of(cls, layout: Layout, projections: Iterator[NDArray[np.complex128]]) -> "_Power":
+        weights = tuple(
+            1 / float(np.mean([layout.variance_dn2[e.name, c] for c in layout.channels]))
+            for e in layout.uniform
+        )
+        return cls(tuple(projections), weights)
+
+    def at(self, which: Sequence[int]) -> "_Power":
+        """Return the same of some frequencies."""
+        return replace(self, found=tuple(own[:, which] for own in self.found))
+
+    def above(self, ground: float) -> "_Power":
+        """Return the same beside noise of so much more power at a frequency, DN^2."""
+        more = [1 + max(ground, 0.0) * w for w in self.weights]
+        return _Power(
+            tuple(own / np.sqrt(m) for own, m in zip(self.found, more, strict=True)),
+            tuple(w / m for w, m in zip(self.weights, more, strict=True)),
+        )
+
+    @property
+    def frames(self) -> int:
+        """Independent frames: what is fixed was taken off."""
+        return sum(len(own) - 1 for own in self.found)
+
+    def _sum(self, power: int) -> float:
+        parts = zip(self.found, self.weights, strict=True)
+        return sum((len(own) - 1) * weight**power for own, weight in parts)
+
+    @property
+    def excess(self) -> NDArray[np.float64]:
+        """Power of a pattern of one amplitude in all exposures, DN^2: (frequency,)."""
+        parts = zip(self.found, self.weights, strict=True)
+        total = sum(w * ((np.abs(own) ** 2).sum(0) - len(own) + 1) for own, w in parts)
+        return np.asarray(total / self._sum(2))
+
+    @property
+    def error(self) -> float:
+        """Standard error of the excess in white noise."""
+        return float(1 / np.sqrt(self._sum(2)))
+
+    @property
+    def chance(self) -> float:
+        """Chance of as much at the first frequency: the sum of weighted exponentials as Gamma's."""
+        mean, square = self._sum(1), self._sum(2)
+        total = float(self.excess[0]) * square + mean
+        return float(scipy.stats.gamma.sf(total * mean / square, mean**2 / square))
+
+    def keeps_phase(self) -> bool | None:
+        """Return whether the first pattern's phase is kept but for its sign; None: untold."""
+        free = self.frames
+        if free < _LEAST:
+            return None
+        c = np.concatenate([own[:, 0] for own in self.found])
+        size = float((np.abs(c) ** 2).sum()) - free  # noise has no phase to keep
+        if size > _CLEAR * np.sqrt(free):
+            share = abs(complex((c**2).sum())) / size
+            if share > _ONE_LINE or share < _CIRCLE:
+                return share > _ONE_LINE
+        amplitude = np.sqrt(max(float(self.excess[0]), 0.0))
+        own = np.concatenate([
+            np.full(len(one), amplitude * np.sqrt(w))
+            for one, w in zip(self.found, self.weights, strict=True)
+        ])  # fmt: skip
+        turned = 2 * own * np.abs(c)
+        any_phase = float((np.log(scipy.special.i0e(turned)) + turned).sum())
+        phases = np.exp(-1j * np.pi * np.arange(_PHASES) / _PHASES)[:, np.newaxis]
+        along = 2 * own * np.real(c * phases)
+        one_phase = float((np.logaddexp(along, -along) - np.log(2)).sum(1).max())
+        more = one_phase - any_phase - np.log(free) / 2  # the phase is fitted
+        return None if abs(more) < _SURE else bool(more > 0)
 
 
 def strongest(layout: Layout, frames_of: FramesOf, frequencies: Sequence[Frequency]) -> Frequency:

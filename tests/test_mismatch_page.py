@@ -267,6 +267,7 @@ def test_every_effect_has_words(kind: str) -> None:
     [
         (Key("line_correlation", "pooled", "", "MONO", "rows 8"), "(8 pixels apart along rows)"),
         (Key("line_correlation", "pooled", "", "Gr", "columns 1"), "(1 pixel of one colour apart"),
+        (Key("line_correlation", "all", "", "", "rows 1.5"), "(3 pixels apart along rows)"),
         (
             Key("line_correlation", "contrast", "", "", "all rows 4"),
             "of one colour apart along rows",

@@ -194,7 +194,7 @@ def test_beside_what_gains_much_only_what_gained_enough_is_tried_anew(
             tried.append(kind)
             return [_proposal("row_noise", sigma_dn=gains[kind])]
 
-        return SimpleNamespace(calls=calls, propose=proposed)
+        return SimpleNamespace(calls=calls, hints=(), propose=proposed)
 
     monkeypatch.setattr(rank, "CANDIDATES", {kind: propose(kind) for kind in gains})
     monkeypatch.setattr(

@@ -6,9 +6,11 @@ from typing import Any
 import pytest
 
 import analysis.mismatch.name as search_module
+from analysis.mismatch.candidates import Proposal
 from analysis.mismatch.diagnose import _proven
 from analysis.mismatch.name import Search
-from analysis.mismatch.named import Named
+from analysis.mismatch.named import Named, unclear
+from dsis.effects import registry
 
 OPEN = Stub(mismatches=["something"])
 
@@ -129,6 +131,36 @@ def test_numbers_are_settled_where_the_search_has_touched_them(
     trial: Any = gains
     _proven(search, OPEN, trial, judged=False)
     assert search.calls == calls
+
+
+def _decay(gain: float, error: float) -> Named:
+    effect = registry()["line_settling"](gain_percent=gain, length_pixels=5.0)
+    proposal = Proposal(effect, ("gain_percent", "length_pixels"), frozenset({"gain_percent"}))
+    errors = {"gain_percent": error, "length_pixels": 0.1}
+    return Named("line_settling", proposal, errors, 9.0, ())
+
+
+@pytest.mark.parametrize(("error", "clear"), [(0.2, True), (0.5, False)])
+def test_what_draws_nothing_must_exceed_its_own_errors(error: float, clear: bool) -> None:
+    """Its length is sure, but it is the size that tells a decay from none."""
+    assert (unclear(_decay(-1.2, error)) == "") == clear
+    assert "gain_percent -1.2 ± 0.5" in unclear(_decay(-1.2, 0.5))
+    drift = registry()["black_level_drift"](sigma_dn=1.0)
+    few = Named("black_level_drift", Proposal(drift, ("sigma_dn",)), {"sigma_dn": 0.5}, 9.0, ())
+    assert unclear(few) == ""  # of few frames, and certain
+
+
+def test_an_effect_within_its_errors_is_dropped_and_the_others_fitted_again() -> None:
+    search: Any = Proving([])
+    search.named = [_decay(0.3, 0.2), _named("kept", x=1.0)]
+    trial: Any = Stub(
+        gains=lambda _state, without: {
+            name: Stub(certain=True, gain=Stub(nats_per_frame=1.0)) for name in without
+        }
+    )
+    _, found = _proven(search, OPEN, trial, judged=True)
+    assert list(found) == ["kept"]
+    assert search.calls == ["settle"]
 
 
 def test_what_gained_little_is_asked_first_and_the_rest_only_where_all_of_it_stays() -> None:

@@ -86,3 +86,16 @@ def test_a_camera_that_knows_its_lens_matches_its_own_recording(fall: float) -> 
     assert found.verdict == "match"
     assert not found.searched
     assert any("No physics was looked for" in remark for remark in found.remarks)
+
+
+def test_a_fall_is_told_beside_a_decay_that_the_camera_has() -> None:
+    """The lines of an edge lean and bend the map: what they make of it is no uneven light."""
+    edge = registry()["line_settling"](gain_percent=3.0, length_pixels=6.0, edge="left")
+    known = camera(edge)
+    true = camera(edge, _shading(falloff_percent=1.5))  # type: ignore[arg-type] # an effect of the registry
+    found = find_mismatch(known, recorded(true, 5), seed=2, vocabulary=frozenset({"shading"}))
+    (named,) = found.omitted_physics
+    fall = named.parameters["falloff_percent"]
+    assert fall.value == pytest.approx(1.5, abs=4 * fall.standard_error)
+    others = {name: one for name, one in named.parameters.items() if name != "falloff_percent"}
+    assert all(abs(one.value) <= 4 * one.standard_error for one in others.values())

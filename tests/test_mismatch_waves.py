@@ -98,6 +98,41 @@ def test_white_noise_has_one_everywhere_and_rare_peaks_rarely(cfa: Cfa) -> None:
     assert scores.mean() > 0  # and none of them is empty
 
 
+@pytest.mark.parametrize("axis", [1, 2])
+@pytest.mark.parametrize(("lag", "fraction"), [(3, 0.05), (5, -0.08)])
+def test_a_memory_from_one_colour_to_another_is_seen_at_its_lag(
+    axis: int, lag: int, fraction: float
+) -> None:
+    """Noise of rows, columns, frames and alternate lines beside it is no memory."""
+    rng = np.random.default_rng(11)
+    stack = noise(rng)
+    stack += fraction * np.roll(stack - 1000, lag, axis)
+    stack += rng.normal(0, 0.5, (FRAMES, ROWS, 1)) + rng.normal(0, 0.5, (FRAMES, 1, COLUMNS))
+    numbers = summed([stack], Cfa.GRBG).odd_lags()
+    along = "columns" if axis == 1 else "rows"
+    value, sd = numbers.pop(f"line_correlation along {along} {lag / 2:g}")
+    assert value == pytest.approx(fraction, abs=SURE * sd)
+    assert value / sd == pytest.approx(fraction * sqrt(stack[1:].size), rel=0.3)
+    assert max(abs(rest / error) for rest, error in numbers.values()) < SURE
+
+
+def test_lags_between_colours_have_the_errors_that_they_say() -> None:
+    """Colours of different noise: products of a loud and a quiet one count less."""
+    rng = np.random.default_rng(12)
+    loud = np.where(np.arange(ROWS)[:, np.newaxis] % 2 == 0, 2.0, 1.0) * np.where(
+        np.arange(COLUMNS) % 2 == 0, 3.0, 1.0
+    )
+    many = [summed([1000 + loud * (noise(rng) - 1000)], Cfa.GRBG).odd_lags() for _ in range(40)]
+    z = np.array([[value / sd for value, sd in one.values()] for one in many])
+    for name, own in zip(many[0], z.T, strict=True):
+        assert abs(own.mean()) < SURE / sqrt(len(many)), name
+    assert np.mean(z**2) == pytest.approx(1, abs=SURE * sqrt(2 / z.size))
+
+
+def test_a_mono_sensor_has_no_lags_between_colours() -> None:
+    assert summed([noise(np.random.default_rng(1))], Cfa.MONO).odd_lags() == {}
+
+
 @pytest.mark.parametrize("uneven", ["pixel", "vignette", "middle"])
 def test_noise_that_is_uneven_over_the_sensor_is_no_wave(uneven: str) -> None:
     """Between bins the middle of the sensor counts more than its edges."""

@@ -22,10 +22,9 @@ from analysis.mismatch.finding import (
     Verdict,
 )
 from analysis.mismatch.instance import kind_of
-from analysis.mismatch.layout import Layout
 from analysis.mismatch.model import processes
 from analysis.mismatch.name import Search
-from analysis.mismatch.named import Named
+from analysis.mismatch.named import Named, unclear
 from analysis.mismatch.observe import observe
 from analysis.mismatch.parameters import parameter_errors
 from analysis.mismatch.phase import WholeFrames
@@ -50,7 +49,7 @@ Array = NDArray[np.float64]
 VOCABULARY = frozenset({*CANDIDATES, "dual_gain"})
 _NEAR = 8.0  # of log-likelihood: a rival worth naming a recording that would decide
 _LOCATED = "No physics was looked for: it is only said where recording and model differ."
-_SMALL, _MEDIUM = 1e6, 2e6  # samples
+_SMALL = 1e6  # samples
 _DOUBTFUL = 30.0  # gain of log-likelihood below which locked frames may not confirm an effect
 
 
@@ -108,7 +107,7 @@ def _found(
     album, frames_of = Album(layout), partial(_frames_of, source, numbers)
     seen = observe(layout, frames_of, album, keep=True)
     large = layout.large
-    setting = Setting(layout, seen, split.interpolated, *how, *_counts(layout), large)
+    setting = Setting.of(layout, seen, split.interpolated, *how)
     remarks = remarks if words else (*remarks, _LOCATED)
 
     trial = Trial.of(recording, split, source, setting)
@@ -142,13 +141,6 @@ def _found(
         departures = Change(len(whole.mismatches), len(final.mismatches))
         proof = replace(proof, discrepancies=departures)
     return _said(_finding(camera, whole, final, search, gains, proof), remarks, evidence, words)
-
-
-def _counts(layout: Layout) -> tuple[int, int, int, int, int]:
-    """Return how many simulations are for what (`Setting`): of large recordings each tells more."""
-    if layout.large:
-        return 8, 4, 1, 1, 2
-    return (16, 8, 1, 1, 2) if layout.samples > _MEDIUM else (16, 8, 2, 2, 4)
 
 
 def _said(
@@ -263,6 +255,10 @@ def _proven(
     """
     while True:
         final = final if judged else _undenied(search, final)
+        small = next(((one, why) for one in search.named if (why := unclear(one))), None)
+        if small is not None:
+            final = search.settle(search.drop(final, *small))
+            continue
         gained = _gained(search, final, trial)
         weak = [
             named

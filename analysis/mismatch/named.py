@@ -8,6 +8,11 @@ from analysis.mismatch.instance import instance
 from dsis.camera import Camera
 from dsis.effects import Effect
 
+_CLEAR = 3.0  # standard errors of an effect's size that is no chance
+_SHAPES = frozenset(
+    {"length_pixels", "gain_length_pixels", "at_code", "period_codes", "full_well_dn", "extent"}
+)
+
 
 @dataclass(frozen=True)
 class Named:
@@ -38,6 +43,25 @@ class Named:
     def name(self) -> str:
         """Its kind, and of a line its frequency, of a decay its edge: there may be several."""
         return instance(self.kind, None if self.proposal is None else self.proposal.effect)
+
+
+def unclear(named: Named) -> str:
+    """Return why an effect is not told from none by its own size; empty: it is.
+
+    Asked of what draws nothing at random: its size has a sign, and its error is that of a mean.
+    """
+    effect = None if named.proposal is None else named.proposal.effect
+    if effect is None or effect.draws:
+        return ""
+    sizes = {
+        name: (float(getattr(effect, name)), named.errors[name])
+        for name in named.proposal.free  # type: ignore[union-attr] # it has an effect
+        if name not in _SHAPES
+    }
+    if not sizes or any(abs(value) > _CLEAR * error for value, error in sizes.values()):
+        return ""
+    said = ", ".join(f"{name} {value:.3g} ± {error:.2g}" for name, (value, error) in sizes.items())
+    return f"its size is within {_CLEAR:g} of its standard errors: {said}"
 
 
 def renewed(named: Named, proposal: Proposal, effect: Effect, errors: dict[str, float]) -> Named:

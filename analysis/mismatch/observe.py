@@ -173,7 +173,8 @@ class _Whole:
     def numbers(self) -> dict[str, Number]:
         """Return spectra and memories of the whole sensor."""
         own = self.bands.numbers() if self.mosaic else {}
-        return {**own, **self.memory.numbers(), "spectral_peak": self.waves.number()}
+        waves = {"spectral_peak": self.waves.number(), **self.waves.odd_lags()}
+        return {**own, **self.memory.numbers(), **waves}
 
     def peaks(self) -> dict[str, Peak]:
         """Return where its spectra are largest, by kind."""

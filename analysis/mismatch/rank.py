@@ -198,7 +198,8 @@ def _tried(
     clues = state.clues(settled)
     predictor = state.predictor(state.setting.screening)
     before = predictor.loglik(state.null.mean)
-    left = {k for k in kinds if k in CANDIDATES and off & set(CANDIDATES[k].calls)}
+    known = {kind: CANDIDATES[kind] for kind in kinds if kind in CANDIDATES}
+    left = {kind for kind, own in known.items() if off & {*own.calls, *own.hints}}
     best = max((memory.gains.get(kind, 0.0) for kind in left), default=0.0)
     found: list[tuple[float, str, Proposal, Array]] = []
     while True:

@@ -63,8 +63,10 @@ def sentence(statistic: str, key: Key, z: float, where: Where) -> str:
         how = f" ({key.detail})"
     if statistic == "line_correlation":
         *_, axis, lag = key.detail.split(" ")  # of all channels together, "all" comes first
-        pixels = "pixel" if lag == "1" else "pixels"
         colour = "" if key.channel == "MONO" else " of one colour"
+        if not float(lag).is_integer():  # from one colour to another
+            lag, colour = f"{2 * float(lag):.0f}", ""
+        pixels = "pixel" if lag == "1" else "pixels"
         how += f" ({lag} {pixels}{colour} apart along {axis})"
     elif key.detail and key.scope not in ("contrast", "exposure", SCENE):
         how += f" ({key.detail})"

@@ -22,6 +22,7 @@ from analysis.mismatch.vector import Vector, vector
 from dsis.camera import Camera
 
 Array = NDArray[np.float64]
+_MEDIUM = 2e6  # samples from which one simulation tells what two of fewer do
 
 
 @dataclass(frozen=True)
@@ -54,6 +55,16 @@ class Setting:
     replicates: int
     polishing: int
     large: bool = False
+
+    @classmethod
+    def of(
+        cls, layout: Layout, seen: Observation, interpolated: str | None, seed: int, jobs: int
+    ) -> "Setting":
+        """Return the setting of a recording: the more samples, the more one simulation tells."""
+        if layout.large:
+            return cls(layout, seen, interpolated, seed, jobs, 8, 4, 1, 1, 2, large=True)
+        few = (1, 1, 2) if layout.samples > _MEDIUM else (2, 2, 4)
+        return cls(layout, seen, interpolated, seed, jobs, 16, 8, *few)
 
 
 @dataclass(frozen=True)

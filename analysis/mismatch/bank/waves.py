@@ -12,8 +12,8 @@ import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
-from analysis.mismatch.bank.coherent import Peak, frequency, top, white_level
-from analysis.mismatch.bank.lines import log_chance
+from analysis.mismatch.bank.coherent import LAGS, Peak, frequency, top, white_level
+from analysis.mismatch.bank.lines import log_chance, without_lines
 from analysis.mismatch.bank.scalars import UNKNOWN, Number, score_of_log
 from dsis.compiled import inlined, kernel
 from dsis.measures import Channel
@@ -22,6 +22,8 @@ from dsis.measures.median import median
 Array = NDArray[np.float64]
 Image = NDArray[np.float32]
 Amplitudes = NDArray[np.complexfloating]
+_PAIRED = {"rows": (("R", "Gr"), ("Gb", "B")), "columns": (("R", "Gb"), ("Gr", "B"))}
+"""Channels that take turns along a line."""
 
 
 class Waves:
@@ -85,6 +87,7 @@ class WaveSums:
         rows, columns = shape
         self.power = np.zeros((2, 2, rows, columns // 2 + 1))
         self.weight = self.squares = 0.0
+        self.uneven = dict.fromkeys(_PAIRED, 0.0)
 
     def add(
         self, waves: Waves, channels: Mapping[str, Channel], variance_dn2: Mapping[str, float]
@@ -101,13 +104,18 @@ class WaveSums:
         waves.add_to(self.power, weight / white)
         self.weight += weight
         self.squares += weight**2 / seen
+        if self.step == 2:
+            each = {name: c.estimates["pixel_variance"].value for name, c in channels.items()}
+            for axis, pairs in _PAIRED.items():
+                alike = [each[a] * each[b] for a, b in pairs]
+                self.uneven[axis] += weight**2 / seen * float(np.mean(alike)) / white**2
 
     def number(self) -> Number:
         """Return the normal score of the largest power, on bins or between them."""
         parts = [part for part in self._parts() if part.size]
         if not self.weight or not parts:
             return UNKNOWN
-        degrees = max(round(self.weight**2 / self.squares), 1)
+        degrees = self._degrees
         # Each by itself: between bins the middle of the sensor counts more than its edges, and
         # where the noise is larger there, all of them are higher.
         whites = [white_level(part, degrees) for part in parts]
@@ -118,6 +126,35 @@ class WaveSums:
             for part, white in zip(parts, whites, strict=True)
         )
         return score_of_log(least), 1.0
+
+    def odd_lags(self) -> dict[str, Number]:
+        """Return correlations along lines of samples an odd number of pixels apart.
+
+        On a mosaic these are of other colours, whose planes know nothing of one another; lags are
+        in pixels of a plane, as theirs are. Nearest neighbours have numbers of their own. What
+        rows, columns and frames have in common, of each colour, is no memory.
+        """
+        if self.step == 1 or not self.weight:
+            return {}
+        rows, columns = self.shape
+        power = self.power[0, 0] / self.weight
+        held = np.zeros(power.shape, np.bool_)
+        held[[0, rows // 2]] = True
+        held[:, [0, columns // 2]] = True
+        power = np.where(held, power[~held].mean(), power)
+        covariance = np.fft.irfft2(without_lines(power, self._degrees), s=self.shape)
+        found: dict[str, Number] = {}
+        for axis, line in (("rows", covariance[0]), ("columns", covariance[:, 0])):
+            sd = float(np.sqrt(self.uneven[axis] / (rows * columns))) / self.weight
+            for lag in range(3, min(2 * LAGS, line.size // 2 - 1) + 1, 2):
+                name = f"line_correlation along {axis} {lag / self.step:g}"
+                found[name] = (float(line[lag] / line[0]), sd)
+        return found
+
+    @property
+    def _degrees(self) -> int:
+        """Independent frames that the sum is worth."""
+        return max(round(self.weight**2 / self.squares), 1)
 
     def peak(self) -> Peak | None:
         """Return where the power is largest: cycles per pixel of a plane, power as one shows it."""

@@ -43,11 +43,14 @@ class Candidate:
         Statistics one of which must be off before the effect is tried.
     propose
         Gives proposals from the clues; empty: the effect cannot be what is seen.
+    hints
+        Further statistics that suffice for a trial, but need not show the effect.
     """
 
     kind: str
     calls: tuple[str, ...]
     propose: Callable[[Clues], Sequence[Proposal]]
+    hints: tuple[str, ...] = ()
 
 
 def build(kind: str, **parameters: object) -> Effect | None:

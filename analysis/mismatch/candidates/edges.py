@@ -123,4 +123,6 @@ def _had(clues: Clues, axis: str, name: str, line: Array, size: int) -> Array:
     return total
 
 
-CANDIDATES = (Candidate("line_settling", ("fixed_edge",), _settling),)
+_SMOOTH = ("fixed_smooth_variance", "fixed_smooth_tilt")  # of few lines a decay is most of it
+
+CANDIDATES = (Candidate("line_settling", ("fixed_edge",), _settling, _SMOOTH),)

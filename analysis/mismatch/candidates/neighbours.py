@@ -51,7 +51,7 @@ def _memory(clues: Clues) -> Sequence[Proposal]:
             continue
         if key.statistic == "line_correlation":
             axis, number = key.detail.split(" ")
-            departures.setdefault((axis, int(number) * step), []).append(
+            departures.setdefault((axis, round(float(number) * step)), []).append(
                 float(clues.vector.values[i] - clues.null.mean[i])
             )
         elif step == 2 and key.statistic in (_ALONG_ROWS, _ALONG_COLUMNS) and key.exposure:

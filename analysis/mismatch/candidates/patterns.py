@@ -11,6 +11,9 @@ from analysis.mismatch.bank.together import TOGETHER
 from analysis.mismatch.candidates.candidate import Candidate, Proposal, proposals
 from analysis.mismatch.clues import Clues, alike
 from analysis.mismatch.layout import Place
+from dsis.draw import Draw
+from dsis.effects import Exposure, Image
+from dsis.grid import PixelGrid
 
 Array = NDArray[np.float64]
 _FALL = "falloff_percent"
@@ -19,6 +22,8 @@ _BOWS = ("bow_down_percent", "bow_right_percent")
 _ROUND, _BOWED = (_FALL, *_TILTS), (*_TILTS, *_BOWS)
 _CLEAR = 3.0  # standard errors from which a tilt is worth a trial
 _JUMP = 0.15  # z of the step where halves meet, of that of their means: some 0.4 of two amplifiers
+_UNEVEN = ("shading", "line_settling", "tap_mismatch")
+_LIGHT_DN = 1000.0  # at which they are looked at: all are in proportion
 _SMOOTH = ("fixed_smooth_variance", "fixed_smooth_tilt", "fixed_smooth_falloff")
 
 
@@ -64,7 +69,7 @@ def _fitted(clues: Clues, names: Sequence[str]) -> tuple[dict[str, float], set[s
     values, errors = np.zeros(len(names)), np.zeros(len(names))
     images = clues.image("gain")
     for channel, (image, noise) in images.items():
-        surfaces, had = _surfaces(image.shape, names), _had(clues, image.shape)
+        surfaces, had = _surfaces(image.shape, names), _had(clues, channel)
         inverse = np.linalg.inv(surfaces @ surfaces.T)
         scale = 100 / clues.scale("gain", channel) / len(images)
         rest = scale * (image - image.mean()).ravel() - had / len(images)
@@ -85,12 +90,29 @@ def _of_strength(clues: Clues) -> Sequence[Proposal]:
     return _of_light({_FALL: 100 * sqrt(variance / spread)}, (_FALL,))
 
 
-def _had(clues: Clues, shape: tuple[int, ...]) -> Array:
-    """Return what the camera's own shading does to the light, per cent."""
-    names = (_FALL, *_BOWED)
-    own = [e.model_dump() for e in clues.camera.effect if e.kind == "shading"]
-    values = np.array([sum(effect[name] for effect in own) for name in names], float)
-    return np.asarray(values @ _surfaces(shape, names))
+def _had(clues: Clues, channel: str) -> Array:
+    """Return how the camera's own effects make the light uneven, per cent, less their mean.
+
+    Those of uneven light, and those whose lines feign it: (pixel,).
+    """
+    layout, camera = clues.layout, clues.camera
+    grid = PixelGrid(layout.rows, layout.columns, layout.cfa)
+    uneven = [e for e in camera.effect if e.kind in _UNEVEN]
+    y, x = layout.sites[channel]
+    step = 1 if len(layout.sites) == 1 else 2
+    made = []
+    for signal in (0.0, _LIGHT_DN):
+        image: Image = np.full(grid.shape, signal, np.float32)
+        exposure = Exposure(grid, 0, Draw(0), Draw(0), image, camera.read_out, _nothing)
+        for effect in uneven:
+            image = effect.apply(image, exposure)
+        made.append(image.astype(np.float64))
+    gain = 100 * (made[1] - made[0])[y::step, x::step].ravel() / _LIGHT_DN
+    return np.asarray(gain - gain.mean())
+
+
+def _nothing(_: int) -> Image:
+    raise AssertionError("uneven light remembers no frame")
 
 
 def _of_light(own: Mapping[str, float], names: Sequence[str]) -> list[Proposal]:

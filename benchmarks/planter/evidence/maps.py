@@ -25,7 +25,8 @@ def coefficient_map(look: Look, wanted: str, *free: str) -> np.ndarray | None:
     }
     design = np.stack([patterns[name] for name in (wanted, *free)], 1)
     design /= np.abs(design).max(0)
-    variance = np.array([np.var(look.residuals[e]) for e in places])
+    # Codes that never move are known to a code, not without error.
+    variance = np.array([max(np.var(look.residuals[e]), 1 / 12) for e in places])
     weight = np.array([plan.frames for plan in plans]) / variance
     scaled = design * np.sqrt(weight / weight.max())[:, None]
     if np.linalg.svd(scaled, compute_uv=False)[-1] < LEAST_INDEPENDENT:

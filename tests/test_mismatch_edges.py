@@ -166,6 +166,25 @@ def test_proposals_start_from_what_the_maps_show(edge: str) -> None:
         assert alone.free == ("offset_dn", "length_pixels")
 
 
+@pytest.mark.parametrize(
+    ("values", "sane"),
+    [
+        ({"length_pixels": 12.0}, True),
+        ({"length_pixels": 66.0}, False),
+        ({"length_pixels": 5.0, "gain_length_pixels": 66.0}, False),
+    ],
+)
+def test_a_decay_over_much_of_the_sensor_is_uneven_light(
+    values: dict[str, float], sane: bool
+) -> None:
+    layout: Any = Stub(rows=96, columns=640)
+    (candidate,) = CANDIDATES
+    assert (
+        candidate.sane(layout, effect("line_settling", gain_percent=1.0, edge="top", **values))
+        == sane
+    )
+
+
 def test_lines_that_have_not_settled_are_named_with_their_numbers() -> None:
     own = {"offset_dn": -1.0, "gain_percent": 1.0, "length_pixels": 5.0}
     true = camera(effect("line_settling", edge="right", **own))

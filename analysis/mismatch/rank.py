@@ -147,9 +147,11 @@ def ranked(
         if state.setting.large:  # of a large recording steps are long and sure
             rounds = min(rounds, _ROUNDS)
         polished = polish(own, state.camera, [proposal], rounds=rounds)
-        if polished is not None and not any(alike(state, polished.mean, one) for one in apart):
-            found.append((kind, proposal, polished))
         step()
+        if polished is None or not CANDIDATES[kind].sane(state.setting.layout, polished.effects[0]):
+            continue
+        if not any(alike(state, polished.mean, one) for one in apart):
+            found.append((kind, proposal, polished))
     judged = ~_others(state, [polished.mean for _, _, polished in found])
     before = predictor.loglik(state.null.mean, judged)
     fitted = [

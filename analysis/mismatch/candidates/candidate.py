@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from pydantic import ValidationError
 
 from analysis.mismatch.clues import Clues
+from analysis.mismatch.layout import Layout
 from dsis.effects import Effect, registry
 
 
@@ -45,12 +46,15 @@ class Candidate:
         Gives proposals from the clues; empty: the effect cannot be what is seen.
     hints
         Further statistics that suffice for a trial, but need not show the effect.
+    sane
+        Whether a fitted effect is still one of its kind, and no stand-in for another.
     """
 
     kind: str
     calls: tuple[str, ...]
     propose: Callable[[Clues], Sequence[Proposal]]
     hints: tuple[str, ...] = ()
+    sane: Callable[[Layout, Effect], bool] = lambda _layout, _effect: True
 
 
 def build(kind: str, **parameters: object) -> Effect | None:

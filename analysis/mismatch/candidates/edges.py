@@ -10,6 +10,8 @@ from analysis.mismatch.bank.edges import line_square_beside
 from analysis.mismatch.bank.seams import Rest, beyond_smooth, centred
 from analysis.mismatch.candidates.candidate import Candidate, Proposal, proposals
 from analysis.mismatch.clues import Clues
+from analysis.mismatch.layout import Layout
+from dsis.effects import Effect
 from dsis.effects.line_settling import LineSettling
 
 Array = NDArray[np.float64]
@@ -77,7 +79,12 @@ def _decays(clues: Clues, edge: str, name: str, rest: Rest) -> list[_Fit]:
 def _lengths(clues: Clues, edge: str) -> list[float]:
     """Return the lengths that are tried, pixels: longer ones are smooth surfaces."""
     lines = clues.layout.columns if _EDGES[edge][0] == "columns" else clues.layout.rows
-    return [own for own in _LENGTHS if own < max(lines * _LONGEST, 2 * _LENGTHS[0])]
+    return [own for own in _LENGTHS if own < _longest(lines)]
+
+
+def _longest(lines: int) -> float:
+    """Return the length from which on a decay is no longer tried, pixels."""
+    return float(max(lines * _LONGEST, 2 * _LENGTHS[0]))
 
 
 def _clear(fit: _Fit) -> float:
@@ -125,4 +132,13 @@ def _had(clues: Clues, axis: str, name: str, line: Array, size: int) -> Array:
 
 _SMOOTH = ("fixed_smooth_variance", "fixed_smooth_tilt")  # of few lines a decay is most of it
 
-CANDIDATES = (Candidate("line_settling", ("fixed_edge",), _settling, _SMOOTH),)
+
+def _short(layout: Layout, effect: Effect) -> bool:
+    """Return whether a decay is short beside the sensor: long ones are uneven light."""
+    if not isinstance(effect, LineSettling):
+        return True
+    lines = layout.columns if _EDGES[effect.edge][0] == "columns" else layout.rows
+    return max(effect.length_pixels, effect.gain_length) < 2 * _longest(lines)
+
+
+CANDIDATES = (Candidate("line_settling", ("fixed_edge",), _settling, _SMOOTH, _short),)

@@ -144,23 +144,24 @@ def _decay(gain: float, error: float) -> Named:
 def test_what_draws_nothing_must_exceed_its_own_errors(error: float, clear: bool) -> None:
     """Its length is sure, but it is the size that tells a decay from none."""
     assert (unclear(_decay(-1.2, error)) == "") == clear
-    assert "gain_percent -1.2 ± 0.5" in unclear(_decay(-1.2, 0.5))
+    assert "gain percent -1.2 ± 0.5" in unclear(_decay(-1.2, 0.5))
+    assert unclear(_decay(-1.2, float("nan"))) == ""  # unknown is not none
     drift = registry()["black_level_drift"](sigma_dn=1.0)
     few = Named("black_level_drift", Proposal(drift, ("sigma_dn",)), {"sigma_dn": 0.5}, 9.0, ())
     assert unclear(few) == ""  # of few frames, and certain
 
 
-def test_an_effect_within_its_errors_is_dropped_and_the_others_fitted_again() -> None:
-    search: Any = Proving([])
+def test_an_effect_within_its_errors_is_dropped_and_what_it_hid_is_looked_for() -> None:
+    search: Any = Proving([_named("kept", x=1.0), _named("found")])
     search.named = [_decay(0.3, 0.2), _named("kept", x=1.0)]
     trial: Any = Stub(
         gains=lambda _state, without: {
             name: Stub(certain=True, gain=Stub(nats_per_frame=1.0)) for name in without
         }
     )
-    _, found = _proven(search, OPEN, trial, judged=True)
-    assert list(found) == ["kept"]
-    assert search.calls == ["settle"]
+    _, found = _proven(search, OPEN, trial, judged=False)
+    assert sorted(found) == ["found", "kept"]
+    assert search.calls == ["further", "settle"]
 
 
 def test_what_gained_little_is_asked_first_and_the_rest_only_where_all_of_it_stays() -> None:

@@ -65,7 +65,7 @@ def find_mismatch(
     """Return where a recording differs from a camera model, and what physics was left out.
 
     With `jobs` above 1, simulations run in processes that are started afresh: a program that calls
-    this needs its `__main__` guard.
+    this needs its `__main__` guard. From then on it keeps some freed memory (`keep_freed`).
     """
     done = 0
 
@@ -257,7 +257,7 @@ def _proven(
         final = final if judged else _undenied(search, final)
         small = next(((one, why) for one in search.named if (why := unclear(one))), None)
         if small is not None:
-            final = search.settle(search.drop(final, *small))
+            final = _without(search, final, small, judged=judged)
             continue
         gained = _gained(search, final, trial)
         weak = [
@@ -270,12 +270,17 @@ def _proven(
         worst = min(weak, key=lambda named: gained[named.name].gain.nats_per_frame)
         nats = gained[worst.name].gain.nats_per_frame
         why = f"gains {nats:.3g} nats per locked frame, no more than chance"
-        final = search.drop(final, worst, why)
-        if not judged and final.mismatches:  # what it hid is looked for
-            named = list(search.named)
-            final = search.further(final)
-            if named != search.named:
-                final = search.settle(final)
+        final = _without(search, final, (worst, why), judged=judged)
+
+
+def _without(search: Search, final: State, which: tuple[Named, str], *, judged: bool) -> State:
+    """Return the state without an effect; unless all is `judged`, what it hid is looked for."""
+    final = search.drop(final, *which)
+    if judged or not final.mismatches:
+        return final
+    named = list(search.named)
+    final = search.further(final)
+    return search.settle(final) if named != search.named else final
 
 
 def _gained(search: Search, final: State, trial: Trial) -> dict[str, Gained]:
@@ -333,11 +338,6 @@ def _finding(
         for name, other in tied.items()
         if name not in named and kind_of(name) in search.vocabulary
     )
-    considered = tuple(
-        f"Considered and not named: {name}: {why}."
-        for name, why in search.refused.items()
-        if name not in tied
-    )
     return Finding(
         verdict,
         mismatches,
@@ -347,7 +347,7 @@ def _finding(
         undecided,
         proof,
         final.camera,
-        considered,
+        search.considered(tied),
     )
 
 

@@ -1,6 +1,6 @@
 """Which physics explains the mismatches: add the best effect, fit all again, look again."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Container, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -11,7 +11,7 @@ from analysis.mismatch.contradicted import refuted
 from analysis.mismatch.instance import LINES, Frequency, frequency_of, instance
 from analysis.mismatch.judge import LITTLE, NEEDLESS, Judge
 from analysis.mismatch.named import Named, camera_without, renewed
-from analysis.mismatch.phase import WholeFrames
+from analysis.mismatch.phase import ABSENT, WholeFrames
 from analysis.mismatch.polish import polish, with_effects
 from analysis.mismatch.predict import Predictor
 from analysis.mismatch.rank import (
@@ -56,6 +56,7 @@ class Search:
     tied: dict[str, Ranked] = field(default_factory=dict)
     doubted: dict[str, str] = field(default_factory=dict)
     settled: list[tuple[str, Frequency]] = field(default_factory=list)
+    absent: set[Frequency] = field(default_factory=set)  # peaks that were no line
     lines: WholeFrames | None = None
     memory: Memory = field(default_factory=Memory)
     polished: State | None = None
@@ -206,6 +207,17 @@ class Search:
         self.memory.gains.clear()  # what it hid may gain more than before
         return bare
 
+    def considered(self, undecided: Container[str]) -> tuple[str, ...]:
+        """Return in words what was not named, and why; not what is `undecided`."""
+        said = [
+            f"Considered and not named: {name}: {why}."
+            for name, why in self.refused.items()
+            if name not in undecided
+        ]
+        if self.absent:
+            said.append(f"Looked at and no line: {len(self.absent)} peak(s): {ABSENT}.")
+        return tuple(said)
+
     def _best(self, state: State) -> tuple[Named, Camera] | None:
         """Return the effect that explains most, and the camera with it."""
         fitted = self._decided(state)
@@ -307,7 +319,11 @@ class Search:
         if self.lines is None or not self.lines.shown(effect):
             return self.lines is None
         denial = self.lines.denial(effect)
-        if denial is not None:
+        if denial == ABSENT:
+            line = frequency_of(effect)
+            self.settled += [(kind, line) for kind in sorted(LINES) if line is not None]
+            self.absent |= {line} if line is not None else set()
+        elif denial is not None:
             self._refuse(effect.kind, effect, denial)
         return denial is None
 

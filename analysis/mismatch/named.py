@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from math import inf, isfinite
 
 from analysis.mismatch.candidates import Proposal
 from analysis.mismatch.instance import instance
@@ -48,20 +49,26 @@ class Named:
 def unclear(named: Named) -> str:
     """Return why an effect is not told from none by its own size; empty: it is.
 
-    Asked of what draws nothing at random: its size has a sign, and its error is that of a mean.
+    Asked of what draws nothing at random, whose size is known as a mean is. Where an error is
+    unknown, nothing is said.
     """
     effect = None if named.proposal is None else named.proposal.effect
-    if effect is None or effect.draws:
+    if named.proposal is None or effect is None or effect.draws:
         return ""
     sizes = {
-        name: (float(getattr(effect, name)), named.errors[name])
-        for name in named.proposal.free  # type: ignore[union-attr] # it has an effect
+        name: (float(getattr(effect, name)), named.errors.get(name, inf))
+        for name in named.proposal.free
         if name not in _SHAPES
     }
-    if not sizes or any(abs(value) > _CLEAR * error for value, error in sizes.values()):
+    if not sizes or any(
+        not isfinite(error) or abs(value) > _CLEAR * error for value, error in sizes.values()
+    ):
         return ""
-    said = ", ".join(f"{name} {value:.3g} ± {error:.2g}" for name, (value, error) in sizes.items())
-    return f"its size is within {_CLEAR:g} of its standard errors: {said}"
+    said = ", ".join(
+        f"{name.replace('_', ' ')} {value:.3g} ± {error:.2g}"
+        for name, (value, error) in sizes.items()
+    )
+    return f"its size is less than {_CLEAR:g} of its standard errors ({said})"
 
 
 def renewed(named: Named, proposal: Proposal, effect: Effect, errors: dict[str, float]) -> Named:

@@ -35,7 +35,7 @@ _PHASE_WORDS = {
     "periodic_noise": "the pattern's phase is the same in all frames but for its sign",
     "bistable_pattern": "the pattern's phase is another in every frame",
 }
-_ABSENT = "whole frames show no more of it than chance does at one of all frequencies"
+ABSENT = "the frames show nothing there that noise does not show at some frequency"
 _BROAD = "frequencies beside it are raised as well: it is no line"
 
 
@@ -79,7 +79,7 @@ class WholeFrames:
             self._looks[frequency] = look(self.layout, self.frames_of, frequency)
         seen = self._looks[frequency]
         if seen.absent:
-            return _ABSENT
+            return ABSENT
         if seen.broad:
             return _BROAD
         if seen.kept is None or seen.kept == (effect.kind == "bistable_pattern"):
@@ -119,8 +119,6 @@ def look(layout: Layout, frames_of: FramesOf, frequency: Frequency) -> Look:
         return Look(absent=False, broad=False, kept=None)
     best = int(power.excess.argmax())
     own, (fx, fy) = power.at([best]), tried[best]
-    if exact:
-        return Look(own.chance * _FEW > _CHANCE, broad=False, kept=own.keeps_phase())
     axes = [
         [(fx + k / columns, fy) for k in (*_NEAR, *_FAR)],
         [(fx, fy + k / rows) for k in (*_NEAR, *_FAR)],
@@ -132,34 +130,28 @@ def look(layout: Layout, frames_of: FramesOf, frequency: Frequency) -> Look:
         float(np.median(around.excess[i * count + len(_NEAR) : (i + 1) * count])) for i in (0, 1)
     )
     own, around = own.above(ground), around.above(ground)
-    absent = own.chance * rows * columns / 2 > _CHANCE
+    real = all((2 * f) % 1 == 0 for f in (fx, fy))
+    bins = _FEW if exact else rows * columns / 2
     broad = False
     for i, axis in enumerate(axes):
-        # The mean of a frame is no neighbour.
+        # The mean of a frame is no neighbour, nor is the same real wave, which runs backwards.
         some = [
             i * count + k
             for k, f in enumerate(axis[: len(_NEAR)])
-            if abs(f[0]) * columns > 0.5 or abs(f[1]) * rows > 0.5
+            if all(_apart(layout, f, other) for other in ((0.0, 0.0), (-fx, -fy)))
         ]
-        mean = float(around.excess[some].mean())
-        raised = mean / around.error * np.sqrt(len(some)) > _RAISED
-        broad |= bool(raised) and mean > _SHARE * float(own.excess[0])
-    return Look(absent, broad, own.keeps_phase())
+        if exact or not some:
+            continue
+        beside = float(np.median(around.excess[some]))  # one of them may be a line itself
+        raised = beside / around.error * np.sqrt(len(some)) > _RAISED
+        broad |= bool(raised) and beside > _SHARE * float(own.excess[0])
+    return Look(own.chance(real=real) * bins > _CHANCE, broad, own.keeps_phase(real=real))
 
 
-def keeps_phase(layout: Layout, frames_of: FramesOf, frequency: Frequency) -> bool | None:
-    """Return whether the phase is kept; None where the frames cannot tell.
-
-    Of stripes and checkerboards of single pixels, all of whose samples are real, it always is.
-
-    Parameters
-    ----------
-    layout, frames_of
-        The frames.
-    frequency
-        Cycles per pixel along x and y.
-    """
-    return _Power.of(layout, _projections(layout, frames_of, [frequency])).keeps_phase()
+def _apart(layout: Layout, one: Frequency, other: Frequency) -> bool:
+    """Return whether two frequencies are more than half a bin apart along an axis."""
+    across, down = ((a - b + 0.5) % 1 - 0.5 for a, b in zip(one, other, strict=True))
+    return abs(across) * layout.columns > 0.5 or abs(down) * layout.rows > 0.5
 
 
 @dataclass(frozen=True)
@@ -218,18 +210,24 @@ class _Power:
         """Standard error of the excess in white noise."""
         return float(1 / np.sqrt(self._sum(2)))
 
-    @property
-    def chance(self) -> float:
-        """Chance of as much at the first frequency: the sum of weighted exponentials as Gamma's."""
+    def chance(self, *, real: bool) -> float:
+        """Return the chance of as much at the first frequency: a sum of squares as Gamma's.
+
+        `real`: all samples of the pattern are real; then squares have one degree of freedom, not
+        two.
+        """
         mean, square = self._sum(1), self._sum(2)
         total = float(self.excess[0]) * square + mean
-        return float(scipy.stats.gamma.sf(total * mean / square, mean**2 / square))
+        spread = square * (2 if real else 1)
+        return float(scipy.stats.gamma.sf(total * mean / spread, mean**2 / spread))
 
-    def keeps_phase(self) -> bool | None:
+    def keeps_phase(self, *, real: bool) -> bool | None:
         """Return whether the first pattern's phase is kept but for its sign; None: untold."""
         free = self.frames
         if free < _LEAST:
             return None
+        if real:
+            return True
         c = np.concatenate([own[:, 0] for own in self.found])
         size = float((np.abs(c) ** 2).sum()) - free  # noise has no phase to keep
         if size > _CLEAR * np.sqrt(free):

@@ -217,12 +217,13 @@ def _tried(
             if possible(proposal.effect)
         ]
         means = _means(state, [proposal.effect for _, proposal in proposed], memory, step)
-        memory.gains |= dict.fromkeys(chosen, -np.inf)
+        for kind in chosen:
+            memory.gains.pop(kind, None)
         for (kind, proposal), mean in zip(proposed, means, strict=True):
             if mean is None:
                 continue
             value = predictor.loglik(mean)
-            memory.gains[kind] = max(memory.gains[kind], value - before)
+            memory.gains[kind] = max(memory.gains.get(kind, -np.inf), value - before)
             if not any(alike(state, mean, other) for other in apart):
                 found.append((value, kind, proposal, mean))
         best = max((value - before for value, *_ in found), default=0.0)

@@ -18,17 +18,21 @@ KEYS = (
 )
 
 
-def wide(kurtosis: float) -> list[float]:
+def wide(kurtosis: float, recorded: float = 0.0) -> list[float]:
     values = np.zeros((16, len(KEYS)))
     values[:, 0] = kurtosis
     errors = np.full(len(KEYS), np.sqrt(24 / SAMPLES))
-    return widening(KEYS, values, errors).tolist()
+    own = np.zeros(len(KEYS))
+    own[0] = recorded
+    return widening(KEYS, values, errors, own).tolist()
 
 
 def test_which_numbers_are_judged_with_care_and_which_not_at_all() -> None:
     assert wide(0.5) == [1.0] * 6
     own = 503 / SAMPLES**0.5
     assert wide(500.0) == pytest.approx([1.0, own, 1.0, np.inf, 1.0, 1.0])
+    assert wide(0.5, recorded=500.0) == wide(500.0)  # the model does not know of them yet
+    assert wide(500.0, recorded=0.5) == wide(500.0)
 
 
 def test_what_a_few_pairs_of_spikes_bring_by_chance_is_within_the_widened_spread() -> None:

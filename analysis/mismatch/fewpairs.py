@@ -13,7 +13,7 @@ _TAILED = 1.0  # excess kurtosis of a sum of products, from which it is not near
 _OF_PRODUCTS = ("correlation", "spectr", "alternation")
 
 
-def widening(keys: Sequence[Key], values: Array, errors: Array) -> Array:
+def widening(keys: Sequence[Key], values: Array, errors: Array, recorded: Array) -> Array:
     """Return by how much sums of products depart farther by chance than a normal law says.
 
     A sum of N products of samples of excess kurtosis K has an excess kurtosis of (3 + K)^2 / N. Of
@@ -28,9 +28,11 @@ def widening(keys: Sequence[Key], values: Array, errors: Array) -> Array:
         Of simulated recordings: (recording, number).
     errors
         In white noise, (number,): that of a kurtosis is (24 / N)^(1/2).
+    recorded
+        Of the recording, (number,): spikes that no model explains yet meet by chance as well.
     """
     pairs = {
-        key.place: (3 + float(np.median(values[:, i]))) * errors[i] / sqrt(24)
+        key.place: (3 + max(float(np.median(values[:, i])), recorded[i])) * errors[i] / sqrt(24)
         for i, key in enumerate(keys)
         if (key.statistic, key.scope) == ("kurtosis", "exposure")
     }

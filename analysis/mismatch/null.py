@@ -85,7 +85,8 @@ def null_of(layout: Layout, simulated: Sequence[Vector], seen: Vector) -> Null:
     # How deep a comb of codes is hangs on the numbers of the camera: on electrons of several DN.
     comb = np.array([key.statistic == "code_imbalance" for key in seen.keys])
     sd = np.where(comb, np.hypot(sd, _COMB * mean), sd)
-    wide = widening(seen.keys, np.where(known, np.nan_to_num(values), 0.0), error)
+    recorded = np.where(known, np.nan_to_num(seen.values), 0.0)
+    wide = widening(seen.keys, np.where(known, np.nan_to_num(values), 0.0), error, recorded)
     known &= np.isfinite(wide)
     sd = np.where(known, sd * wide, sd)
     sums = contrasts(layout, Vector(seen.keys, seen.values, sd), known)

@@ -8,14 +8,39 @@ from hypothesis import strategies as st
 
 from analysis.mismatch.prove import shape as law
 from analysis.mismatch.prove.cells import cells_of
-from analysis.mismatch.prove.shape import EDGES, NORMAL, Shape, interval_of
+from analysis.mismatch.prove.shape import EDGES, NORMAL, Shape, Tally
 from dsis.effects import registry
 from mismatch_recordings import camera
 
 
+def interval_of(residuals: np.ndarray) -> np.ndarray:
+    """Return the interval of each residual; the last ones take all beyond."""
+    found = np.searchsorted(EDGES, residuals.ravel(), side="right") - 1
+    return np.asarray(np.clip(found, 0, EDGES.size - 2))
+
+
+def tally_of(own: np.ndarray, base: np.ndarray) -> Tally:
+    everything = np.ones((1, own.size), np.bool_)
+    frames = (one.astype(np.float32).reshape(1, 1, -1) for one in (own, base))
+    return Tally.of(*frames, everything, everything)
+
+
 def learned_from(own: np.ndarray, base: np.ndarray) -> Shape:
-    one, other = interval_of(own), interval_of(base)
-    return law.shape_of(law.counted(one), law.counted(other), law.moved(one, other))
+    tally = tally_of(own, base)
+    return law.shape_of(tally.ordinary, tally.base_ordinary, tally.exchanged)
+
+
+def test_residuals_are_counted_in_their_intervals() -> None:
+    draws = np.random.default_rng(3)
+    own, base = (draws.standard_t(2, 20_000).astype(np.float32) for _ in range(2))
+    own[:6] = (-250.0, -200.0, -4.0, 4.0, 199.9, 250.0)
+    tally, one, other = tally_of(own, base), interval_of(own), interval_of(base)
+    size = EDGES.size - 1
+    assert np.array_equal(tally.ordinary, np.bincount(one, minlength=size))
+    assert np.array_equal(tally.base_ordinary, np.bincount(other, minlength=size))
+    left = [np.bincount(each[one != other], minlength=size) for each in (one, other)]
+    assert np.array_equal(tally.exchanged, left[0] + left[1])
+    assert tally.odd.sum() == tally.base_odd.sum() == 0
 
 
 def gains(mass: np.ndarray) -> np.ndarray:

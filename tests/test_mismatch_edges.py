@@ -1,6 +1,7 @@
 """Lines that have not settled: the effect, the numbers that see it, and that it is named."""
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace as Stub
 from typing import Any
@@ -261,3 +262,13 @@ def test_a_named_decay_says_at_which_edge() -> None:
     assert named["choices"] == {"edge": "top"}
     assert "edge top; length 6.00 ± 0.50 pixels" in verdict(NAMED)[0]
     assert "edge top" in summary(NAMED)
+
+
+def test_many_effects_are_named_without_their_numbers() -> None:
+    (one,) = NAMED.omitted_physics
+    others = [replace(one, effect=kind) for kind in ("row_noise", "prnu", "flicker")]
+    many = replace(NAMED, omitted_physics=(one, one, *others))
+    said = verdict(many)[0]
+    assert "pixels" not in said
+    assert said.count("lines that have not settled (2 of them)") == 1
+    assert "row noise" in said

@@ -1,6 +1,6 @@
 """What was found, in sentences: for the page and for the terminal."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from itertools import pairwise
 from math import isfinite
 
@@ -19,6 +19,7 @@ from analysis.mismatch.report.numbers import interval, measured, plain
 from analysis.mismatch.words import effect_words, place, statistic_words, unit
 
 _NAMED = 3
+_IN_FULL = 4  # effects that one sentence can hold with their numbers
 
 
 def verdict(finding: Finding) -> tuple[str, ...]:
@@ -29,7 +30,7 @@ def verdict(finding: Finding) -> tuple[str, ...]:
         case "parameters":
             said = ["The physics is complete; its numbers are off."]
         case "omitted_physics":
-            names = joined(_effect_in_short(e) for e in finding.omitted_physics)
+            names = _in_short(finding.omitted_physics)
             said = [f"The camera model leaves out {names}.", *unproven(finding)]
         case "unexplained":
             said = ["Something differs, and no effect of the vocabulary is proven to explain it."]
@@ -102,6 +103,17 @@ def parameters(effect: OmittedEffect) -> str:
     """Return all parameters of an effect: `edge left; length 6.1 ± 0.2 pixels` say."""
     words = (f"{name} {value.replace('_', ' ')}" for name, value in effect.choices.items())
     return "; ".join([*words, *(fitted(name, p) for name, p in effect.parameters.items())])
+
+
+def _in_short(effects: Sequence[OmittedEffect]) -> str:
+    """Return the effects in words; where they are many, the table beside has the numbers."""
+    if len(effects) <= _IN_FULL:
+        return joined(_effect_in_short(e) for e in effects)
+    kinds = [effect_words(e.effect) for e in effects]
+    return joined(
+        f"{kind} ({kinds.count(kind)} of them)" if kinds.count(kind) > 1 else kind
+        for kind in dict.fromkeys(kinds)
+    )
 
 
 def _effect_in_short(effect: OmittedEffect) -> str:

@@ -29,7 +29,7 @@ from analysis.mismatch.observe import observe
 from analysis.mismatch.parameters import parameter_errors
 from analysis.mismatch.phase import WholeFrames
 from analysis.mismatch.pictures import Album, evidence_of
-from analysis.mismatch.recalibrate import Calibrated, calibrate
+from analysis.mismatch.recalibrate import Calibrated
 from analysis.mismatch.remarks import remarks_on
 from analysis.mismatch.segments import bent, second_path
 from analysis.mismatch.settle import would_settle
@@ -164,14 +164,7 @@ def _calibrated_to(setting: Setting, whole: State, camera: Camera) -> Calibrated
     """Return the model with base numbers that saw no locked frame."""
     if whole.setting is setting:
         return whole.calibrated
-    return calibrate(
-        camera,
-        setting.layout,
-        setting.seen,
-        setting.interpolated,
-        seed=setting.seed,
-        jobs=setting.jobs,
-    )
+    return setting.calibrated(camera)
 
 
 def _proof_without(

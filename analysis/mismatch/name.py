@@ -23,7 +23,6 @@ from analysis.mismatch.rank import (
     ties,
     twin,
 )
-from analysis.mismatch.recalibrate import calibrate
 from analysis.mismatch.resolved import opened
 from analysis.mismatch.segments import second_path
 from analysis.mismatch.state import Setting, State
@@ -184,17 +183,7 @@ class Search:
         effect = None if named.proposal is None else named.proposal.effect
         if effect is not None and not effect.measures & {"level", "pixel_variance"}:
             return camera  # levels and variances know nothing of it
-        own = self.setting
-        model = calibrate(
-            camera,
-            own.layout,
-            own.seen,
-            own.interpolated,
-            seed=own.seed,
-            jobs=own.jobs,
-            near=state.calibrated,
-        )
-        return model.model.camera
+        return self.setting.calibrated(camera, state.calibrated).model.camera
 
     def drop(self, state: State, named: Named, why: str) -> State:
         """Return the state without an effect, which is refused from now on."""

@@ -66,6 +66,18 @@ class Setting:
         few = (1, 1, 2) if layout.samples > _MEDIUM else (2, 2, 4)
         return cls(layout, seen, interpolated, seed, jobs, 16, 8, *few)
 
+    def calibrated(self, camera: Camera, near: Calibrated | None = None) -> Calibrated:
+        """Return the model with base numbers fitted to what was observed; see `calibrate`."""
+        return calibrate(
+            camera,
+            self.layout,
+            self.seen,
+            self.interpolated,
+            seed=self.seed,
+            jobs=self.jobs,
+            near=near,
+        )
+
 
 @dataclass(frozen=True)
 class State:
@@ -118,15 +130,7 @@ class State:
         """
         nulls = setting.drafts if draft else setting.nulls
         layout, seen = setting.layout, setting.seen
-        calibrated = calibrate(
-            camera,
-            layout,
-            seen,
-            setting.interpolated,
-            seed=setting.seed,
-            jobs=setting.jobs,
-            near=None if near is None else near.calibrated,
-        )
+        calibrated = setting.calibrated(camera, None if near is None else near.calibrated)
         vectors, fits = [], []
         for first in range(0, nulls, setting.jobs):
             batch = range(first, min(first + setting.jobs, nulls))

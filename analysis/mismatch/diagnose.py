@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from analysis.mismatch.candidates import CANDIDATES
 from analysis.mismatch.evidence import Evidence
-from analysis.mismatch.explain import because, explained
+from analysis.mismatch.explain import because, changes, explained
 from analysis.mismatch.feigned import heated
 from analysis.mismatch.finding import (
     Alternative,
@@ -31,7 +31,7 @@ from analysis.mismatch.phase import WholeFrames
 from analysis.mismatch.pictures import Album, evidence_of
 from analysis.mismatch.recalibrate import Calibrated
 from analysis.mismatch.remarks import remarks_on
-from analysis.mismatch.segments import bent, second_path
+from analysis.mismatch.segments import second_path
 from analysis.mismatch.settle import would_settle
 from analysis.mismatch.source import Source
 from analysis.mismatch.split import Split
@@ -116,7 +116,8 @@ def _found(
         search = Search(setting, camera, whole, words, step)
         proof = _proof_without(trial, whole, _calibrated_to(setting, whole, camera), step, source)
         evidence = evidence_of(whole, whole, album if large else trial.numbers.album, split)
-        return _said(_finding(camera, whole, whole, search, {}, proof), remarks, evidence, words)
+        found = _finding(camera, whole, whole, search, {}, proof, {})
+        return _said(found, remarks, evidence, words)
     base = whole if large else State.of(setting, camera, step)
     search = Search(
         setting,
@@ -127,9 +128,11 @@ def _found(
         lines=WholeFrames(stages(layout)[-1][0] if large else layout, frames_of),
     )
     final = _searched(search, source) if large else search.run()
+    known: dict[str, Array] = {}
     if large:  # simulations of large recordings tell more, and cost more
         search.setting = replace(setting, nulls=setting.drafts)
         final = _undenied(search, final)  # all frames may deny what some showed
+        known = changes(whole, final, search.named, partial(search.without, final))
     final, gains = _proven(search, search.settle(final), trial, judged=large)
     if not large and (denied := _heated(search, final, whole, step)) is not None:
         final = search.further(search.drop(final, *denied))
@@ -140,7 +143,8 @@ def _found(
         final = State.of(whole.setting, final.camera, step) if search.named else whole
         departures = Change(len(whole.mismatches), len(final.mismatches))
         proof = replace(proof, discrepancies=departures)
-    return _said(_finding(camera, whole, final, search, gains, proof), remarks, evidence, words)
+    found = _finding(camera, whole, final, search, gains, proof, known)
+    return _said(found, remarks, evidence, words)
 
 
 def _said(
@@ -303,9 +307,14 @@ def _finding(
     search: Search,
     gains: dict[str, Gain],
     proof: Proof,
+    known: Mapping[str, Array],
 ) -> Finding:
+    """Return the finding; `known` are changes by effect that were asked for already."""
     errors = parameter_errors(camera, final.calibrated, final.setting.layout, final.fits)
-    explanations = explained(base, final, _changes(search, base, final))
+    missing = [named for named in search.named if named.name not in known]
+    more = changes(base, final, missing, partial(search.without, final))
+    own = {**known, **more}
+    explanations = explained(base, final, {one.name: own[one.name] for one in search.named})
     mismatches = tuple(
         replace(m, explained_by=None if name is None else kind_of(name), z_after=after)
         for m in base.mismatches
@@ -342,21 +351,6 @@ def _finding(
         final.camera,
         search.considered(tied),
     )
-
-
-def _changes(search: Search, base: State, final: State) -> dict[str, Array]:
-    """Return what each effect named changes in the numbers, in deviations of the base null."""
-    null, predictor, found = base.null, final.predictor(), {}
-    bare = {n.name: search.without(final, n) for n in search.named if n.proposal is not None}
-    predictor.ready(bare.values())
-    for named in search.named:
-        if named.name in bare:
-            change = final.null.mean - predictor.mean(bare[named.name])
-        else:
-            change = bent(base, final)
-        known = null.known & np.isfinite(change)
-        found[named.name] = np.where(known, change, 0.0) / null.sd
-    return found
 
 
 def _omitted(named: Named, why: tuple[str, ...], gain: Gain) -> OmittedEffect:

@@ -1,12 +1,15 @@
 """Which effect explains which mismatch: by what each changes in the numbers that are off."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.locate import FAMILY
+from analysis.mismatch.named import Named
+from analysis.mismatch.segments import bent
 from analysis.mismatch.state import State
+from dsis.camera import Camera
 
 Array = NDArray[np.float64]
 _LEFT = 0.4  # of a departure may be left where it is called explained
@@ -48,6 +51,23 @@ def explained(
         top = float(np.abs(z).max())
         clear = best is not None and score[best] > 0 and (not still or left < _LEFT * top)
         found[mismatch.statistic] = (best if clear else None, left)
+    return found
+
+
+def changes(
+    base: State, final: State, named: Sequence[Named], without: Callable[[Named], Camera]
+) -> dict[str, Array]:
+    """Return what each effect changes in the numbers, in deviations of the base null."""
+    null, predictor, found = base.null, final.predictor(), {}
+    bare = {one.name: without(one) for one in named if one.proposal is not None}
+    predictor.ready(bare.values())
+    for one in named:
+        if one.name in bare:
+            change = final.null.mean - predictor.mean(bare[one.name])
+        else:
+            change = bent(base, final)
+        known = null.known & np.isfinite(change)
+        found[one.name] = np.where(known, change, 0.0) / null.sd
     return found
 
 

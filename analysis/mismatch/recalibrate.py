@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
-from math import isfinite, sqrt
+from math import inf, isfinite, nan, sqrt
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from dsis.measures.spikes import SPIKED
 _ROUNDS = 4
 _LEAST = 0.01  # of a signal: with the above, half a thousandth of it is as good as none
 _SAME = 0.05  # of an error: the fit has settled
+_CLOSER = 0.3  # a round's change beside that of the one before, unless two have shown it
 _SWITCH_DEVIANCE = 12.0  # by which another gap must fit better before the switch is moved
 _APART = 1.005  # ratio of signals from which they are two levels
 
@@ -101,18 +102,24 @@ def calibrate(
         )
 
     before: BaseFit | None = None
+    change = nan
     for _ in range(_ROUNDS if bending else 1):
         recorded = _sum(undone, effects)
         fit = fitted(recorded, switches)
-        if before is not None and _same(before, fit, seen.levels):
-            break
-        before = fit
-        if len(switches) == 1:
+        settled = False
+        if before is not None:
+            last, change = change, _change(before, fit, seen.levels)
+            closer = change / last if isfinite(last) and last > 0 else _CLOSER
+            settled = change * min(closer, 1.0) <= _SAME  # what another round would change
+        if len(switches) == 1 and not settled:
             own, added = recorded.fitted(seen.levels)
             again = partial(fitted, replace(added, bulk_dn2={}), levels=own)
             switches = _moved(own, left_out, switches, fit, again)
             fit = fitted(recorded, switches)
+        before = fit
         model = Model(with_numbers(camera, fit, switches, layout.black_dn), signals_of(layout, fit))
+        if settled:
+            break
         effects = bending_offsets(model, layout, seed + 1, jobs, spiky=spiky)
     if layout.scenes:
         model = with_pictures(model, layout, fit, effects, seed=seed + 1, jobs=jobs)
@@ -120,31 +127,28 @@ def calibrate(
     return Calibrated(model, fit, fitted(offsets, switches), offsets, switches, left_out, effects)
 
 
-def _same(one: BaseFit, other: BaseFit, levels: Mapping[Place, Level]) -> bool:
-    """Return whether two fits differ by little of their errors, and by less of their signals.
+def _change(one: BaseFit, other: BaseFit, levels: Mapping[Place, Level]) -> float:
+    """Return by how much two fits differ at most, in errors, or shares of a signal.
 
     A fall of the light takes of level and variance alike: slope and intercept know nothing of it.
     """
-
-    def near(a: float, b: float, error: float) -> bool:
-        return not isfinite(error) or abs(a - b) <= _SAME * error
-
-    settled = all(
-        near(signal, other.signal_dn[place], max(levels[place].level_error_dn, _LEAST * signal))
+    changes = [
+        (signal, other.signal_dn[place], max(levels[place].level_error_dn, _LEAST * signal))
         for place, signal in one.signal_dn.items()
-    )
-    return (
-        settled
-        and all(
-            near(a.slope, b.slope, a.slope_error)
-            and near(a.intercept, b.intercept, a.intercept_error)
-            for a, b in zip(one.pieces, other.pieces, strict=True)
-        )
-        and all(
-            near(value, other.black_dn[c], one.black_error_dn[c])
-            for c, value in one.black_dn.items()
-        )
-    )
+    ]
+    for a, b in zip(one.pieces, other.pieces, strict=True):
+        changes += [(a.slope, b.slope, a.slope_error)]
+        changes += [(a.intercept, b.intercept, a.intercept_error)]
+    changes += [
+        (value, other.black_dn[c], one.black_error_dn[c]) for c, value in one.black_dn.items()
+    ]
+    return max((_in_errors(*own) for own in changes), default=0.0)
+
+
+def _in_errors(a: float, b: float, error: float) -> float:
+    if not isfinite(error) or a == b:
+        return 0.0
+    return abs(a - b) / error if error > 0 else inf
 
 
 def with_numbers(

@@ -45,10 +45,12 @@ class Simulations:
     def ready(self, cameras: Iterable[Camera], replicates: int) -> None:
         """Simulate side by side what will be asked for: few recordings of each of many cameras."""
         wanted = {camera.model_dump_json(): camera for camera in cameras}
+        # By replicates: cameras of one share draws, which are kept for a while.
         missing = [
             (key, number)
+            for number in range(replicates)
             for key in wanted
-            for number in range(len(self.kept.get(key, ())), replicates)
+            if number >= len(self.kept.get(key, ()))
         ]
         if self.jobs < 2 or len(missing) < 2:
             return

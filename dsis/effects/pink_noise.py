@@ -14,7 +14,7 @@ from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, Stage
 from dsis.grid import PixelGrid
 from dsis.kept import Kept
 
-_SERIES = Kept(96 << 20)  # many cameras are simulated on the same draws; all frames of a proof fit
+_SERIES = Kept(400 << 20)  # many cameras are simulated on the same draws: 300 frames of VGA
 
 
 class PinkNoise(Effect):

@@ -24,6 +24,7 @@ from analysis.mismatch.source import Source
 from analysis.mismatch.split import Split
 from analysis.mismatch.state import Setting, State
 from analysis.mismatch.taking import layout_of
+from analysis.mismatch.thinned import Stage, thinned
 from analysis.mismatch.touches import touched
 from analysis.mismatch.vector import Vector, vector
 from dsis.camera import Camera
@@ -34,6 +35,7 @@ Simulated = Callable[[str], Iterable[NDArray[np.generic]]]
 _SIMULATIONS = 16
 _FEW = 5  # where simulations are large
 _MOST_KEPT = 8e7  # samples of simulated frames, two bytes each
+_MOST_EXPOSURES = 10  # of a large recording, that have no locked frames and so add none
 
 
 @dataclass(frozen=True)
@@ -70,7 +72,7 @@ class HeldNumbers:
     def _watched(self) -> tuple[Layout, Observation, Album]:
         numbers = {
             e.name: tuple(sorted((*e.numbers, *self.split.locked.get(e.name, ()))))
-            for e in self.setting.layout.exposures
+            for e in self.rest[0].exposures
         }
         layout = layout_of(self.recording, numbers, self.source.frames)
         album = Album(layout)
@@ -78,6 +80,23 @@ class HeldNumbers:
             layout, lambda name: self.source.frames(name, numbers[name]), album, keep=True
         )
         return layout, seen, album
+
+    @cached_property
+    def rest(self) -> tuple[Layout, Observation]:
+        """Layout and observation of the frames before the locked ones.
+
+        Of a large recording, few of the exposures that have no locked frames.
+        """
+        whole = self.setting.layout
+        if not whole.large:
+            return whole, self.setting.seen
+        others = tuple(e for e in whole.exposures if not self.split.locked.get(e.name))
+        most = max((len(e.numbers) for e in others), default=0)
+        few = thinned(replace(whole, exposures=others), Stage(most, _MOST_EXPOSURES, 0.0))
+        left_out = {e.name for e in others} - {e.name for e in few.exposures}
+        kept = tuple(e for e in whole.exposures if e.name not in left_out)
+        layout, numbers = replace(whole, exposures=kept), {e.name: e.numbers for e in kept}
+        return layout, observe(layout, lambda name: self.source.frames(name, numbers[name]))
 
     @property
     def frames(self) -> int:
@@ -94,7 +113,7 @@ class HeldNumbers:
         yardstick = _yardstick(final, without)
         one, other = (self._made(yardstick, final, camera) for camera in (final.camera, without))
         layout, seen = self.whole
-        parts = ((layout, seen), (self.setting.layout, self.setting.seen))
+        parts = ((layout, seen), self.rest)
         recorded = [_vector_of(yardstick, *part) for part in parts]
         keys, places = _shared(recorded)
         whole, rest = (
@@ -114,8 +133,8 @@ class HeldNumbers:
         judge = yardstick.model.camera.model_dump_json()
         key = f"{judge} {final.camera.model_dump_json()} {camera.model_dump_json()}"
         if key not in self.kept:
-            whole, rest = self.whole[0], self.setting.layout
-            count = _FEW if whole.large else _SIMULATIONS
+            whole, rest = self.whole[0], self.rest[0]
+            count = _FEW if self.setting.large else _SIMULATIONS
             model, seed = final.calibrated.model.with_camera(camera), self.setting.seed + 3
 
             seen = each(partial(_two, model, whole, rest, seed), range(count), self.setting.jobs)

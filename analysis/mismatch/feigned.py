@@ -7,6 +7,7 @@ from analysis.mismatch.bank.edges import edge_shapes
 from analysis.mismatch.bank.seams import SMOOTH_DEGREE, beyond_smooth, seam_shapes
 from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.edged import STATISTIC, edged, single
+from analysis.mismatch.recalibrate import code_step
 from analysis.mismatch.state import State
 from analysis.mismatch.uneven import uneven
 from dsis.effects import Effect
@@ -15,10 +16,13 @@ from dsis.measures.spikes import variance_of_quartiles
 Array = NDArray[np.float64]
 _MAPS = {"dsnu": ("offset", "offset alone"), "prnu": ("gain", "gain alone")}
 _AXES = {"row_fpn": "rows", "column_fpn": "columns", "row_prnu": "rows", "column_prnu": "columns"}
+_TAILED = frozenset({"heavy_tailed_read_noise"})
 _GROWING = frozenset({"row_prnu", "column_prnu"})
 _CLEAR = 5.0  # standard errors of what stands out with exposure time
 _SHAPED = frozenset({"half_seam", "parity", STATISTIC})
-_MOST = 0.5  # of a pattern's variance, that something else may feign
+_MOST = 0.5  # of a pattern's variance, or of tails, that something else may feign
+_SCATTER = 1.84  # see `coded`
+_LIKELY = 2.0  # standard deviations that chance may well have
 
 
 def of_another(state: State, effect: Effect, without: Array) -> Denial | None:
@@ -35,6 +39,7 @@ def of_another(state: State, effect: Effect, without: Array) -> Denial | None:
         or single(state, effect)
         or heated(state, kind)
         or uneven(state, effect)
+        or coded(state, kind, without)
     )
 
 
@@ -130,6 +135,38 @@ def heated(state: State, kind: str) -> Denial | None:
     )
     why = "pixels that stand out with exposure time are left, whose dark current is noisy too"
     return Denial(0.0, why) if hot else None
+
+
+def coded(state: State, kind: str, without: Array) -> Denial | None:
+    """Return how heavy tails are denied by codes that are not equally wide; None: they are not.
+
+    Codes whose widths scatter by d (of a code) change the excess kurtosis of noise of s codes by
+    chance: by sum(w 4 He2(u) phi(u)) / s over codes at u, whose standard deviation is 1.84 d /
+    sqrt(s). It is the same in all exposures at one level, for the codes are. Where they are left
+    unexplained, and feign half of what tails would explain, there may be no tails.
+    """
+    codes = ("code_imbalance", "code_spacing")
+    if kind not in _TAILED or all(m.statistic not in codes for m in state.mismatches):
+        return None
+    claimed, left = {}, {}
+    keys = zip(state.vector.keys, state.null.known, strict=True)
+    for i, (key, known) in enumerate(keys):
+        place = (key.exposure, key.channel)
+        if not known or place not in state.setting.seen.levels or key.scope != "exposure":
+            continue
+        if key.statistic == "kurtosis":
+            claimed[place] = state.null.mean[i] - without[i]
+        elif key.statistic == "code_imbalance":
+            left[place] = state.vector.values[i] - state.null.mean[i]
+    whole, fake = 0.0, 0.0
+    for place in claimed.keys() & left.keys():
+        sd = max(state.setting.seen.levels[place].variance_dn2, 1e-9) ** 0.5
+        feigned_here = _LIKELY * _SCATTER * left[place] * (code_step(state.camera) / sd) ** 0.5
+        whole += claimed[place] ** 2
+        fake += claimed[place] * max(feigned_here, 0.0)
+    if fake <= _MOST * whole:
+        return None
+    return Denial(1 - fake / whole if whole else 0.0, "codes are not equally wide, and feign tails")
 
 
 def outlying(state: State, kind: str) -> Denial | None:

@@ -10,6 +10,7 @@ from analysis.mismatch.candidates import CANDIDATES
 from analysis.mismatch.contradicted import refuted
 from analysis.mismatch.instance import LINES, Frequency, frequency_of, instance
 from analysis.mismatch.judge import LITTLE, NEEDLESS, Judge
+from analysis.mismatch.mapped import as_maps_show
 from analysis.mismatch.named import Named, camera_without, renewed
 from analysis.mismatch.phase import ABSENT, WholeFrames
 from analysis.mismatch.polish import polish, with_effects
@@ -261,7 +262,7 @@ class Search:
             if len(self.settled) > len(settled):
                 continue  # a line was refused: behind it another may be
             before = len(self.doubted)
-            fitted = self._undoubted(state, fitted)
+            fitted = self._undoubted(state, as_maps_show(state, fitted))
             if len(self.doubted) > before:
                 continue  # all that was fitted of a kind is denied: others were too far behind it
             if not fitted or fitted[0].gain < LEAST_GAIN:

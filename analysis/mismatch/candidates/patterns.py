@@ -20,6 +20,7 @@ _FALL = "falloff_percent"
 _TILTS = ("tilt_down_percent", "tilt_right_percent")
 _BOWS = ("bow_down_percent", "bow_right_percent")
 _ROUND, _BOWED = (_FALL, *_TILTS), (*_TILTS, *_BOWS)
+SURFACES = frozenset({_FALL, *_BOWED})
 _CLEAR = 3.0  # standard errors from which a tilt is worth a trial
 _JUMP = 0.15  # z of the step where halves meet, of that of their means: some 0.4 of two amplifiers
 _UNEVEN = ("shading", "line_settling", "tap_mismatch")
@@ -69,11 +70,11 @@ def _fitted(clues: Clues, names: Sequence[str]) -> tuple[dict[str, float], set[s
     values, errors = np.zeros(len(names)), np.zeros(len(names))
     images = clues.image("gain")
     for channel, (image, noise) in images.items():
-        surfaces, had = _surfaces(image.shape, names), _had(clues, channel)
-        inverse = np.linalg.inv(surfaces @ surfaces.T)
+        shapes = surfaces(image.shape, names)
+        inverse = np.linalg.inv(shapes @ shapes.T)
         scale = 100 / clues.scale("gain", channel) / len(images)
-        rest = scale * (image - image.mean()).ravel() - had / len(images)
-        values += inverse @ surfaces @ rest
+        rest = scale * (image - image.mean()).ravel() - had(clues, channel) / len(images)
+        values += inverse @ shapes @ rest
         errors = np.hypot(errors, scale * noise * np.sqrt(np.diag(inverse)))
     own = dict(zip(names, values.tolist(), strict=True))
     clear = {name for name, error in zip(names, errors, strict=True)
@@ -86,11 +87,11 @@ def _of_strength(clues: Clues) -> Sequence[Proposal]:
     variance, _ = clues.amplitude("fixed_smooth_variance", _squared(clues))
     if variance <= 0:
         return []
-    spread = float(_surfaces((clues.layout.rows, clues.layout.columns), (_FALL,)).var())
+    spread = float(surfaces((clues.layout.rows, clues.layout.columns), (_FALL,)).var())
     return _of_light({_FALL: 100 * sqrt(variance / spread)}, (_FALL,))
 
 
-def _had(clues: Clues, channel: str) -> Array:
+def had(clues: Clues, channel: str) -> Array:
     """Return how the camera's own effects make the light uneven, per cent, less their mean.
 
     Those of uneven light, and those whose lines feign it: (pixel,).
@@ -123,7 +124,7 @@ def _of_light(own: Mapping[str, float], names: Sequence[str]) -> list[Proposal]:
     return proposals("shading", names, [n for n in names if n != _FALL], **start)
 
 
-def _surfaces(shape: tuple[int, ...], names: Sequence[str]) -> Array:
+def surfaces(shape: tuple[int, ...], names: Sequence[str]) -> Array:
     """Return what shading does to a unit of light for 1 of each number: (surface, pixel)."""
     n, m = shape
     y, x = ((np.arange(size) - (size - 1) / 2) / (size / 2) for size in shape)

@@ -1,0 +1,62 @@
+"""Codes that are not equally wide change the tails of noise: that is no heavy-tailed noise."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.stats import norm
+
+from analysis.mismatch.bank.key import Key
+from analysis.mismatch.feigned import coded
+
+TAILS = "heavy_tailed_read_noise"
+
+
+def _kurtosis(rms: float, sd: float, rng: np.random.Generator) -> float:
+    """Return the excess kurtosis of Gaussian noise of `sd` codes read by codes of unequal width."""
+    half = int(10 * sd)
+    codes = np.arange(-half, half + 1)
+    edges = np.concatenate([[0.0], np.cumsum(1 + rms * rng.standard_normal(codes.size))])
+    share = np.diff(norm.cdf((edges - edges[half] - 0.5) / sd))
+    share /= share.sum()
+    centred = codes - (share * codes).sum()
+    return float((share * centred**4).sum() / (share * centred**2).sum() ** 2 - 3)
+
+
+def _state(claimed: float, imbalance: float, variance: float = 9.0, located: bool = True) -> Any:
+    """Return a state with tails, whose darks use their codes unevenly beyond the model."""
+    keys = tuple(
+        Key(statistic=s, scope="exposure", exposure="dark", channel="MONO", detail="")
+        for s in ("kurtosis", "code_imbalance")
+    )
+    level = SimpleNamespace(variance_dn2=variance)
+    return SimpleNamespace(
+        camera=SimpleNamespace(effect=()),
+        setting=SimpleNamespace(seen=SimpleNamespace(levels={("dark", "MONO"): level})),
+        vector=SimpleNamespace(keys=keys, values=np.array([claimed, imbalance])),
+        null=SimpleNamespace(mean=np.array([claimed, 0.0]), known=np.ones(2, bool)),
+        mismatches=[SimpleNamespace(statistic="code_imbalance")] if located else [],
+    )
+
+
+WITHOUT = np.zeros(2)
+
+
+@pytest.mark.parametrize(("rms", "sd"), [(0.1, 2.0), (0.08, 3.0), (0.2, 6.0)])
+def test_tails_as_codes_of_a_converter_feign_them_are_denied(rms: float, sd: float) -> None:
+    rng = np.random.default_rng(8)
+    drawn = np.array([_kurtosis(rms, sd, rng) for _ in range(400)])
+    denied = [coded(_state(k, rms, sd**2), TAILS, WITHOUT) is not None for k in drawn if k > 0]
+    assert np.mean(denied) > 0.98  # four standard deviations are feigned, and half of that is asked
+    assert drawn.std() == pytest.approx(1.84 * rms / sd**0.5, rel=0.1)
+
+
+def test_tails_far_beyond_what_codes_feign_are_believed() -> None:
+    assert coded(_state(0.6, 0.08), TAILS, WITHOUT) is None
+
+
+def test_codes_that_are_explained_feign_nothing() -> None:
+    assert coded(_state(0.1, 0.08, located=False), TAILS, WITHOUT) is None
+    assert coded(_state(0.1, 0.0), TAILS, WITHOUT) is None
+    assert coded(_state(0.1, 0.08), "rts", WITHOUT) is None

@@ -24,9 +24,15 @@ HALVES = Proposal(TapMismatch(gain_percent=0.1), ("gain_percent",), frozenset())
 
 
 def _camera() -> Camera:
-    values = {"schema": "dsis-camera/1", "name": "test", "cfa": "MONO", "black_level": 64.0,
-              "white_level": 4095, "bit_depth": 12,
-              "noise": {"shot": "gaussian", "segment": [{"slope": 1.0, "intercept": 1.0}]}}  # fmt: skip
+    values = {
+        "schema": "dsis-camera/1",
+        "name": "test",
+        "cfa": "MONO",
+        "black_level": 64.0,
+        "white_level": 4095,
+        "bit_depth": 12,
+        "noise": {"shot": "gaussian", "segment": [{"slope": 1.0, "intercept": 1.0}]},
+    }
     return Camera.model_validate(values)
 
 

@@ -9,6 +9,7 @@ from analysis.mismatch.candidates.candidate import Candidate, Proposal, proposal
 from analysis.mismatch.clues import Clues
 
 _UNTOLD_PERCENT = 1.0  # start where levels do not tell
+_LEAST_FLATS = 2  # on each side of a switch
 
 
 def _dark_current(clues: Clues) -> Sequence[Proposal]:
@@ -77,18 +78,20 @@ def skewness_below(limit: float) -> float:
 
 
 def _gain_mismatch(clues: Clues) -> Sequence[Proposal]:
+    """Start from the step of the levels at the switch; a side of one flat only has no step."""
     ends = [s.upper_dn for s in clues.camera.noise.segment if s.upper_dn is not None]
+    flats = {e.name for e in clues.layout.exposures if e.kind == "flat"}
     if not ends:
         return []
-    below: list[float] = []
-    above: list[float] = []
+    sides: tuple[dict[str, list[float]], ...] = ({}, {})
     for place, (value, _) in clues.excess("level").items():
         s = clues.signal(place)
-        if s > 0:
-            (above if s >= ends[0] else below).append(value / s)
-    if not below or not above:
+        if s > 0 and place[0] in flats:
+            sides[int(s >= ends[0])].setdefault(place[0], []).append(value / s)
+    if any(len(side) < _LEAST_FLATS for side in sides):
         return []
-    step = 100 * (float(np.median(above)) - float(np.median(below)))
+    below, above = (float(np.median(np.concatenate(list(side.values())))) for side in sides)
+    step = 100 * (above - below)
     return proposals(
         "dual_gain_mismatch",
         ["gain_error_percent"],

@@ -21,6 +21,11 @@ class Kept:
         self._most, self._bytes, self._lock = most_bytes, 0, Lock()
         self._arrays: OrderedDict[Hashable, NDArray[Any]] = OrderedDict()
 
+    def keep(self, most_bytes: int) -> None:
+        """Keep so much at least from now on."""
+        with self._lock:
+            self._most = max(self._most, most_bytes)
+
     def of(self, key: Hashable, make: Callable[[], NDArray[Any]]) -> NDArray[Any]:
         """Return the array of a key, read-only, made now unless it is there."""
         with self._lock:

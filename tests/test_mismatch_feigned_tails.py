@@ -1,5 +1,6 @@
 """Codes that are not equally wide change the tails of noise: that is no heavy-tailed noise."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -33,7 +34,15 @@ def _state(claimed: float, imbalance: float, variance: float = 9.0, located: boo
     level = SimpleNamespace(variance_dn2=variance)
     return SimpleNamespace(
         camera=SimpleNamespace(effect=()),
-        setting=SimpleNamespace(seen=SimpleNamespace(levels={("dark", "MONO"): level})),
+        setting=SimpleNamespace(
+            seen=SimpleNamespace(levels={("dark", "MONO"): level, ("flat", "MONO"): level}),
+            layout=SimpleNamespace(
+                exposures=[
+                    SimpleNamespace(name="dark", kind="dark"),
+                    SimpleNamespace(name="flat", kind="flat"),
+                ]
+            ),
+        ),
         vector=SimpleNamespace(keys=keys, values=np.array([claimed, imbalance])),
         null=SimpleNamespace(mean=np.array([claimed, 0.0]), known=np.ones(2, bool)),
         mismatches=[SimpleNamespace(statistic="code_imbalance")] if located else [],
@@ -60,3 +69,18 @@ def test_codes_that_are_explained_feign_nothing() -> None:
     assert coded(_state(0.1, 0.08, located=False), TAILS, WITHOUT) is None
     assert coded(_state(0.1, 0.0), TAILS, WITHOUT) is None
     assert coded(_state(0.1, 0.08), "rts", WITHOUT) is None
+
+
+def test_tails_where_widths_are_unknown_count_as_claimed() -> None:
+    """Noise of less than two codes in the darks: what flats show of widths is no word on those."""
+    state = _state(1.5, np.nan)
+    keys = [*state.vector.keys]
+    keys += [replace(key, exposure="flat") for key in keys]
+    state.vector.keys, state.vector.values = tuple(keys), np.array([1.5, np.nan, 0.01, 0.02])
+    state.null.mean = np.array([1.5, np.nan, 0.01, 0.0])
+    state.null.known = np.array([True, False, True, True])
+    assert coded(state, TAILS, np.zeros(4)) is None
+
+
+def test_numbers_that_nothing_is_known_of_deny_nothing() -> None:
+    assert coded(_state(0.1, 0.08), TAILS, np.array([np.nan, 0.0])) is None

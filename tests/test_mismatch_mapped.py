@@ -11,10 +11,10 @@ from analysis.mismatch.layout import sites
 from analysis.mismatch.mapped import as_maps_show
 from analysis.mismatch.polish import Polished
 from analysis.mismatch.rank import Ranked
-from dsis.camera import Camera
 from dsis.cfa import Cfa
 from dsis.effects.shading import Shading
 from dsis.effects.tap_mismatch import TapMismatch
+from mismatch_recordings import camera
 
 ROWS, COLUMNS, TOP_DN, NOISE_DN = 96, 128, 1000.0, 1.0
 TILT = Proposal(
@@ -23,28 +23,14 @@ TILT = Proposal(
 HALVES = Proposal(TapMismatch(gain_percent=0.1), ("gain_percent",), frozenset())
 
 
-def _camera() -> Camera:
-    values = {
-        "schema": "dsis-camera/1",
-        "name": "test",
-        "cfa": "MONO",
-        "black_level": 64.0,
-        "white_level": 4095,
-        "bit_depth": 12,
-        "noise": {"shot": "gaussian", "segment": [{"slope": 1.0, "intercept": 1.0}]},
-    }
-    return Camera.model_validate(values)
-
-
 def _state(image: Any) -> Any:
     """Return a state whose only map is `image`; both effects change one of its two numbers."""
-    camera = _camera()
     layout = SimpleNamespace(
         rows=ROWS, columns=COLUMNS, cfa=Cfa.MONO, sites=sites(Cfa.MONO), channels=("MONO",)
     )
     clues = SimpleNamespace(
         layout=layout,
-        camera=camera,
+        camera=camera(),
         image=lambda name: {"MONO": (image, NOISE_DN)} if name == "gain" else {},
         scale=lambda _name, _channel: TOP_DN,
     )
@@ -87,6 +73,38 @@ def test_what_maps_do_not_tell_stays_as_it_was() -> None:
 def test_effects_that_change_other_numbers_are_no_rivals() -> None:
     order = [_ranked(TILT, 40.0), _ranked(HALVES, 36.0, (0.0, 9.0))]
     assert as_maps_show(_state(_map("step", 30.0, 1)), order) == order
+
+
+def test_smooth_light_of_any_form_is_no_step() -> None:
+    """A curve that no shading has: the step would come nearer to it than a lean does."""
+    line = np.linspace(-1, 1, COLUMNS)
+    for seed, size in enumerate((0.2, 0.3, 0.5, 1.0)):
+        curve = size * (line - line**3) + _map("none", 0.0, seed)
+        order = [_ranked(TILT, 40.0), _ranked(HALVES, 36.0)]
+        assert as_maps_show(_state(curve), order) == order
+
+
+def test_numbers_that_are_sure_need_no_map() -> None:
+    order = [_ranked(TILT, 400.0), _ranked(HALVES, 20.0)]
+    assert as_maps_show(_state(_map("step", 12.0, 1)), order) == order
+
+
+def test_every_proposal_of_light_falls_behind_halves() -> None:
+    both = Proposal(
+        Shading(falloff_percent=0.1, tilt_right_percent=0.1),
+        ("falloff_percent", "tilt_right_percent"),
+        frozenset({"tilt_right_percent"}),
+    )
+    order = [_ranked(TILT, 40.0), _ranked(both, 39.0), _ranked(HALVES, 36.0)]
+    one, *others = as_maps_show(_state(_map("step", 14.0, 3)), order)
+    assert one.kind == "tap_mismatch"
+    assert one.gain == 40.0
+    assert all(2.0 <= other.gain < 37.0 for other in others)
+
+
+def test_a_map_without_noise_says_nothing_wrong() -> None:
+    order = [_ranked(TILT, 40.0), _ranked(HALVES, 36.0)]
+    assert as_maps_show(_state(np.zeros((ROWS, COLUMNS))), order)[0].kind == "shading"
 
 
 def test_a_clear_map_keeps_apart_what_the_numbers_tie() -> None:

@@ -309,7 +309,7 @@ def _finding(
     proof: Proof,
     known: Mapping[str, Array],
 ) -> Finding:
-    """Return the finding; `known` are changes by effect that were asked for already."""
+    """Return the finding; `known` are changes by effect asked for before all was settled."""
     errors = parameter_errors(camera, final.calibrated, final.setting.layout, final.fits)
     missing = [named for named in search.named if named.name not in known]
     more = changes(base, final, missing, partial(search.without, final))

@@ -142,31 +142,39 @@ def coded(state: State, kind: str, without: Array) -> Denial | None:
 
     Codes whose widths scatter by d (of a code) change the excess kurtosis of noise of s codes by
     chance: by sum(w 4 He2(u) phi(u)) / s over codes at u, whose standard deviation is 1.84 d /
-    sqrt(s). It is the same in all exposures at one level, for the codes are. Where they are left
-    unexplained, and feign half of what tails would explain, there may be no tails.
+    sqrt(s). It is the same in all darks, which use the same codes, and another at each level. Where
+    such widths are left unexplained, and two standard deviations feign half of what tails would
+    explain, there may be no tails. What is claimed where widths are unknown, in less noise than two
+    codes, counts as claimed.
     """
     codes = ("code_imbalance", "code_spacing")
     if kind not in _TAILED or all(m.statistic not in codes for m in state.mismatches):
         return None
     claimed, left = {}, {}
-    keys = zip(state.vector.keys, state.null.known, strict=True)
-    for i, (key, known) in enumerate(keys):
+    for i, key in enumerate(state.vector.keys):
         place = (key.exposure, key.channel)
+        known = state.null.known[i] and np.isfinite(without[i])
         if not known or place not in state.setting.seen.levels or key.scope != "exposure":
             continue
         if key.statistic == "kurtosis":
             claimed[place] = state.null.mean[i] - without[i]
         elif key.statistic == "code_imbalance":
-            left[place] = state.vector.values[i] - state.null.mean[i]
-    whole, fake = 0.0, 0.0
-    for place in claimed.keys() & left.keys():
+            seen, expected = state.vector.values[i], state.null.mean[i]
+            left[place] = np.sqrt(max(seen**2 - expected**2, 0.0)) if seen > 0 else 0.0
+    whole = sum(change**2 for change in claimed.values())
+    darks = {e.name for e in state.setting.layout.exposures if e.kind == "dark"}
+    in_darks, elsewhere = 0.0, 0.0
+    for place in sorted(claimed.keys() & left.keys()):
         sd = max(state.setting.seen.levels[place].variance_dn2, 1e-9) ** 0.5
-        feigned_here = _LIKELY * _SCATTER * left[place] * (code_step(state.camera) / sd) ** 0.5
-        whole += claimed[place] ** 2
-        fake += claimed[place] * max(feigned_here, 0.0)
-    if fake <= _MOST * whole:
+        scatter = _SCATTER * left[place] * (code_step(state.camera) / sd) ** 0.5
+        if place[0] in darks:
+            in_darks += abs(claimed[place]) * scatter
+        else:
+            elsewhere += (claimed[place] * scatter) ** 2
+    fake = _LIKELY * (in_darks**2 + elsewhere) ** 0.5
+    if whole <= 0 or fake <= _MOST * whole:
         return None
-    return Denial(1 - fake / whole if whole else 0.0, "codes are not equally wide, and feign tails")
+    return Denial(1 - fake / whole, "codes are not equally wide, and feign tails")
 
 
 def outlying(state: State, kind: str) -> Denial | None:

@@ -35,7 +35,7 @@ Simulated = Callable[[str], Iterable[NDArray[np.generic]]]
 _SIMULATIONS = 16
 _FEW = 5  # where simulations are large
 _MOST_KEPT = 8e7  # samples of simulated frames, two bytes each
-_MOST_EXPOSURES = 10  # of a large recording, that have no locked frames and so add none
+_MOST_EXPOSURES = 10  # of a large recording, that have no locked frames: both sides know them
 
 
 @dataclass(frozen=True)
@@ -94,6 +94,8 @@ class HeldNumbers:
         most = max((len(e.numbers) for e in others), default=0)
         few = thinned(replace(whole, exposures=others), Stage(most, _MOST_EXPOSURES, 0.0))
         left_out = {e.name for e in others} - {e.name for e in few.exposures}
+        if not left_out:
+            return whole, self.setting.seen
         kept = tuple(e for e in whole.exposures if e.name not in left_out)
         layout, numbers = replace(whole, exposures=kept), {e.name: e.numbers for e in kept}
         return layout, observe(layout, lambda name: self.source.frames(name, numbers[name]))

@@ -109,8 +109,7 @@ def calibrate(
         settled = False
         if before is not None:
             last, change = change, _change(before, fit, seen.levels)
-            closer = change / last if isfinite(last) and last > 0 else _CLOSER
-            settled = change * min(closer, 1.0) <= _SAME  # what another round would change
+            settled = change <= _SAME or _left(change, last) <= _SAME
         if len(switches) == 1 and not settled:
             own, added = recorded.fitted(seen.levels)
             again = partial(fitted, replace(added, bulk_dn2={}), levels=own)
@@ -145,10 +144,17 @@ def _change(one: BaseFit, other: BaseFit, levels: Mapping[Place, Level]) -> floa
     return max((_in_errors(*own) for own in changes), default=0.0)
 
 
+def _left(change: float, last: float) -> float:
+    """Return what further rounds would change, each the same share of the one before."""
+    share = change / last if isfinite(last) and last > 0 else _CLOSER
+    return change * share / (1 - share) if share < 1 else inf
+
+
 def _in_errors(a: float, b: float, error: float) -> float:
     if not isfinite(error) or a == b:
         return 0.0
-    return abs(a - b) / error if error > 0 else inf
+    change = abs(a - b) / error if error > 0 else inf
+    return change if isfinite(change) else inf
 
 
 def with_numbers(

@@ -14,7 +14,7 @@ from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, Stage
 from dsis.grid import PixelGrid
 from dsis.kept import Kept
 
-_SERIES = Kept(400 << 20)  # many cameras are simulated on the same draws: 300 frames of VGA
+_SERIES = Kept(96 << 20)  # many cameras are simulated on the same draws; all frames of a proof fit
 
 
 class PinkNoise(Effect):
@@ -74,6 +74,11 @@ class PinkNoise(Effect):
             for k, v in zip(y, in_columns, strict=True)
         )
         return point.components(float(covariance[0]), row, column, frame)
+
+
+def keep_series(most_bytes: int) -> None:
+    """Keep up to so many bytes of series in this process, where the same draws come back."""
+    _SERIES.keep(most_bytes)
 
 
 def _series(exposure: Exposure) -> NDArray[np.float32]:

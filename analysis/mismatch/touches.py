@@ -20,6 +20,9 @@ _FIXED = frozenset(
 _CORRELATIONS = frozenset(
     {"correlation_0_1", "correlation_1_0", "correlation_1_1", "correlation_0_2", "correlation_2_0"}
 )
+_SIDED = frozenset(
+    {"half_seam", "parity", "fixed_edge", "fixed_smooth_tilt", "fixed_smooth_falloff"}
+)
 # A mean over frames keeps 1/T of the lines' and frames' own noise.
 _FOLLOWS = {
     "kurtosis_within_pixels": frozenset({"kurtosis"}),
@@ -50,8 +53,14 @@ _FOLLOWS = {
 
 
 def touched(keys: Sequence[Key], effects: Sequence[Effect]) -> NDArray[np.bool_]:
-    """Return which numbers some of the effects may change."""
-    declared = frozenset(name for effect in effects for name in effect.measures)
+    """Return which numbers some of the effects may change.
+
+    What is drawn at random for every line or pixel has no side: it leans one way on one sensor and
+    the other way on the next. Few simulated sensors would say which, and be wrong.
+    """
     names = {key.statistic for key in keys}
-    may = {name for name in names if declared & _FOLLOWS.get(name, frozenset({name}))}
+    may: set[str] = set()
+    for effect in effects:
+        own = {name for name in names if effect.measures & _FOLLOWS.get(name, frozenset({name}))}
+        may |= own - _SIDED if effect.draws else own
     return np.array([key.statistic in may for key in keys], bool)

@@ -16,7 +16,6 @@ from dsis.measures.spikes import variance_of_quartiles
 Array = NDArray[np.float64]
 _MAPS = {"dsnu": ("offset", "offset alone"), "prnu": ("gain", "gain alone")}
 _AXES = {"row_fpn": "rows", "column_fpn": "columns", "row_prnu": "rows", "column_prnu": "columns"}
-_TAILED = frozenset({"heavy_tailed_read_noise"})
 _GROWING = frozenset({"row_prnu", "column_prnu"})
 _CLEAR = 5.0  # standard errors of what stands out with exposure time
 _SHAPED = frozenset({"half_seam", "parity", STATISTIC})
@@ -148,7 +147,7 @@ def coded(state: State, kind: str, without: Array) -> Denial | None:
     codes, counts as claimed.
     """
     codes = ("code_imbalance", "code_spacing")
-    if kind not in _TAILED or all(m.statistic not in codes for m in state.mismatches):
+    if kind != "heavy_tailed_read_noise" or all(m.statistic not in codes for m in state.mismatches):
         return None
     claimed, left = {}, {}
     for i, key in enumerate(state.vector.keys):

@@ -89,11 +89,7 @@ def _fitted(clues: Clues, effect: Effect, names: Sequence[str]) -> tuple[Array, 
     for channel, (image, noise) in clues.image("gain").items():
         rest, scale = _rest(clues, channel, image)
         shapes = _shapes(clues, effect, names, channel, image.shape)
-        weights = [
-            max(_variance(rest.mean(axis)), (scale * noise) ** 2 / image.shape[axis], _LEAST)
-            ** -0.5
-            for axis in (0, 1)
-        ]
+        weights = [_precision(rest, axis, scale * noise) ** 0.5 for axis in (0, 1)]
         own, *design = (
             np.concatenate([weights[axis] * one.mean(axis) for axis in (0, 1)])
             for one in (rest, *shapes)
@@ -117,7 +113,7 @@ def _step(clues: Clues, effect: Effect) -> float:
         rest, scale = _rest(clues, channel, image)
         axis = _AXIS[effect.regions]
         lines = rest.mean(axis)
-        weight = 1 / max(_variance(lines), (scale * noise) ** 2 / image.shape[axis], _LEAST)
+        weight = _precision(rest, axis, scale * noise)
         own = beyond_smooth(_halves(clues, effect, channel, image.shape).mean(axis))
         top += weight * float(own @ lines)
         bottom += weight * float(own @ own)
@@ -131,10 +127,15 @@ def _rest(clues: Clues, channel: str, image: Array) -> tuple[Array, float]:
     return scale * (image - image.mean()) - had(clues, channel).reshape(image.shape), scale
 
 
-def _variance(lines: Array) -> float:
-    """Return the variance of means of lines beside smooth curves and the step of halves."""
+def _precision(image: Array, axis: int, noise: float) -> float:
+    """Return one over the variance of means of lines beside smooth curves and the step of halves.
+
+    It is at most that of white noise of a pixel.
+    """
+    lines = image.mean(axis)
     rest, (step, _) = beyond_smooth(lines), seam_shapes(lines.size)
-    return float((rest - step * (step @ rest)).var())
+    scatter = float((rest - step * (step @ rest)).var())
+    return float(1 / max(scatter, noise**2 / image.shape[axis], _LEAST))
 
 
 def _shapes(

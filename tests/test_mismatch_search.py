@@ -183,6 +183,42 @@ def test_an_effect_is_dropped_only_where_many_simulations_say_so(
     assert asked.needless([effect]) == (effect, judge.NEEDLESS)
 
 
+@pytest.mark.parametrize(
+    ("worths", "hides", "dropped", "why"),
+    [
+        ((124.0, 8.8), "carry_over", "readout_memory", "it takes the place of what adc_memory"),
+        ((5.0, 8.8), "carry_over", "adc_memory", "it shows 0%"),  # beside the other it is little
+        ((124.0, 8.8), "", "adc_memory", "it shows 0%"),  # whatever else is there
+    ],
+)
+def test_what_takes_the_place_of_a_stronger_effect_goes_before_it(
+    monkeypatch: pytest.MonkeyPatch,
+    worths: tuple[float, float],
+    hides: str,
+    dropped: str,
+    why: str,
+) -> None:
+    memory = _proposal("adc_memory", step_dn=0.4, period_codes=64, at_code=3.0)
+    strong = Named("adc_memory", memory, {}, 124.0, ())
+    weak = Named(
+        "readout_memory", _proposal("readout_memory", fraction=0.01, lag_pixels=8), {}, 8.8, ()
+    )
+    worth = {"adc_memory": worths[0], "readout_memory": worths[1]}
+
+    def denial(_state: Any, _asked: Any, kind: str, _without: str, another: str = "") -> Any:
+        wrong = kind == "adc_memory" and not (hides and another == "readout_memory")
+        return SimpleNamespace(share=0.0, why="it shows 0%") if wrong else None
+
+    predictor = SimpleNamespace(replicates=2, ready=list, mean=lambda one: one, worth=worth.get)
+    state: Any = SimpleNamespace(predictor=lambda *_: predictor)
+    monkeypatch.setattr(judge, "contradicted", denial)
+    monkeypatch.setattr(judge, "of_another", lambda *_: None)
+    found = Judge(state, lambda named: named.kind, 16).denied([strong, weak])  # type: ignore[arg-type, return-value] # no camera
+    assert found is not None
+    assert found[0].kind == dropped
+    assert found[1].startswith(why)
+
+
 def test_beside_what_gains_much_only_what_gained_enough_is_tried_anew(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

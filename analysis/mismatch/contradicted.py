@@ -26,7 +26,13 @@ class Denial:
     why: str
 
 
-def contradicted(state: State, predictor: Predictor, kind: str, without: Camera) -> Denial | None:
+def contradicted(
+    state: State,
+    predictor: Predictor,
+    kind: str,
+    without: Camera,
+    another: Camera | None = None,
+) -> Denial | None:
     """Return how an effect of the state's camera is denied by the recording; None: it is not.
 
     Of each statistic that calls for the effect, over all channels and over all exposures with light
@@ -34,9 +40,11 @@ def contradicted(state: State, predictor: Predictor, kind: str, without: Camera)
     sum(c d) / sum(c^2) is 1 for the right effect, c and d in standard deviations that allow for its
     form. One statistic that shows less than half of it denies the effect: a tilt, say, is nearly a
     difference of the halves, but has no step where they meet; an amplifier glows in the dark too.
+    `another`: the state's camera without another effect, were that not there.
     """
-    mean = predictor.mean(without)
-    return _denied(state, predictor, kind, mean, state.null.mean, state.null.sd)
+    mean, own = predictor.mean(without), state.null.mean
+    shift = 0.0 * own if another is None else np.nan_to_num(predictor.mean(another) - own)
+    return _denied(state, predictor, kind, mean + shift, own + shift, state.null.sd)
 
 
 def refuted(state: State, predictor: Predictor, kind: str, mean: Array) -> Denial | None:

@@ -4,6 +4,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
+import numpy as np
+from numpy.typing import NDArray
+
 from analysis.mismatch.contradicted import contradicted
 from analysis.mismatch.feigned import of_another
 from analysis.mismatch.named import Named
@@ -13,7 +16,9 @@ from analysis.mismatch.resolved import resolved
 from analysis.mismatch.state import State
 from dsis.camera import Camera
 
+Array = NDArray[np.float64]
 LITTLE, NEEDLESS = "it would explain", "the others explain what it would explain"
+INSTEAD = "it takes the place of what"
 _RESOLVED = 0.7  # share of what an effect touches that it must explain
 Verdict = tuple[float, str]
 """The share that an effect explains of what it changes, and why that is too little."""
@@ -38,8 +43,41 @@ class Judge:
     nulls: int
 
     def denied(self, some: Sequence[Named]) -> tuple[Named, str] | None:
-        """Return the effect that the recording denies most, and why; None: it denies none."""
-        return self._worst(self._denial, some)
+        """Return the effect that the recording denies most, and why; None: it denies none.
+
+        What takes the place of an effect that explains more than itself goes first.
+        """
+        worst = self._worst(self._denial, some)
+        if worst is None:
+            return None
+        weaker = self._in_place_of(worst[0], some)
+        return worst if weaker is None else (weaker, f"{INSTEAD} {worst[0].name} explains better")
+
+    def _in_place_of(self, denied: Named, some: Sequence[Named]) -> Named | None:
+        """Return the weakest effect without which the recording would not deny another.
+
+        Each is judged beside the other: what is wrong itself explains little beside what is right.
+        """
+        effects = [one for one in some if one.proposal is not None]
+        if denied not in effects:
+            return None
+        worths = {one.name: self._predictor.worth(self._mean(one)) for one in effects}
+        weaker = [one for one in effects if worths[one.name] < worths[denied.name]]
+        sure = self.state.predictor(max(self.nulls, self._predictor.replicates))
+        for asked in (self._predictor, sure) if weaker else ():
+            if self._shown(asked, denied, None):
+                return None  # it is denied for something else
+            weaker = [one for one in weaker if self._shown(asked, denied, one)]
+        return min(weaker, key=lambda one: worths[one.name], default=None)
+
+    def _shown(self, predictor: Predictor, named: Named, but: Named | None) -> bool:
+        """Return whether statistics show what an effect predicts, were another not there."""
+        another = None if but is None else self.without(but)
+        without = self.without(named)
+        return contradicted(self.state, predictor, named.kind, without, another) is None
+
+    def _mean(self, named: Named) -> Array:
+        return self._predictor.mean(self.without(named))
 
     def needless(self, some: Sequence[Named]) -> tuple[Named, str] | None:
         """Return the effect that explains least of what it changes, and why; None: all do."""

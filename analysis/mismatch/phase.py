@@ -10,12 +10,12 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-import scipy.special
 import scipy.stats
 from numpy.typing import NDArray
 
 from analysis.mismatch.instance import Frequency, frequency_of, same_line
 from analysis.mismatch.layout import Layout
+from analysis.mismatch.phaselaw import kept_rather_than_free
 from dsis.effects import Effect
 
 FramesOf = Callable[[str], Iterable[NDArray[np.generic]]]
@@ -23,7 +23,6 @@ _ONE_LINE, _CIRCLE = 0.75, 0.45
 _LEAST = 8  # frames, to tell
 _CLEAR = 8.0  # standard errors of the noise's power from which a line's phase is seen
 _SURE = 3.0  # of log-likelihood, to prefer one kind of phase
-_PHASES = 48  # of half a turn that are tried
 _ASIDE = 3  # bins to the neighbours that say what is around
 _NEAR = (-2, -1, 1, 2)  # bins to those that a line leaves as they are
 _FAR = (-23, -17, -13, -9, 9, 13, 17, 23)  # bins to those that say what lines have in common
@@ -235,16 +234,8 @@ class _Power:
             if share > _ONE_LINE or share < _CIRCLE:
                 return share > _ONE_LINE
         amplitude = np.sqrt(max(float(self.excess[0]), 0.0))
-        own = np.concatenate([
-            np.full(len(one), amplitude * np.sqrt(w))
-            for one, w in zip(self.found, self.weights, strict=True)
-        ])  # fmt: skip
-        turned = 2 * own * np.abs(c)
-        any_phase = float((np.log(scipy.special.i0e(turned)) + turned).sum())
-        phases = np.exp(-1j * np.pi * np.arange(_PHASES) / _PHASES)[:, np.newaxis]
-        along = 2 * own * np.real(c * phases)
-        one_phase = float((np.logaddexp(along, -along) - np.log(2)).sum(1).max())
-        more = one_phase - any_phase - np.log(free) / 2  # the phase is fitted
+        own = [amplitude * np.sqrt(w) for w in self.weights]
+        more = kept_rather_than_free([one[:, 0] for one in self.found], own)
         return None if abs(more) < _SURE else bool(more > 0)
 
 

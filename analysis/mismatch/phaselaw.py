@@ -1,0 +1,72 @@
+"""How likely a line's projections are if its phase is kept but for its sign, or is another in each.
+
+A frame's projection is m + a s u + noise or m + a exp(i phi) + noise, the noise's mean square 1: m
+is what all frames share, a fixed pattern at the line's frequency, and is known from few frames only
+so badly that it is integrated out; u is one phase, s a random sign, phi a random phase.
+"""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+import scipy.special
+from numpy.typing import NDArray
+
+Complex = NDArray[np.complex128]
+Array = NDArray[np.float64]
+_PHASES = 32  # of half a turn that are tried
+_STRENGTHS = np.array([0.7, 0.9, 1.1, 1.4])  # of an amplitude that is not exact
+_STEP = 0.5  # of m, in standard deviations of the noise
+_REACH = 3.5  # standard deviations of m
+_MOST = 6.0  # amplitude of one frame beyond which less noise tells no more
+
+
+def kept_rather_than_free(found: Sequence[Complex], amplitudes: Sequence[float]) -> float:
+    """Return the log-likelihood of a phase that is kept but for its sign, less that of a free one.
+
+    Both are means over amplitudes about those given, the first also over the phase that is kept.
+
+    Parameters
+    ----------
+    found
+        Projections of the frames of each exposure: (frame,), noise of mean square 1.
+    amplitudes
+        The line's amplitude in each, in the same unit.
+    """
+    kept, free = np.zeros((_STRENGTHS.size, _PHASES)), np.zeros(_STRENGTHS.size)
+    for own, amplitude in zip(found, amplitudes, strict=True):
+        for i, strength in enumerate(_STRENGTHS):
+            one, other = _likelihoods(own, strength * amplitude)
+            kept[i] += one
+            free[i] += other
+    both = (scipy.special.logsumexp(x) - np.log(x.size) for x in (kept, free))
+    return float(next(both) - next(both))
+
+
+def _likelihoods(found: Complex, amplitude: float) -> tuple[Array, float]:
+    """Return log-likelihoods of each phase that is kept, and of free phases, up to a constant."""
+    if amplitude > _MOST:
+        found, amplitude = found * (_MOST / amplitude), _MOST
+    centre = found.mean()
+    reach = _REACH * (amplitude + 1) / np.sqrt(found.size)
+    reach = min(reach, amplitude + _REACH)
+    side = np.arange(-reach, reach + _STEP, _STEP)
+    shared = (centre + side[:, np.newaxis] + 1j * side).reshape(-1)
+    squares = np.full(shared.size, -found.size * amplitude**2)
+    free = np.zeros(shared.size)
+    kept = np.zeros((_PHASES, shared.size))
+    for apart in (one - shared for one in found):
+        size = np.abs(apart)
+        squares -= size**2
+        turned = 2 * amplitude * size
+        free += np.log(scipy.special.i0e(turned)) + turned
+        for i, phase in enumerate(_phases()):
+            along = np.abs(2 * amplitude * np.real(apart * phase))
+            kept[i] += along + np.log1p(np.exp(-2 * along)) - np.log(2)  # of cosh
+    return (
+        scipy.special.logsumexp(kept + squares, axis=1),
+        float(scipy.special.logsumexp(free + squares)),
+    )
+
+
+def _phases() -> Iterator[complex]:
+    yield from np.exp(-1j * np.pi * np.arange(_PHASES) / _PHASES)

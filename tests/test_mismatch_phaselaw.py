@@ -1,0 +1,70 @@
+"""Phases that are kept but for their sign, and free ones: closed forms, and data of known law."""
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from analysis.mismatch import phaselaw
+from analysis.mismatch.phaselaw import kept_rather_than_free
+
+Complex = NDArray[np.complex128]
+
+
+def _noise(rng: np.random.Generator, frames: int) -> Complex:
+    """Return noise of mean square 1."""
+    made: Complex = (rng.normal(size=frames) + 1j * rng.normal(size=frames)) / np.sqrt(2)
+    return made
+
+
+@pytest.mark.parametrize("amplitude", [0.5, 1.5, 4.0])
+def test_two_frames_are_told_as_their_difference_is(amplitude: float) -> None:
+    """What both share drops out: d = a (s1 - s2) u + noise, of variance 2."""
+    found = np.array([0.7 + 0.2j, -1.9 - 1.1j])
+    difference = found[0] - found[1]
+    turns = np.pi * np.arange(phaselaw._PHASES) / phaselaw._PHASES
+    kept = [
+        np.mean([np.exp(-(abs(difference - sign * amplitude * np.exp(1j * turn)) ** 2) / 2)
+                 for sign in (0, 0, -2, 2)])
+        for turn in turns
+    ]  # fmt: skip
+    around = 2 * np.pi * np.arange(400) / 400
+    circle = np.exp(1j * around[:, np.newaxis]) - np.exp(1j * around)
+    free = np.mean(np.exp(-(np.abs(difference - amplitude * circle) ** 2) / 2))
+    one, other = phaselaw._likelihoods(found, amplitude)
+    assert one - other == pytest.approx(np.log(kept) - np.log(free), abs=0.01)
+
+
+def test_one_frame_says_nothing() -> None:
+    assert kept_rather_than_free([np.array([3.0 + 1.0j])], [2.0]) == pytest.approx(0, abs=0.02)
+
+
+@pytest.mark.parametrize("kept", [True, False])
+def test_what_has_one_phase_is_told_from_what_has_any(kept: bool) -> None:
+    """Six frames of six exposures, the line at two of its errors in each, beside fixed patterns."""
+    rng = np.random.default_rng(7)
+    told = []
+    for _ in range(20):
+        found, turn = [], np.exp(2j * np.pi * rng.random())
+        for _ in range(6):
+            sign = rng.choice([-1, 1], 6) * turn
+            phases = sign if kept else np.exp(2j * np.pi * rng.random(6))
+            found.append(2.0 * phases + _noise(rng, 6) + 5.0 * _noise(rng, 1))
+        told.append(kept_rather_than_free(found, [2.0] * 6))
+    wrong = [one for one in told if (one > 0) != kept]
+    assert len(wrong) <= 1
+    assert abs(np.median(told)) > 5
+
+
+def test_a_strong_line_is_no_harder_to_tell_than_one_that_is_just_clear() -> None:
+    rng = np.random.default_rng(8)
+    signs = np.array([1, -1, -1, 1, -1, 1])
+    found = 400 * signs * np.exp(0.3j) + _noise(rng, 6)
+    assert kept_rather_than_free([found], [400.0]) > 5
+    free = 400 * np.exp(2j * np.pi * rng.random(6)) + _noise(rng, 6)
+    assert kept_rather_than_free([free], [400.0]) < -5
+
+
+def test_noise_alone_tells_nothing() -> None:
+    rng = np.random.default_rng(9)
+    found = [_noise(rng, 8) for _ in range(6)]
+    assert abs(kept_rather_than_free(found, [0.1] * 6)) < 0.2

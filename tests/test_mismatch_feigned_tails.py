@@ -9,7 +9,7 @@ import pytest
 from scipy.stats import norm
 
 from analysis.mismatch.bank.key import Key
-from analysis.mismatch.feigned import coded
+from analysis.mismatch.feigned import coded, lopsided
 
 TAILS = "heavy_tailed_read_noise"
 
@@ -84,3 +84,27 @@ def test_tails_where_widths_are_unknown_count_as_claimed() -> None:
 
 def test_numbers_that_nothing_is_known_of_deny_nothing() -> None:
     assert coded(_state(0.1, 0.08), TAILS, np.array([np.nan, 0.0])) is None
+
+
+def _leaning(skewness: float, expected: float, sd: float) -> Any:
+    """Return a state with tails, whose null knows how far chance leans such noise."""
+    key = Key(statistic="skewness", scope="exposure", exposure="dark", channel="MONO", detail="")
+    z = np.array([(skewness - expected) / sd])
+    return SimpleNamespace(
+        vector=SimpleNamespace(keys=(key,), values=np.array([skewness])),
+        null=SimpleNamespace(departures=lambda _: z),
+    )
+
+
+@pytest.mark.parametrize(
+    ("skewness", "sd", "denied"),
+    [
+        (40.0, 1.5, True),  # spikes of one sign
+        (-40.0, 1.5, True),
+        (40.0, 20.0, False),  # one large value: chance, among tails as heavy
+        (0.6, 0.02, False),  # shot noise of three electrons
+    ],
+)
+def test_heavy_tails_lean_to_no_side(skewness: float, sd: float, denied: bool) -> None:
+    assert (lopsided(_leaning(skewness, 0.0, sd), TAILS) is not None) == denied
+    assert lopsided(_leaning(skewness, 0.0, sd), "impulse") is None

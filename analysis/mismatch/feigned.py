@@ -21,6 +21,8 @@ _CLEAR = 5.0  # standard errors of what stands out with exposure time
 _SHAPED = frozenset({"half_seam", "parity", STATISTIC})
 _MOST = 0.5  # of a pattern's variance, or of tails, that something else may feign
 _SCATTER = 1.84  # see `coded`
+_FAR_OFF = 8.0  # standard deviations that no chance has
+_FEW_ELECTRONS = 1.0  # skewness of shot noise of one electron: read noise beside it lessens it
 _LIKELY = 2.0  # standard deviations that chance may well have
 
 
@@ -39,6 +41,7 @@ def of_another(state: State, effect: Effect, without: Array) -> Denial | None:
         or heated(state, kind)
         or uneven(state, effect)
         or coded(state, kind, without)
+        or lopsided(state, kind)
     )
 
 
@@ -174,6 +177,29 @@ def coded(state: State, kind: str, without: Array) -> Denial | None:
     if whole <= 0 or fake <= _MOST * whole:
         return None
     return Denial(1 - fake / whole, "codes are not equally wide, and feign tails")
+
+
+def lopsided(state: State, kind: str) -> Denial | None:
+    """Return how heavy tails are denied by noise that leans to one side; None: they are not.
+
+    Heavy-tailed noise is as likely above as below. Chance leans it far, which the null with its
+    tails knows; what leans beyond that, and more than shot noise can, are spikes of one sign.
+    """
+    if kind != "heavy_tailed_read_noise":
+        return None
+    left = state.null.departures(state.vector)
+    leans = any(
+        key.statistic == "skewness"
+        and key.scope == "exposure"
+        and abs(z) > _FAR_OFF
+        and abs(value) > _FEW_ELECTRONS
+        for key, z, value in zip(state.vector.keys, left, state.vector.values, strict=False)
+    )
+    return (
+        Denial(0.0, "its tails are alike on both sides, those of the noise are not")
+        if leans
+        else None
+    )
 
 
 def outlying(state: State, kind: str) -> Denial | None:

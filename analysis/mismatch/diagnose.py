@@ -212,7 +212,7 @@ def _searched(search: Search, source: Source) -> State:
         found = (search.resumed if layout == last[0] else search.begun)(state)
         camera = found.camera if search.named else search.camera
     search.setting, search.base = whole, base
-    final = State.of(whole, camera, search.step) if search.named else base
+    final = State.of(whole, camera, search.step, draft=True) if search.named else base
     return search.resumed(final) if layout == whole.layout else _switched(search, final)
 
 

@@ -13,7 +13,7 @@ from analysis.mismatch.judge import LITTLE, NEEDLESS, Judge
 from analysis.mismatch.mapped import as_maps_show
 from analysis.mismatch.named import Named, camera_without, renewed
 from analysis.mismatch.phase import ABSENT, WholeFrames
-from analysis.mismatch.polish import polish, with_effects
+from analysis.mismatch.polish import Slopes, polish, with_effects
 from analysis.mismatch.predict import Predictor
 from analysis.mismatch.rank import (
     LEAST_GAIN,
@@ -60,6 +60,7 @@ class Search:
     lines: WholeFrames | None = None
     memory: Memory = field(default_factory=Memory)
     polished: State | None = None
+    known: Slopes = field(default_factory=Slopes)  # of the parameters fitted last
     rough: bool = False  # a strong effect was taken in since
     least: float = LEAST_GAIN  # for an effect to be taken in
 
@@ -77,7 +78,7 @@ class Search:
         What too few frames denied may be proposed again. What is chosen among many, which more
         frames tell better, is looked for once more, and everything fitted once more.
         """
-        self.memory, self.refused, self.tied = Memory(), {}, {}
+        self.memory, self.refused, self.tied, self.known = Memory(), {}, {}, Slopes()
         for named in [n for n in self.named if n.kind in _CHOSEN]:
             self.named.remove(named)
             bare = self.without(state, named)
@@ -327,8 +328,10 @@ class Search:
         sparse = replicates_for(self.setting, [p.effect for _, p in mine])
         predictor = state.predictor(max(self.setting.polishing, sparse))
         # Of a large recording each simulation tells much and costs much: `settle` steps once more.
-        rounds = 1 if self.setting.large else 2
-        polished = polish(predictor, bare, [p for _, p in mine], rounds, self._slopes(state))
+        rounds, before = (1, self.known) if self.setting.large else (2, None)
+        polished = polish(
+            predictor, bare, [p for _, p in mine], rounds, self._slopes(state), before
+        )
         self.polished = state
         if polished is None:
             return state

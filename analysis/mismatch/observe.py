@@ -24,6 +24,7 @@ from analysis.mismatch.bank.waves import Waves, WaveSums
 from analysis.mismatch.layout import Layout, Place
 from analysis.mismatch.scenes import Local
 from dsis.measures import Accumulator, Channel, Measured
+from dsis.measures.plane import Transforms
 
 Array = NDArray[np.float64]
 
@@ -108,9 +109,14 @@ class Observation:
         return self.levels.get(place) or self.local.get(place)
 
 
-def measure(layout: Layout, frames: Iterable[NDArray[np.generic]]) -> Measured:
-    """Return the measures of one exposure's frames."""
-    sums = Accumulator(layout.rows, layout.columns, layout.cfa, layout.black_dn, layout.white_dn)
+def measure(
+    layout: Layout,
+    frames: Iterable[NDArray[np.generic]],
+    spectra: Callable[[Transforms], None] | None = None,
+) -> Measured:
+    """Return the measures of one exposure's frames; `spectra` as an `Accumulator` has it."""
+    size, codes = (layout.rows, layout.columns), (layout.black_dn, layout.white_dn)
+    sums = Accumulator(*size, layout.cfa, *codes, spectra=spectra)
     for frame in frames:
         sums.add(frame)
     return sums.result()
@@ -157,7 +163,10 @@ class _Whole:
     ) -> Measured:
         """Return the measures of an exposure's frames; take what moves in them, unless `still`."""
         lines, after = Waves(self.shape), CarryOver(keep=self.samples)
-        found = measure(self.layout, after.watching(lines.watching(seen)))
+        if self.mosaic:
+            found = measure(self.layout, after.watching(lines.watching(seen)))
+        else:  # its transforms are at hand
+            found = measure(self.layout, after.watching(seen), lambda one: lines.take(one[0]))
         self.memory.add(after, still=still)
         if not still:
             places = {name: (exposure, name) for name in found.channels}

@@ -1,7 +1,7 @@
 """Parameters of effects by Gauss-Newton steps on the bank's numbers, predicted by simulation."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import exp, log
 
 import numpy as np
@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from analysis.mismatch.candidates import Proposal
+from analysis.mismatch.instance import alike_effects
 from analysis.mismatch.predict import Predictor
 from dsis.camera import Camera
 from dsis.effects import Effect
@@ -45,17 +46,31 @@ class Polished:
     errors: tuple[dict[str, float], ...]
 
 
+@dataclass
+class Slopes:
+    """How numbers moved with parameters before: with other effects beside it changes little."""
+
+    found: list[tuple[Effect, str, Array]] = field(default_factory=list)
+
+    def of(self, effect: Effect, name: str) -> Array | None:
+        """Return how numbers move with a parameter of an effect; None: it is not known."""
+        same = (j for known, own, j in self.found if own == name and alike_effects(known, effect))
+        return next(same, None)
+
+
 def polish(
     predictor: Predictor,
     camera: Camera,
     start: Sequence[Proposal],
     rounds: int = 2,
     slopes: Callable[[Effect], Predictor] | None = None,
+    before: Slopes | None = None,
 ) -> Polished | None:
     """Return `camera` with effects whose parameters are fitted; None where it is no camera.
 
     `camera` holds what stays as it is; the effects of `start` are added to it. `slopes` gives what
-    tells how numbers move with the parameters of an effect, where fewer simulations do.
+    tells how numbers move with the parameters of an effect, where fewer simulations do; `before`
+    holds what is known of it already, and takes what is found.
     """
     free = free_of(start)
     effects = tuple(p.effect for p in start)
@@ -66,7 +81,7 @@ def polish(
     best = predictor.loglik(mean)
     errors: Array = np.full(len(free), np.inf)
     for _ in range(rounds if free else 0):
-        step, errors, promised = _newton(predictor, camera, effects, free, mean, slopes)
+        step, errors, promised = _newton(predictor, camera, effects, free, mean, slopes, before)
         if promised < _SMALL:
             break
         better = _along(predictor, camera, effects, free, step, best)
@@ -113,9 +128,10 @@ def _newton(
     free: Sequence[Free],
     mean: Array,
     slopes: Callable[[Effect], Predictor] | None,
+    before: Slopes | None = None,
 ) -> tuple[Array, Array, float]:
     """Return the Gauss-Newton step of the free parameters, their standard errors and its gain."""
-    j = jacobian(predictor if slopes is None else slopes, camera, effects, free)
+    j = jacobian(predictor if slopes is None else slopes, camera, effects, free, before)
     score, inverse = information(predictor, mean, j)
     rest, _, _ = predictor.weights(mean)
     along = score @ rest
@@ -128,8 +144,25 @@ def jacobian(
     camera: Camera,
     effects: tuple[Effect, ...],
     free: Sequence[Free],
+    before: Slopes | None = None,
 ) -> Array:
     """Return how the predicted numbers move with each free parameter: (number, parameter)."""
+    known = [None if before is None else before.of(effects[i], name) for i, name, _ in free]
+    left = [one for one, slope in zip(free, known, strict=True) if slope is None]
+    fresh = _simulated(predictor, camera, effects, left)
+    if before is not None:
+        before.found += [(effects[i], name, j) for (i, name, _), j in zip(left, fresh, strict=True)]
+    own = iter(fresh)
+    columns = [next(own) if slope is None else slope for slope in known]
+    return np.stack(columns, 1)
+
+
+def _simulated(
+    predictor: Predictor | Callable[[Effect], Predictor],
+    camera: Camera,
+    effects: tuple[Effect, ...],
+    free: Sequence[Free],
+) -> list[Array]:
     own = [predictor if isinstance(predictor, Predictor) else predictor(effects[i])
            for i, _, _ in free]  # fmt: skip
     built, beside = with_effects(camera, effects), list(shifted(camera, effects, free))
@@ -137,13 +170,12 @@ def jacobian(
         some = [other for one, (other, _) in zip(own, beside, strict=True)
                 if one.replicates >= most]  # fmt: skip
         next(one for one in own if one.replicates == most).ready([built, *some])
-    columns = [
+    return [
         np.zeros(one.forms.size)
         if other is None or built is None
         else (one.mean(other) - one.mean(built)) / step
         for one, (other, step) in zip(own, beside, strict=True)
     ]
-    return np.stack(columns, 1)
 
 
 def shifted(

@@ -6,7 +6,7 @@ pixel's mean over time commutes with that, so the moments of the temporal residu
 of u, u^2, u^3, u^4 without a second pass.
 """
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
@@ -20,7 +20,7 @@ from dsis.measures.first_pass import Passed, first_pass
 from dsis.measures.kernels import FiveSums, Sums
 from dsis.measures.lag_products import half_plane, lag_products
 from dsis.measures.measured import Measured
-from dsis.measures.plane import Region, planes, sheets
+from dsis.measures.plane import Region, Transforms, planes, sheets
 
 LAGS = 4
 
@@ -49,6 +49,9 @@ class Accumulator:
         Largest lag of the autocovariances, pixels of the mosaic.
     threads
         Threads that kernels may use; the result does not depend on it.
+    spectra
+        Sees the transforms of each frame but the first, less the first and its own mean, of the
+        planes of one size: complex64 (plane, row, column // 2 + 1).
     """
 
     def __init__(
@@ -63,7 +66,9 @@ class Accumulator:
         region: Region | None = None,
         lags: int = LAGS,
         threads: int = 1,
+        spectra: Callable[[Transforms], None] | None = None,
     ) -> None:
+        self.spectra = spectra
         self.frame_shape = (rows, columns)
         self.cfa, self.black_level, self.threads = cfa, black_level, threads
         self.white_level, self.lowest_code = white_level, lowest_code
@@ -134,7 +139,9 @@ class Accumulator:
             self.pair_squares.append(found.squares)
         for sheet in self.sheets:
             if self.frames:
-                sheet.add(self.difference, means, self.threads)
+                transforms = sheet.add(self.difference, means, self.threads)
+                if self.spectra is not None:
+                    self.spectra(transforms)
             else:
                 sheet.start()
         if self.frames:

@@ -12,6 +12,7 @@ from dsis.measures.fixed_pattern import Smooth
 from dsis.measures.kernels import Frame, Sums
 
 Region = tuple[slice, slice]
+Transforms = NDArray[np.complex64]
 
 
 @dataclass(frozen=True)
@@ -106,11 +107,13 @@ class Sheets:
         size = self.planes[0].smooth.degree + 1
         self.surfaces.append(np.zeros((len(self.planes), size, size)))
 
-    def add(self, difference: Frame, means: Sums, threads: int) -> None:
-        """Take a further frame, less the mean of each phase (2, 2)."""
+    def add(self, difference: Frame, means: Sums, threads: int) -> Transforms:
+        """Take a further frame, less the mean of each phase (2, 2); return its transforms."""
         kernels.split(difference, self.places, means, self.images)
-        kernels.add_power(scipy.fft.rfft2(self.images, workers=threads), self.power)
+        transforms: Transforms = scipy.fft.rfft2(self.images, workers=threads)
+        kernels.add_power(transforms, self.power)
         self.surfaces.append(self.planes[0].smooth.coefficients(self.images))
+        return transforms
 
 
 def planes(cfa: Cfa, region: Region) -> tuple[Plane, ...]:

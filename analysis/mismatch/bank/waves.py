@@ -41,14 +41,16 @@ class Waves:
         first: Image | None = None
         for frame in frames:
             image = np.asarray(frame, np.float32)
-            first = image if first is None else first
-            if self.frames:
-                self._take(scipy.fft.rfft2(image - first, overwrite_x=True))
-            self.frames += 1
+            if first is None:
+                first = image
+            else:
+                self.take(scipy.fft.rfft2(image - first, overwrite_x=True))
             yield frame
 
-    def _take(self, transform: Amplitudes) -> None:
-        if self.frames == 1:
+    def take(self, transform: Amplitudes) -> None:
+        """Take the transform (row, column // 2 + 1) of a frame less the first."""
+        self.frames = max(self.frames, 1) + 1
+        if self.frames == 2:
             self.total = transform
             return
         if self.power is None:

@@ -26,6 +26,7 @@ from analysis.mismatch.model import processes
 from analysis.mismatch.name import Search
 from analysis.mismatch.named import Named, unclear
 from analysis.mismatch.observe import observe
+from analysis.mismatch.own import wrong_sizes
 from analysis.mismatch.parameters import parameter_errors
 from analysis.mismatch.phase import WholeFrames
 from analysis.mismatch.pictures import Album, evidence_of
@@ -131,12 +132,15 @@ def _found(
     known: dict[str, Array] = {}
     if large:  # simulations of large recordings tell more, and cost more
         search.setting = replace(setting, nulls=setting.drafts)
+        final = search.sized_anew(final)
         final = _undenied(search, final)  # all frames may deny what some showed
         known = changes(whole, final, search.named, partial(search.without, final))
     final, gains = _proven(search, search.settle(final), trial, judged=large)
     if not large and (denied := _heated(search, final, whole, step)) is not None:
         final = search.further(search.drop(final, *denied))
         final, gains = _proven(search, search.settle(final), trial, judged=large)
+    scale, whole = whole.null.sd, search.rebased(whole)
+    known = {name: change * scale / whole.null.sd for name, change in known.items()}
     proof = trial.proof(search.base, final, step, source)
     evidence = evidence_of(search.base, final, album, split)
     if not large:
@@ -212,7 +216,7 @@ def _searched(search: Search, source: Source) -> State:
         found = (search.resumed if layout == last[0] else search.begun)(state)
         camera = found.camera if search.named else search.camera
     search.setting, search.base = whole, base
-    final = State.of(whole, camera, search.step) if search.named else base
+    final = State.of(whole, camera, search.step) if search.named or search.own else base
     return search.resumed(final) if layout == whole.layout else _switched(search, final)
 
 
@@ -311,6 +315,7 @@ def _finding(
 ) -> Finding:
     """Return the finding; `known` are changes by effect asked for before all was settled."""
     errors = parameter_errors(camera, final.calibrated, final.setting.layout, final.fits)
+    errors += wrong_sizes(search.own)
     missing = [named for named in search.named if named.name not in known]
     more = changes(base, final, missing, partial(search.without, final))
     own = {**known, **more}

@@ -67,7 +67,7 @@ class Fitted:
         if camera is None:
             return state
         # Beside what is named now, the user's sizes may do.
-        good = [replace(own, effect=own.given) for own in self.own if not own.contradicted]
+        good = [own.users for own in self.own if not own.contradicted]
         self.own = [own for own in self.own if own.contradicted]
         self.camera = resized(self.camera, good)
         return State.of(self.setting, resized(camera, good), self.step, near=state)
@@ -138,14 +138,17 @@ class Fitted:
     def _resized(self, state: State, some: Sequence[Own]) -> State:
         """Return the state with own effects of the sizes that the recording shows, if others."""
         self.sized |= {own.place for own in some}
-        found = refitted(state, some)
-        if not found:
-            return state
-        kept = {own.place: own for own in [*self.own, *found]}
-        self.own = [kept[place] for place in sorted(kept)]
-        self.camera = resized(self.camera, found)
-        camera = resized(state.camera, found)
-        return State.of(self.setting, camera, self.step, near=state)
+        while found := refitted(state, some):
+            kept = {own.place: own for own in [*self.own, *found]}
+            self.own = [kept[place] for place in sorted(kept)]
+            before, camera = state.camera.effect, resized(state.camera, found)
+            self.camera = resized(self.camera, found)
+            state = State.of(self.setting, camera, self.step, near=state)
+            # Far from where it was, a change is not known well enough to tell little from none.
+            some = [own for own in found if own.fell_from(before[own.place])]
+            if not some:
+                break
+        return state
 
     def _polished(self, state: State) -> State:
         """Fit the parameters of all effects together, and judge the result once more."""

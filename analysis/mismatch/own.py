@@ -13,14 +13,16 @@ from analysis.mismatch.candidates import CANDIDATES, Proposal
 from analysis.mismatch.finding import Mismatch, ParameterError
 from analysis.mismatch.named import SHAPES
 from analysis.mismatch.polish import polish, with_effects
+from analysis.mismatch.predict import Predictor
 from analysis.mismatch.rank import LEAST_GAIN, replicates_for
 from analysis.mismatch.state import State
 from dsis.camera import Camera
 from dsis.effects import Effect
 
 _CLEAR = 3.0  # standard errors between two sizes that no chance sets apart
-_ROUNDS = 2  # of a fit: down to a tenth of a size
-_LITTLE = 1e-3  # of a size: where that is no size, it is none that may vanish
+_ROUNDS = 6  # of a fit, at most
+_FALLEN = 0.5  # of a size, below which it may be none: a fit of a logarithm hardly gets there
+_LITTLE = 1e-3  # of a size: as good as none
 
 
 @dataclass(frozen=True)
@@ -56,15 +58,22 @@ class Own:
         return float(getattr(self.effect, self.name))
 
     @property
-    def given(self) -> Effect:
+    def users(self) -> "Own":
         """The effect as the user wrote it."""
-        return _of_size(self.effect, self.name, self.model) or self.effect
+        effect = _of_size(self.effect, self.name, self.model)
+        return replace(self, effect=effect or self.effect)
 
     @property
     def proposal(self) -> Proposal:
-        """The effect with its size free."""
+        """The effect with its size free, unless that has vanished."""
+        if self._none:
+            return Proposal(self.effect, ())
         signed = _of_size(self.effect, self.name, -self.value) is not None
         return Proposal(self.effect, (self.name,), frozenset({self.name} if signed else ()))
+
+    @property
+    def _none(self) -> bool:
+        return abs(self.value) <= _LITTLE * abs(self.model)
 
     @property
     def error(self) -> float:
@@ -92,6 +101,17 @@ class Own:
         return effect.kind == self.effect.kind and effect.model_dump(
             exclude=size
         ) == self.effect.model_dump(exclude=size)
+
+    @property
+    def vanished(self) -> "Own":
+        """The effect of a size that is as good as none."""
+        effect = _of_size(self.effect, self.name, _LITTLE * self.model)
+        return replace(self, effect=effect or self.effect, errors={})
+
+    def fell_from(self, before: Effect) -> bool:
+        """Return whether the effect is less than half of what it was, and not gone."""
+        size = abs(float(getattr(before, self.name)))
+        return not self._none and abs(self.value) < _FALLEN * size
 
     def beside(self, effect: Effect) -> "Own":
         """Return the effect as large as itself and another together: where a fit starts from."""
@@ -169,18 +189,31 @@ def refitted(state: State, some: Sequence[Own]) -> list[Own]:
             replace(own, effect=effect, errors=errors)
             for own, effect, errors in zip(left, polished.effects, polished.errors, strict=True)
         ]
-        gained = []
+        loglik = polished.loglik
         for i, own in enumerate(fitted):
-            other = [own.given if i == k else one.effect for k, one in enumerate(fitted)]
-            camera = with_effects(bare, other)
-            before = -inf if camera is None else predictor.loglik(predictor.mean(camera))
-            gained.append(replace(own, gain=polished.loglik - before))
-        if all(own.gain >= LEAST_GAIN and own.contradicted for own in gained):
-            return gained
+            if abs(own.value) < _FALLEN * abs(own.model):
+                none = _loglik(predictor, bare, fitted, i, own.vanished)
+                if none > loglik:
+                    fitted[i], loglik = own.vanished, none
+        gained = [
+            replace(own, gain=loglik - _loglik(predictor, bare, fitted, i, own.users))
+            for i, own in enumerate(fitted)
+        ]
         doubtful = [own for own in gained if own.gain < LEAST_GAIN or not own.contradicted]
+        if not doubtful:
+            return gained
         least = min(doubtful, key=lambda own: own.gain)
         left = [own for own in left if own.place != least.place]
     return []
+
+
+def _loglik(
+    predictor: Predictor, bare: Camera, some: Sequence[Own], which: int, other: Own
+) -> float:
+    """Return the log-likelihood of the recorded numbers with one of some effects otherwise."""
+    effects = [other.effect if i == which else own.effect for i, own in enumerate(some)]
+    camera = with_effects(bare, effects)
+    return -inf if camera is None else predictor.loglik(predictor.mean(camera))
 
 
 def wrong_sizes(some: Iterable[Own]) -> tuple[ParameterError, ...]:

@@ -126,6 +126,7 @@ def _found(
         replace(base, mismatches=whole.mismatches),
         words,
         step,
+        whole=None if large else whole.setting,
         lines=WholeFrames(stages(layout)[-1][0] if large else layout, frames_of),
     )
     final = _searched(search, source) if large else search.run()

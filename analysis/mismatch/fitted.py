@@ -43,6 +43,8 @@ class Fitted:
         The state that was fitted last.
     rough
         Whether a strong effect was taken in since.
+    whole
+        All frames of a small recording: they say what differs as long as nothing is named.
     """
 
     setting: Setting
@@ -56,6 +58,7 @@ class Fitted:
     sized: set[int] = field(default_factory=set)
     polished: State | None = None
     rough: bool = False
+    whole: Setting | None = None
 
     def settle(self, state: State) -> State:
         """Return the state with final parameters; their errors go into the effects named."""
@@ -124,10 +127,13 @@ class Fitted:
         fitted = {own.place: own for own in self.own}
         return [fitted.get(own.place, own) for own in sizes(self.camera)]
 
-    def _called(self, state: State) -> list[Own]:
-        """Return own effects that mismatches call for, but those that tie with others."""
+    def _called(self, state: State, *, less: bool = False) -> list[Own]:
+        """Return own effects that mismatches call for, but those that tie with others.
+
+        `less`: by showing less than the model.
+        """
         tied = {one.kind for pair in self.ties for one in pair}
-        some = called(self._sizes(), state.mismatches)
+        some = called(self._sizes(), [m for m in state.mismatches if m.z < 0 or not less])
         return [o for o in some if o.place not in self.sized and o.effect.kind not in tied]
 
     def sized_anew(self, state: State) -> State:
@@ -135,20 +141,29 @@ class Fitted:
         self.sized = set()
         return self._resized(state, self._called(state))
 
-    def _resized(self, state: State, some: Sequence[Own]) -> State:
-        """Return the state with own effects of the sizes that the recording shows, if others."""
+    def _resized(self, state: State, some: Sequence[Own], least: float = 0.0) -> State:
+        """Return the state with own effects of the sizes that the recording shows, if others.
+
+        Only if they gain at least so much.
+        """
         self.sized |= {own.place for own in some}
+        before = state
         while found := refitted(state, some):
+            if state is before and max(own.gain for own in found) < least:
+                break
             kept = {own.place: own for own in [*self.own, *found]}
             self.own = [kept[place] for place in sorted(kept)]
-            before, camera = state.camera.effect, resized(state.camera, found)
+            effects, camera = state.camera.effect, resized(state.camera, found)
             self.camera = resized(self.camera, found)
             state = State.of(self.setting, camera, self.step, near=state)
             # Far from where it was, a change is not known well enough to tell little from none.
-            some = [own for own in found if own.fell_from(before[own.place])]
+            some = [own for own in found if own.fell_from(effects[own.place])]
             if not some:
                 break
-        return state
+        if state is before or self.named or self.whole is None:
+            return state
+        whole = State.of(self.whole, self.camera, self.step)
+        return replace(state, mismatches=whole.mismatches)
 
     def _polished(self, state: State) -> State:
         """Fit the parameters of all effects together, and judge the result once more."""

@@ -116,18 +116,23 @@ class Search(Fitted):
         """Return the state with every effect that the search takes in; of those that are `strong`.
 
         What is like an effect of the camera is no second one: the size of that is fitted again. So
-        are, where nothing more is found, sizes that mismatches call for.
+        are, where nothing more is found, sizes that mismatches call for, and before that those of
+        which a recording shows less than the model: what stands in for less is soon wrong.
         """
         while state.mismatches and len(self.named) < _MOST_EFFECTS:
             added = self._best(state)
             again = None if added is None else self._own(added[0])
-            if added is None or again is not None:
-                some = [] if strong else self._called(state)
-                some = some if again is None else [again]
-                if not some:
-                    break
-                state = self._resized(state, some)
+            if again is not None:
+                state = self._resized(state, [again])
                 continue
+            least = 0.0 if added is None else added[0].gain
+            some = [] if strong else self._called(state, less=added is not None)
+            sized = self._resized(state, some, least) if some else state
+            if sized is not state:
+                state = sized
+                continue
+            if added is None:
+                break
             if added[0].gain < _WEAK and self.rough:  # what is large, and rough, feigns a little
                 state, before = self._polished(state), state
                 if state is not before:

@@ -280,9 +280,9 @@ def _without(search: Search, final: State, which: tuple[Named, str], *, judged: 
     final = search.drop(final, *which)
     if judged or not final.mismatches:
         return final
-    named = list(search.named)
+    known = [*search.named, *search.own]
     final = search.further(final)
-    return search.settle(final) if named != search.named else final
+    return search.settle(final) if known != [*search.named, *search.own] else final
 
 
 def _gained(search: Search, final: State, trial: Trial) -> dict[str, Gained]:

@@ -133,8 +133,10 @@ class Fitted:
         `less`: by showing less than the model.
         """
         tied = {one.kind for pair in self.ties for one in pair}
-        some = called(self._sizes(), [m for m in state.mismatches if m.z < 0 or not less])
-        return [o for o in some if o.place not in self.sized and o.effect.kind not in tied]
+        left = [o for o in self._sizes() if o.place not in self.sized and o.effect.kind not in tied]
+        if not left:
+            return []
+        return called(left, [m for m in state.mismatches if not less or m.z < 0])
 
     def sized_anew(self, state: State) -> State:
         """Return the state with the sizes of own effects that its mismatches call for."""

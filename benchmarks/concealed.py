@@ -1,10 +1,11 @@
 """The concealed proof: `python benchmarks/concealed.py --cases 200 --jobs 2`.
 
 Draws stratified random cases - no effect (30 %), one, two, three effects of random strength, every
-effect in turn, mono and Bayer, decoys, wrong base numbers, effects taken out of the vocabulary,
-effects planted into the real CCD recording - with a simulator that shares no code with dsis. Writes
-recordings and a sealed key, prints the key's SHA-256, runs the diagnosis on the files alone, opens
-the key and prints what was found. Resumable: everything lies in --work, one line of JSON a case.
+effect in turn, mono and Bayer, decoys, wrong base numbers, effects that camera.toml has already
+(some of a wrong size), effects taken out of the vocabulary, effects planted into the real CCD
+recording - with a simulator that shares no code with dsis. Writes recordings and a sealed key,
+prints the key's SHA-256, runs the diagnosis on the files alone, opens the key and prints what was
+found. Resumable: everything lies in --work, one line of JSON a case.
 """
 
 import argparse

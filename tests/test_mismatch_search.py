@@ -48,7 +48,7 @@ def _search(**values: Any) -> Search:
     )
     bare: dict[str, Any] = {
         "setting": SimpleNamespace(nulls=16, drafts=16, layout=None, large=False),
-        "camera": None,
+        "camera": SimpleNamespace(effect=()),
         "base": None,
         "vocabulary": vocabulary,
         "step": lambda: None,

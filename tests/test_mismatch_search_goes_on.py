@@ -51,7 +51,7 @@ def _search(monkeypatch: pytest.MonkeyPatch, why: str, *script: str, **more: Any
     monkeypatch.setattr(search_module, "State", Stub(of=lambda *_, **__: OPEN))
     setting: Any = Stub(nulls=16, drafts=16, layout=None, large=False)
     base: Any = OPEN
-    camera: Any = None
+    camera: Any = Stub(effect=())
     made = Scripted(setting, camera, base, frozenset(script), step=lambda: None)
     made.script, made.seen, made.pruned = script, [], False  # type: ignore[attr-defined] # its own
     made.why, made.doubts = why, more.get("doubts", ())  # type: ignore[attr-defined] # its own
@@ -88,7 +88,7 @@ class Proving:
 
     def __init__(self, after: list[Named]) -> None:
         self.named, self.after = [_named("kept", x=1.0), _named("weak")], after
-        self.setting = Stub(jobs=1)
+        self.setting, self.own = Stub(jobs=1), []
         self.calls: list[str] = []
 
     def fitted_without(self, *_: Any) -> None:
@@ -230,7 +230,8 @@ def test_all_is_fitted_again_once_before_what_is_weak_is_taken_in(
     setting: Any = Stub(nulls=16, drafts=16, layout=None, large=False)
     words = frozenset({"strong", "weak", "weaker"})
     nothing: Any = OPEN
-    search = Refitted(setting, nothing, nothing, words, step=lambda: None)
+    camera: Any = Stub(effect=())
+    search = Refitted(setting, camera, nothing, words, step=lambda: None)
     search.fits = 0  # type: ignore[attr-defined] # its own
     search._sought(nothing)
     assert [n.kind for n in search.named] == ["strong", "weaker"]

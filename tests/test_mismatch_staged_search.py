@@ -18,6 +18,7 @@ class Staged:
     def __init__(self, *names: list[str]) -> None:
         self.script, self.least, self.named = list(names), 0.0, []
         self.setting, self.base = Setting(WHOLE), Stub(camera="given", mismatches=["something"])
+        self.own: list[Any] = []
         self.camera, self.step, self.asked = "given", None, []
         self.how: list[str] = []
 

@@ -16,6 +16,7 @@ from planter import KINDS, Case, Choice, Effect, Layout, draw_case, plant, stack
 from planter.acceptable import STATISTICS, located, points_at  # noqa: E402
 from planter.calibration import precision  # noqa: E402
 from planter.deck import Deal, camera_for, deal  # noqa: E402
+from planter.disk import camera_values  # noqa: E402
 from planter.evidence import COUNTED, EVIDENCE  # noqa: E402
 from planter.judgement import COMPARED, judge  # noqa: E402
 from planter.ledger import read_ledger, versions, work_through  # noqa: E402
@@ -251,6 +252,21 @@ def test_parameter_errors_are_compared_with_the_truth(base: Case) -> None:
     assert found == ("noise.slope", (true, true))
     assert covered({**entry, "standard_error": 0.006 * true}, found[1])
     assert not covered({**entry, "standard_error": 0.004 * true}, found[1])
+
+
+def test_an_effect_that_the_camera_has_is_written_with_its_wrong_size(base: Case) -> None:
+    own = replace(planted(base, "prnu", sigma_percent=1.0), known=("prnu",))
+    wrong = replace(own, wrong={"effect.prnu.sigma_percent": 0.25})
+    assert "effect" not in camera_values(base)
+    assert camera_values(own)["effect"] == [{"kind": "prnu", "sigma_percent": 1.0}]
+    assert camera_values(wrong)["effect"] == [{"kind": "prnu", "sigma_percent": 1.25}]
+    assert Case.from_json(wrong.to_json()) == wrong
+    entry = {"parameter": "effect.prnu.sigma_percent", "model": 1.25, "recorded": 1.01}
+    assert truth_of(wrong, entry) == ("effect.prnu.sigma_percent", (1.0, 1.0))
+    sealed = {"case": json.loads(wrong.to_json()), "z": {}}
+    assert judge(sealed, {"parameter_errors": [entry]})["wrong_found"] == {entry["parameter"]: True}
+    named = {"omitted_physics": [{"effect": "prnu", "parameters": {}}]}
+    assert judge(sealed, named)["wrong"] == ["prnu"]
 
 
 def test_the_key_is_sealed_and_a_cut_ledger_goes_on(tmp_path: Path) -> None:

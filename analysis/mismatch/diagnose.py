@@ -26,6 +26,7 @@ from analysis.mismatch.model import processes
 from analysis.mismatch.name import Search
 from analysis.mismatch.named import Named, unclear
 from analysis.mismatch.observe import observe
+from analysis.mismatch.own import wrong_sizes
 from analysis.mismatch.parameters import parameter_errors
 from analysis.mismatch.phase import WholeFrames
 from analysis.mismatch.pictures import Album, evidence_of
@@ -125,18 +126,22 @@ def _found(
         replace(base, mismatches=whole.mismatches),
         words,
         step,
+        whole=None if large else whole.setting,
         lines=WholeFrames(stages(layout)[-1][0] if large else layout, frames_of),
     )
     final = _searched(search, source) if large else search.run()
     known: dict[str, Array] = {}
     if large:  # simulations of large recordings tell more, and cost more
         search.setting = replace(setting, nulls=setting.drafts)
+        final = search.sized_anew(final)
         final = _undenied(search, final)  # all frames may deny what some showed
         known = changes(whole, final, search.named, partial(search.without, final))
     final, gains = _proven(search, search.settle(final), trial, judged=large)
     if not large and (denied := _heated(search, final, whole, step)) is not None:
         final = search.further(search.drop(final, *denied))
         final, gains = _proven(search, search.settle(final), trial, judged=large)
+    scale, whole = whole.null.sd, search.rebased(whole)
+    known = {name: change * scale / whole.null.sd for name, change in known.items()}
     proof = trial.proof(search.base, final, step, source)
     evidence = evidence_of(search.base, final, album, split)
     if not large:
@@ -212,7 +217,8 @@ def _searched(search: Search, source: Source) -> State:
         found = (search.resumed if layout == last[0] else search.begun)(state)
         camera = found.camera if search.named else search.camera
     search.setting, search.base = whole, base
-    final = State.of(whole, camera, search.step, draft=True) if search.named else base
+    some = search.named or search.own
+    final = State.of(whole, camera, search.step, draft=True) if some else base
     return search.resumed(final) if layout == whole.layout else _switched(search, final)
 
 
@@ -275,9 +281,9 @@ def _without(search: Search, final: State, which: tuple[Named, str], *, judged: 
     final = search.drop(final, *which)
     if judged or not final.mismatches:
         return final
-    named = list(search.named)
+    known = [*search.named, *search.own]
     final = search.further(final)
-    return search.settle(final) if named != search.named else final
+    return search.settle(final) if known != [*search.named, *search.own] else final
 
 
 def _gained(search: Search, final: State, trial: Trial) -> dict[str, Gained]:
@@ -311,6 +317,7 @@ def _finding(
 ) -> Finding:
     """Return the finding; `known` are changes by effect asked for before all was settled."""
     errors = parameter_errors(camera, final.calibrated, final.setting.layout, final.fits)
+    errors += wrong_sizes(search.own)
     missing = [named for named in search.named if named.name not in known]
     more = changes(base, final, missing, partial(search.without, final))
     own = {**known, **more}

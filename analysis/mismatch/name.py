@@ -1,6 +1,6 @@
 """Which physics explains the mismatches: add the best effect, fit all again, look again."""
 
-from collections.abc import Callable, Container, Sequence
+from collections.abc import Container, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -8,13 +8,13 @@ from numpy.typing import NDArray
 
 from analysis.mismatch.candidates import CANDIDATES
 from analysis.mismatch.contradicted import refuted
+from analysis.mismatch.fitted import Fitted
 from analysis.mismatch.instance import LINES, Frequency, frequency_of, instance
 from analysis.mismatch.judge import LITTLE, NEEDLESS, Judge
 from analysis.mismatch.mapped import as_maps_show
-from analysis.mismatch.named import Named, camera_without, renewed
+from analysis.mismatch.named import Named
 from analysis.mismatch.phase import ABSENT, WholeFrames
-from analysis.mismatch.polish import Slopes, polish, with_effects
-from analysis.mismatch.predict import Predictor
+from analysis.mismatch.polish import Slopes, with_effects
 from analysis.mismatch.rank import (
     LEAST_GAIN,
     Memory,
@@ -26,13 +26,11 @@ from analysis.mismatch.rank import (
 )
 from analysis.mismatch.resolved import opened
 from analysis.mismatch.segments import second_path
-from analysis.mismatch.state import Setting, State
-from analysis.mismatch.uncertainty import settled
+from analysis.mismatch.state import State
 from dsis.camera import Camera
 from dsis.effects import Effect
 
 Array = NDArray[np.float64]
-Step = Callable[[], None]
 _WEAK = 30.0  # gain below which an effect may be what others, fitted one by one, left over
 _MOST_EFFECTS = 14  # some may have to go again
 _CHOSEN = frozenset({"adc_memory", "dual_gain"})  # a period, a gap between levels
@@ -42,26 +40,16 @@ _TAILS = frozenset({"kurtosis", "kurtosis_within_pixels", "one_off_outliers"})
 
 
 @dataclass
-class Search:
+class Search(Fitted):
     """The search from a base state; `run` leaves the result in the attributes."""
 
-    setting: Setting
-    camera: Camera
-    base: State
-    vocabulary: frozenset[str]
-    step: Step
-    named: list[Named] = field(default_factory=list)
     refused: dict[str, str] = field(default_factory=dict)
-    ties: list[tuple[Ranked, Ranked]] = field(default_factory=list)
     tied: dict[str, Ranked] = field(default_factory=dict)
     doubted: dict[str, str] = field(default_factory=dict)
     settled: list[tuple[str, Frequency]] = field(default_factory=list)
     absent: set[Frequency] = field(default_factory=set)  # peaks that were no line
     lines: WholeFrames | None = None
     memory: Memory = field(default_factory=Memory)
-    polished: State | None = None
-    known: Slopes = field(default_factory=Slopes)  # of the parameters fitted last
-    rough: bool = False  # a strong effect was taken in since
     least: float = LEAST_GAIN  # for an effect to be taken in
 
     def run(self) -> State:
@@ -70,7 +58,7 @@ class Search:
 
     def begun(self, state: State) -> State:
         """Return the state with what is strong: parameters are fitted, and all is judged, later."""
-        return self._sought(state)
+        return self._sought(state, strong=True)
 
     def resumed(self, state: State) -> State:
         """Return the final state of a search that goes on with more frames than before.
@@ -78,7 +66,8 @@ class Search:
         What too few frames denied may be proposed again. What is chosen among many, which more
         frames tell better, is looked for once more, and everything fitted once more.
         """
-        self.memory, self.refused, self.tied, self.known = Memory(), {}, {}, Slopes()
+        self.memory, self.refused, self.tied, self.sized = Memory(), {}, {}, set()
+        self.known = Slopes()
         for named in [n for n in self.named if n.kind in _CHOSEN]:
             self.named.remove(named)
             bare = self.without(state, named)
@@ -124,10 +113,25 @@ class Search:
                 self.settled = [own for own in self.settled if own != (one.kind, line)]
         return found
 
-    def _sought(self, state: State) -> State:
-        """Return the state with every effect that the search takes in."""
+    def _sought(self, state: State, *, strong: bool = False) -> State:
+        """Return the state with every effect that the search takes in; of those that are `strong`.
+
+        What is like an effect of the camera is no second one: the size of that is fitted again. So
+        are, where nothing more is found, sizes that mismatches call for, and before that those of
+        which a recording shows less than the model: what stands in for less is soon wrong.
+        """
         while state.mismatches and len(self.named) < _MOST_EFFECTS:
             added = self._best(state)
+            again = None if added is None else self._own(added[0])
+            if again is not None:
+                state = self._resized(state, [again])
+                continue
+            least = 0.0 if added is None else added[0].gain
+            some = [] if strong else self._called(state, less=added is not None)
+            sized = self._resized(state, some, least) if some else state
+            if sized is not state:
+                state = sized
+                continue
             if added is None:
                 break
             if added[0].gain < _WEAK and self.rough:  # what is large, and rough, feigns a little
@@ -144,6 +148,7 @@ class Search:
 
     def _take(self, named: Named) -> None:
         self.named.append(named)
+        self.sized = set()
         line = frequency_of(None if named.proposal is None else named.proposal.effect)
         if line is not None:
             self.settled += [(kind, line) for kind in sorted(LINES)]
@@ -154,39 +159,6 @@ class Search:
         if line is not None:
             self.settled.append((kind, line))
 
-    def settle(self, state: State) -> State:
-        """Return the state with final parameters; their errors go into the effects named."""
-        mine = [(n, n.proposal) for n in self.named if n.proposal is not None]
-        if not mine:
-            return state
-        bare = camera_without(state.camera, [p.effect for _, p in mine], self.camera)
-        effects, errors = settled(state, bare, [p for _, p in mine])
-        fitted = iter(zip(effects, errors, strict=True))
-        self.named = [
-            n if n.proposal is None else renewed(n, n.proposal, *next(fitted)) for n in self.named
-        ]
-        camera = with_effects(bare, effects)
-        if camera is None:
-            return state
-        return State.of(self.setting, camera, self.step, near=state)
-
-    def without(self, state: State, named: Named) -> Camera:
-        """Return a state's camera without one of the effects named."""
-        if named.proposal is None:
-            return state.camera.model_copy(update={"noise": self.base.camera.noise})
-        return camera_without(state.camera, [named.proposal.effect], self.camera)
-
-    def fitted_without(self, state: State, named: Named) -> Camera:
-        """Return the camera without one of the effects named, its base numbers fitted once more.
-
-        No physics is credited with what better numbers give.
-        """
-        camera = self.without(state, named)
-        effect = None if named.proposal is None else named.proposal.effect
-        if effect is not None and not effect.measures & {"level", "pixel_variance"}:
-            return camera  # levels and variances know nothing of it
-        return self.setting.calibrated(camera, state.calibrated).model.camera
-
     def drop(self, state: State, named: Named, why: str) -> State:
         """Return the state without an effect, which is refused from now on."""
         bare = State.of(self.setting, self.without(state, named), self.step, near=state)
@@ -196,6 +168,7 @@ class Search:
         self._refuse(named.kind, None if named.proposal is None else named.proposal.effect, why)
         self.named.remove(named)
         self.memory.gains.clear()  # what it hid may gain more than before
+        self.sized = set()
         return bare
 
     def considered(self, undecided: Container[str]) -> tuple[str, ...]:
@@ -307,6 +280,8 @@ class Search:
         """Return whether an effect may be tried: not again, and as whole frames show its line."""
         if instance(effect.kind, effect) in self._done() | self.doubted.keys():
             return False
+        if any(own.place in self.sized and own.like(effect) for own in self._sizes()):
+            return False
         if self.lines is None or not self.lines.shown(effect):
             return self.lines is None
         denial = self.lines.denial(effect)
@@ -317,37 +292,6 @@ class Search:
         elif denial is not None:
             self._refuse(effect.kind, effect, denial)
         return denial is None
-
-    def _polished(self, state: State) -> State:
-        """Fit the parameters of all effects together, and judge the result once more."""
-        self.rough = False
-        mine = [(n, n.proposal) for n in self.named if n.proposal is not None]
-        if not mine or state is self.polished:
-            return state
-        bare = camera_without(state.camera, [p.effect for _, p in mine], self.camera)
-        sparse = replicates_for(self.setting, [p.effect for _, p in mine])
-        predictor = state.predictor(max(self.setting.polishing, sparse))
-        # Of a large recording each simulation tells much and costs much: `settle` steps once more.
-        rounds, before = (1, self.known) if self.setting.large else (2, None)
-        polished = polish(
-            predictor, bare, [p for _, p in mine], rounds, self._slopes(state), before
-        )
-        self.polished = state
-        if polished is None:
-            return state
-        fitted = iter(zip(polished.effects, polished.errors, strict=True))
-        self.named = [
-            n if n.proposal is None else renewed(n, n.proposal, *next(fitted)) for n in self.named
-        ]
-        camera = with_effects(bare, polished.effects)
-        if camera is not None:
-            self.polished = State.of(self.setting, camera, self.step, near=state)
-        return self.polished
-
-    def _slopes(self, state: State) -> Callable[[Effect], Predictor]:
-        """Return what tells how numbers move with an effect: few simulations, where they do."""
-        least = self.setting.polishing
-        return lambda effect: state.predictor(max(least, replicates_for(self.setting, [effect])))
 
     def denied(self, state: State) -> tuple[Named, str] | None:
         """Return the effect that the recording denies most, and why; None: it denies none."""

@@ -10,7 +10,7 @@ from dsis.camera import Camera
 from dsis.effects import Effect
 
 _CLEAR = 3.0  # standard errors of an effect's size that is no chance
-_SHAPES = frozenset(
+SHAPES = frozenset(
     {"length_pixels", "gain_length_pixels", "at_code", "period_codes", "full_well_dn", "extent"}
 )
 
@@ -58,7 +58,7 @@ def unclear(named: Named) -> str:
     sizes = {
         name: (float(getattr(effect, name)), named.errors.get(name, inf))
         for name in named.proposal.free
-        if name not in _SHAPES
+        if name not in SHAPES
     }
     if not sizes or any(
         not isfinite(error) or abs(value) > _CLEAR * error for value, error in sizes.values()

@@ -40,11 +40,11 @@ class Simulations:
 
     def keep(self, camera: Camera, numbers: Sequence[Array]) -> None:
         """Take numbers of a camera's first replicates that were found elsewhere."""
-        self.kept[camera.model_dump_json()] = list(numbers)
+        self.kept[_key(camera)] = list(numbers)
 
     def ready(self, cameras: Iterable[Camera], replicates: int) -> None:
         """Simulate side by side what will be asked for: few recordings of each of many cameras."""
-        wanted = {camera.model_dump_json(): camera for camera in cameras}
+        wanted = {_key(camera): camera for camera in cameras}
         # By replicates: cameras of one share draws, which are kept for a while.
         missing = [
             (key, number)
@@ -66,7 +66,7 @@ class Simulations:
 
     def of(self, camera: Camera, replicates: int) -> Array:
         """Return the numbers of a camera's first replicates: (replicate, number)."""
-        key = camera.model_dump_json()
+        key = _key(camera)
         known = self.kept.get(key, [])
         missing = range(len(known), replicates)
         if missing:
@@ -75,3 +75,9 @@ class Simulations:
             known = [*known, *(self.numbers_of(one) for one in made)]
             self.kept[key] = known
         return np.stack(known[:replicates])
+
+
+def _key(camera: Camera) -> str:
+    """Return what tells cameras apart; effects of different kinds are in no order."""
+    ordered = sorted(camera.effect, key=lambda effect: effect.kind)
+    return camera.model_copy(update={"effect": tuple(ordered)}).model_dump_json()

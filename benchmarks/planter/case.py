@@ -56,7 +56,10 @@ class Case:
         At most one of a kind.
     wrong
         Numbers of camera.toml that are off, by how many standard errors: "noise.slope",
-        "noise.intercept", "black_level" (first segment), "noise.switch_dn" (in gaps of levels).
+        "noise.intercept", "black_level" (first segment), "noise.switch_dn" (in gaps of levels);
+        sizes of effects that camera.toml knows, "effect.prnu.sigma_percent" say, by which share.
+    known
+        Kinds of those effects that are in camera.toml.
     """
 
     seed: int
@@ -73,6 +76,7 @@ class Case:
     sensor_seed: int = 0
     response: tuple[float, float, float] = (1.0, 1.0, 1.0)
     shot: str = "gaussian"
+    known: tuple[str, ...] = ()
 
     def having(self, *effects: Effect) -> Self:
         """Return the same recording with `effects` planted besides, or in place of their kind."""
@@ -137,4 +141,5 @@ class Case:
         values["exposures"] = tuple(Plan(**p) for p in values["exposures"])
         values["effects"] = tuple(Effect(**e) for e in values["effects"])
         values["response"] = tuple(values["response"])
+        values["known"] = tuple(values.get("known", ()))
         return cls(**values)

@@ -20,6 +20,14 @@ APART = (
     {"quantisation", "adc_dnl"},
     {"dual_gain", "dual_gain_mismatch"},
 )
+# Effects that camera.toml has already, strong enough that a wrong size shows.
+OWN = {
+    "dsnu": "sigma_dn",
+    "prnu": "sigma_percent",
+    "column_fpn": "sigma_dn",
+    "row_noise": "sigma_dn",
+}
+OWNED, OFF, OWN_STRENGTH = 0.2, 0.5, 50.0
 DECOYS = ("poisson camera", "coarse codes", "two segments", "scene", "unknown light", "none")
 CAMERAS = 200
 
@@ -39,7 +47,9 @@ class Deal:
     real
         Planted into real frames.
     wrong
-        Numbers of camera.toml that are off, in standard errors.
+        Numbers of camera.toml that are off, in standard errors; sizes of effects by their share.
+    own
+        An effect that is in camera.toml already.
     """
 
     number: int
@@ -49,6 +59,7 @@ class Deal:
     decoy: str = "none"
     real: bool = False
     wrong: Mapping[str, float] = field(default_factory=dict)
+    own: str | None = None
 
 
 def deal(seed: int, cases: int, only: str | None = None) -> list[Deal]:
@@ -65,10 +76,12 @@ def deal(seed: int, cases: int, only: str | None = None) -> list[Deal]:
         Deal(0, decoy=DECOYS[i % len(DECOYS)]) for i in range(nulls)
     ]
     order = rng.permutation(len(deals))
-    return [
+    dealt = [
         replace(deals[place], number=number, wrong=_wrong(rng, deals[place]))
         for number, place in enumerate(order)
     ]
+    rng = np.random.default_rng([seed, 53])
+    return [_with_own(rng, one) for one in dealt]
 
 
 def _hands(rng: np.random.Generator, counts: list[int]) -> list[tuple[str, ...]]:
@@ -109,6 +122,17 @@ def _wrong(rng: np.random.Generator, dealt: Deal) -> dict[str, float]:
     return {name: float(rng.choice([-1, 1]) * rng.uniform(5, 30))}
 
 
+def _with_own(rng: np.random.Generator, dealt: Deal) -> Deal:
+    """Return a deal, at times with an effect that camera.toml has, of a size that may be wrong."""
+    left = sorted(OWN.keys() - set(dealt.kinds))
+    kind, share = str(rng.choice(left)), float(rng.choice([-1, 1]) * rng.uniform(0.15, 0.5))
+    owned, off = rng.random() < OWNED, rng.random() < OFF
+    if dealt.real or dealt.decoy == "coarse codes" or not owned:
+        return dealt
+    wrong = {f"effect.{kind}.{OWN[kind]}": share} if off else {}
+    return replace(dealt, own=kind, wrong={**dealt.wrong, **wrong})
+
+
 def camera_for(dealt: Deal, seed: int) -> Case:
     """Return a random camera and layout that the effects and the decoy fit."""
     poisson_decoy = dealt.decoy == "poisson camera"
@@ -128,7 +152,8 @@ def camera_for(dealt: Deal, seed: int) -> Case:
         )
         case = draw_case(int(rng.integers(2**31)), "small", choice)
         case = replace(case, wrong=dealt.wrong, shot="poisson" if poisson_decoy else "gaussian")
-        if all(RECIPES[kind].fits(case) for kind in dealt.kinds):
+        kinds = dealt.kinds if dealt.own is None else (*dealt.kinds, dealt.own)
+        if all(RECIPES[kind].fits(case) for kind in kinds):
             return case
     message = f"no camera fits {dealt.kinds}"
     raise RuntimeError(message)

@@ -19,8 +19,9 @@ CALIBRATION = 0.5
 def plant(folder: Path, case: Case, frames: Frames = frame_codes) -> Path:
     """Write `folder`/recording.toml with its frames (.npy) and `folder`/camera.toml.
 
-    Frames are unsigned 16-bit codes, made by `frames(case, exposure, frame)`. camera.toml has no
-    effects; its numbers are the true ones but for those in `case.wrong`. Returns the folder.
+    Frames are unsigned 16-bit codes, made by `frames(case, exposure, frame)`. camera.toml has the
+    effects of `case.known` only; its numbers are the true ones but for those in `case.wrong`.
+    Returns the folder.
     """
     folder.mkdir(parents=True, exist_ok=True)
     listed = []
@@ -46,7 +47,7 @@ def camera_values(case: Case) -> dict[str, Any]:
     """Return camera.toml: the base model with the errors that `case.wrong` asks for.
 
     An error of k is k times the standard error of the difference between camera.toml and what
-    the recording says.
+    the recording says; of an effect's size it is that share.
     """
     segments: list[dict[str, Any]] = []
     both = np.hypot(1, CALIBRATION)
@@ -72,7 +73,15 @@ def camera_values(case: Case) -> dict[str, Any]:
         "white_level": case.white_level,
         "bit_depth": case.bit_depth,
         "noise": {"shot": case.shot, "segment": segments},
+        **({"effect": [_believed(case, kind) for kind in case.known]} if case.known else {}),
     }
+
+
+def _believed(case: Case, kind: str) -> dict[str, Any]:
+    """Return an effect as camera.toml has it."""
+    parameters = case.planted(kind) or {}
+    off = {name: 1 + case.wrong.get(f"effect.{kind}.{name}", 0.0) for name in parameters}
+    return {"kind": kind, **{name: value * off[name] for name, value in parameters.items()}}
 
 
 def moved_switch(case: Case, switch_dn: float, gaps: float) -> float:

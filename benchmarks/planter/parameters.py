@@ -16,6 +16,10 @@ def truth_of(case: Case, entry: Mapping[str, Any]) -> tuple[str, tuple[float, fl
     the gap between the levels around it.
     """
     name, quoted = entry["parameter"], entry["model"]
+    if name.startswith("effect."):
+        _, kind, size = name.split(".")
+        true = (case.planted(kind) or {}).get(size)
+        return None if true is None else (name, (true, true))
     if "black" in name:
         return "black_level", (case.black_level, case.black_level)
     segments = camera_values(case)["noise"]["segment"]

@@ -3,7 +3,7 @@
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from planter.case import Case, Effect
 from planter.chain import KINDS
-from planter.deck import Deal, camera_for
+from planter.deck import OWN_STRENGTH, Deal, camera_for
 from planter.disk import plant
 from planter.fitted import fit_into
 from planter.onreal import RealFrames
@@ -32,6 +32,8 @@ def conceal(task: Mapping[str, Any]) -> dict[str, Any]:
     real = RealFrames.read(Path(task["ccd"]), *CROP) if dealt.real else None
     seed = task["seed"]
     case = real.twin(seed * 1000 + dealt.number) if real else camera_for(dealt, seed)
+    if dealt.own is not None:
+        case = replace(_planted(case, dealt.own, OWN_STRENGTH).case, known=(dealt.own,))
     plantings: list[Planting] = []
     pairs = sorted(zip(dealt.kinds, dealt.strengths, strict=True), key=_order)
     for kind, z in pairs:

@@ -1,0 +1,208 @@
+"""What a search has taken in, and its parameters: fitted together, and as they are in the end."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+from analysis.mismatch.candidates import Proposal
+from analysis.mismatch.named import Named, camera_without, renewed
+from analysis.mismatch.own import Own, called, refitted, resized, sizes, without_own
+from analysis.mismatch.polish import Slopes, polish, with_effects
+from analysis.mismatch.predict import Predictor
+from analysis.mismatch.rank import Ranked, replicates_for
+from analysis.mismatch.state import Setting, State
+from analysis.mismatch.uncertainty import settled
+from dsis.camera import Camera
+from dsis.effects import Effect
+
+Step = Callable[[], None]
+
+
+@dataclass
+class Fitted:
+    """Effects beside a base state, and sizes of the camera's own effects.
+
+    Attributes
+    ----------
+    setting, step
+        What was observed, and what to call on the way.
+    camera
+        The user's, its own effects of the sizes that the recording shows.
+    base
+        The state of the user's camera.
+    vocabulary
+        Effects that may be named.
+    named
+        Those taken in.
+    ties
+        Those that are put aside, for the recording does not tell one from the other.
+    own
+        Effects of the camera that have other sizes than the user's.
+    sized
+        Places of those whose size was fitted since an effect was taken in or dropped.
+    polished
+        The state that was fitted last.
+    known
+        How numbers moved with the parameters that were fitted.
+    rough
+        Whether a strong effect was taken in since.
+    whole
+        All frames of a small recording: they say what differs as long as nothing is named.
+    """
+
+    setting: Setting
+    camera: Camera
+    base: State
+    vocabulary: frozenset[str]
+    step: Step
+    named: list[Named] = field(default_factory=list)
+    ties: list[tuple[Ranked, Ranked]] = field(default_factory=list)
+    own: list[Own] = field(default_factory=list)
+    sized: set[int] = field(default_factory=set)
+    polished: State | None = None
+    known: Slopes = field(default_factory=Slopes)
+    rough: bool = False
+    whole: Setting | None = None
+
+    def settle(self, state: State) -> State:
+        """Return the state with final parameters; their errors go into the effects named."""
+        state = self._resized(state, self._called(state))
+        bare, mine = self._parts(state)
+        if not mine:
+            return state
+        camera = self._fitted(bare, *settled(state, bare, mine))
+        if camera is None:
+            return state
+        # Beside what is named now, the user's sizes may do.
+        good = [own.users for own in self.own if not own.contradicted]
+        self.own = [own for own in self.own if own.contradicted]
+        self.camera = resized(self.camera, good)
+        return State.of(self.setting, resized(camera, good), self.step, near=state)
+
+    def _parts(self, state: State) -> tuple[Camera, list[Proposal]]:
+        """Return a state's camera without what is fitted, and that: own sizes, effects named."""
+        mine = [named.proposal for named in self.named if named.proposal is not None]
+        bare = camera_without(state.camera, [p.effect for p in mine], self.camera)
+        return without_own(bare, self.own), [*(own.proposal for own in self.own), *mine]
+
+    def _fitted(
+        self, bare: Camera, effects: Sequence[Effect], errors: Sequence[dict[str, float]]
+    ) -> Camera | None:
+        """Take in what was fitted, and return the camera with it; None: it cannot have them."""
+        if with_effects(bare, effects) is None:
+            return None
+        fitted = iter(zip(effects, errors, strict=True))
+        self.own = [
+            replace(own, effect=e, errors=se)
+            for own, (e, se) in zip(self.own, fitted, strict=False)
+        ]
+        self.named = [
+            n if n.proposal is None else renewed(n, n.proposal, *next(fitted)) for n in self.named
+        ]
+        self.camera = resized(self.camera, self.own)
+        mine = [named.proposal.effect for named in self.named if named.proposal is not None]
+        return bare.model_copy(update={"effect": (*self.camera.effect, *mine)})
+
+    def without(self, state: State, named: Named) -> Camera:
+        """Return a state's camera without one of the effects named."""
+        if named.proposal is None:
+            return state.camera.model_copy(update={"noise": self.base.camera.noise})
+        return camera_without(state.camera, [named.proposal.effect], self.camera)
+
+    def fitted_without(self, state: State, named: Named) -> Camera:
+        """Return the camera without one of the effects named, its base numbers fitted once more.
+
+        No physics is credited with what better numbers give.
+        """
+        camera = self.without(state, named)
+        effect = None if named.proposal is None else named.proposal.effect
+        if effect is not None and not effect.measures & {"level", "pixel_variance"}:
+            return camera  # levels and variances know nothing of it
+        return self.setting.calibrated(camera, state.calibrated).model.camera
+
+    def _own(self, named: Named) -> Own | None:
+        """Return the camera's own effect that one named is like, as large as both; None: none."""
+        effect = None if named.proposal is None else named.proposal.effect
+        like = (own.beside(effect) for own in self._sizes() if effect and own.like(effect))
+        return next(like, None)
+
+    def _sizes(self) -> list[Own]:
+        """Return the camera's own effects that have a size, as they are now."""
+        fitted = {own.place: own for own in self.own}
+        return [fitted.get(own.place, own) for own in sizes(self.camera)]
+
+    def _called(self, state: State, *, less: bool = False) -> list[Own]:
+        """Return own effects that mismatches call for, but those that tie with others.
+
+        `less`: by showing less than the model.
+        """
+        tied = {one.kind for pair in self.ties for one in pair}
+        left = [o for o in self._sizes() if o.place not in self.sized and o.effect.kind not in tied]
+        if not left:
+            return []
+        return called(left, [m for m in state.mismatches if not less or m.z < 0])
+
+    def sized_anew(self, state: State) -> State:
+        """Return the state with the sizes of own effects that its mismatches call for."""
+        self.sized = set()
+        return self._resized(state, self._called(state))
+
+    def _resized(self, state: State, some: Sequence[Own], least: float = 0.0) -> State:
+        """Return the state with own effects of the sizes that the recording shows, if others.
+
+        Only if they gain at least so much.
+        """
+        self.sized |= {own.place for own in some}
+        before = state
+        while found := refitted(state, some):
+            if state is before and max(own.gain for own in found) < least:
+                break
+            kept = {own.place: own for own in [*self.own, *found]}
+            self.own = [kept[place] for place in sorted(kept)]
+            effects, camera = state.camera.effect, resized(state.camera, found)
+            self.camera = resized(self.camera, found)
+            state = State.of(self.setting, camera, self.step, near=state)
+            # Far from where it was, a change is not known well enough to tell little from none.
+            some = [own for own in found if own.fell_from(effects[own.place])]
+            if not some:
+                break
+        if state is before or self.named or self.whole is None:
+            return state
+        whole = State.of(self.whole, self.camera, self.step)
+        return replace(state, mismatches=whole.mismatches)
+
+    def _polished(self, state: State) -> State:
+        """Fit the parameters of all effects together, and judge the result once more."""
+        self.rough = False
+        bare, mine = self._parts(state)
+        if not mine or state is self.polished:
+            return state
+        sparse = replicates_for(self.setting, [p.effect for p in mine])
+        predictor = state.predictor(max(self.setting.polishing, sparse))
+        # Of a large recording each simulation tells much and costs much: `settle` steps once more.
+        rounds, known = (1, self.known) if self.setting.large else (2, None)
+        polished = polish(predictor, bare, mine, rounds, self._slopes(state), known)
+        self.polished = state
+        if polished is None:
+            return state
+        camera = self._fitted(bare, polished.effects, polished.errors)
+        if camera is not None:
+            self.polished = State.of(self.setting, camera, self.step, near=state)
+        return self.polished
+
+    def _slopes(self, state: State) -> Callable[[Effect], Predictor]:
+        """Return what tells how numbers move with an effect: few simulations, where they do."""
+        least = self.setting.polishing
+        return lambda effect: state.predictor(max(least, replicates_for(self.setting, [effect])))
+
+    def rebased(self, whole: State) -> State:
+        """Return the state before physics was added, its own effects of the sizes recorded.
+
+        `whole` is what is asked whether anything differs: no physics is credited with better sizes.
+        """
+        if not self.own:
+            return whole
+        whole = State.of(whole.setting, self.camera, self.step)
+        large = self.base.setting.large
+        base = whole if large else State.of(self.base.setting, self.camera, self.step)
+        self.base = replace(base, mismatches=whole.mismatches)
+        return whole

@@ -1,0 +1,107 @@
+"""Sizes of effects that the user's camera has: wrong ones are wrong numbers, no omitted physics."""
+
+import pytest
+
+from analysis.mismatch import Finding, find_mismatch
+from analysis.mismatch.own import sizes
+from dsis.camera import Camera
+from dsis.effects import Effect, registry
+from mismatch_recordings import camera, recorded
+
+SURE = 3.0  # standard errors
+
+
+def _effect(kind: str, **parameters: float | str) -> Effect:
+    return registry()[kind](**parameters)  # type: ignore[arg-type] # pydantic checks them
+
+
+def _prnu(percent: float) -> Effect:
+    return _effect("prnu", sigma_percent=percent)
+
+
+def _column_fpn(dn: float) -> Effect:
+    return _effect("column_fpn", sigma_dn=dn)
+
+
+def _found(true: Camera, model: Camera) -> Finding:
+    return find_mismatch(model, recorded(true, 11), seed=5)
+
+
+@pytest.mark.parametrize(
+    ("true", "model", "name"),
+    [
+        (_prnu(1.0), _prnu(1.2), "effect.prnu.sigma_percent"),
+        (_prnu(1.2), _prnu(1.0), "effect.prnu.sigma_percent"),
+        (_column_fpn(1.0), _column_fpn(2.0), "effect.column_fpn.sigma_dn"),
+    ],
+)
+def test_a_wrong_size_is_a_parameter_error(true: Effect, model: Effect, name: str) -> None:
+    found = _found(camera(true), camera(model))
+    size = name.rpartition(".")[2]
+    assert found.verdict == "parameters"
+    assert not found.mismatches
+    assert not found.unexplained
+    (error,) = found.parameter_errors
+    assert (error.parameter, error.model) == (name, getattr(model, size))
+    assert abs(error.recorded - getattr(true, size)) < SURE * error.standard_error
+    assert abs(error.recorded - error.model) > SURE * error.standard_error
+    assert [own.kind for own in found.camera.effect] == [true.kind]
+    assert getattr(found.camera.effect[0], size) == error.recorded
+
+
+def test_an_effect_that_is_not_there_has_next_to_no_size() -> None:
+    found = _found(camera(), camera(_prnu(1.0)))
+    assert found.verdict == "parameters"
+    (error,) = found.parameter_errors
+    assert error.recorded < SURE * error.standard_error < 0.5
+
+
+def test_right_sizes_stay_as_they_are() -> None:
+    own = (_prnu(1.0), _column_fpn(1.5), _effect("dsnu", sigma_dn=1.0))
+    found = _found(camera(*own), camera(*own))
+    assert found.verdict == "match"
+    assert found.camera.effect == own
+
+
+def test_right_sizes_stay_as_they_are_beside_physics_that_is_left_out() -> None:
+    own = (_prnu(1.0), _column_fpn(1.5))
+    rows = _effect("row_fpn", sigma_dn=2.0)
+    found = _found(camera(*own, rows), camera(*own))
+    assert [one.effect for one in found.omitted_physics] == ["row_fpn"]
+    assert not found.parameter_errors
+    assert found.camera.effect[:2] == own
+
+
+def test_a_wrong_size_and_omitted_physics_are_told_apart() -> None:
+    noise = _effect("row_noise", sigma_dn=2.0)
+    found = _found(camera(_prnu(1.0), noise), camera(_prnu(1.2)))
+    assert found.verdict == "omitted_physics"
+    assert [one.effect for one in found.omitted_physics] == ["row_noise"]
+    (error,) = found.parameter_errors
+    assert error.parameter == "effect.prnu.sigma_percent"
+    assert abs(error.recorded - 1.0) < SURE * error.standard_error
+    assert "fixed_pixel_variance" not in {m.statistic for m in found.mismatches}
+    assert [own.kind for own in found.camera.effect] == ["prnu", "row_noise"]
+
+
+def test_an_effect_has_a_size_where_one_number_less_of_it_is_less() -> None:
+    some = (
+        _prnu(1.0),
+        _effect("tap_mismatch", gain_percent=-1.0, regions="left_right"),
+        _effect("saturation", full_well_dn=3000.0),
+        _effect("quantisation", step_dn=4.0),
+        _effect("hot_pixels", pixel_fraction=0.01, mean_dn_per_s=100.0),
+        _effect("row_noise", sigma_dn=0.0),
+        _effect("dsnu", sigma_dn=1.0),
+        _effect("dsnu", sigma_dn=2.0),
+    )
+    found = sizes(camera(*some))
+    assert [(own.effect.kind, own.name, own.model) for own in found] == [
+        ("prnu", "sigma_percent", 1.0),
+        ("tap_mismatch", "gain_percent", -1.0),
+    ]
+    prnu, taps = found
+    assert not prnu.proposal.signed
+    assert taps.proposal.signed
+    assert prnu.beside(_prnu(1.0)).value == pytest.approx(2**0.5)
+    assert not taps.like(_effect("tap_mismatch", gain_percent=-1.0, regions="top_bottom"))

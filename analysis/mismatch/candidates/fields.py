@@ -16,21 +16,20 @@ from dsis.effects import Effect
 from dsis.effects.smooth_prnu import SmoothPrnu
 
 Array = NDArray[np.float64]
-_SHORTEST = 0.7  # pixels of the plane: neighbours of less have nothing in common
+_SHORTEST = 0.7  # pixels: neighbours of less have nothing in common
 _LENGTHS = 16
-_LONGEST = 1 / 6  # of a plane's shorter side: what is longer is a smooth surface
+_LONGEST = 1 / 6  # of the shorter side: what is longer is a smooth surface
 _BINS = 32
 _LOWEST, _HIGHEST = 4.0, 0.75  # cycles a plane, a pixel: smooth surfaces have what is lower
 _OF_LINES = 1.5  # cycles a plane along an axis, that means of lines have with the window
 _FAR_OUT = 5.0  # standard deviations of pixels, beyond which they count as so far out
 _ROUNDS = 6
 _LEAST = 1e-9  # of the largest power
-_CLEAR = 9.0  # of chi-squared
 
 
 @dataclass(frozen=True)
 class _Spectrum:
-    """Mean power of maps in bins of spatial frequency, %^2.
+    """Mean power of the gain's map in bins of spatial frequency, %^2.
 
     Attributes
     ----------
@@ -49,14 +48,14 @@ class _Spectrum:
 
 def _smooth_prnu(clues: Clues) -> Sequence[Proposal]:
     """Start from the field that, beside white gains, makes the gain's spectrum most likely."""
-    seen = _spectrum(clues)
-    if seen is None:
+    image = _gains(clues)
+    if image is None:
         return []
-    shape, step = _plane(clues)
-    lengths = np.geomspace(_SHORTEST, max(min(shape) * _LONGEST, 2 * _SHORTEST), _LENGTHS) * step
-    fits = [(*_fitted(seen, _unit(shape, step, own)), own) for own in lengths.tolist()]
-    cost, variance, length = min(fits)
-    if variance <= 0 or _fitted(seen, np.zeros_like(seen.power))[0] - cost < _CLEAR:
+    seen = _spectrum(clues, image)
+    longest = max(min(image.shape) * _LONGEST, 2 * _SHORTEST)
+    lengths = np.geomspace(_SHORTEST, longest, _LENGTHS).tolist()
+    _, variance, length = min((*_fitted(seen, _unit(image.shape, own)), own) for own in lengths)
+    if variance <= 0:
         return []
     return proposals(
         "smooth_prnu",
@@ -71,7 +70,7 @@ def _fitted(seen: _Spectrum, unit: Array) -> tuple[float, float]:
 
     By Whittle's likelihood: weighted least squares, their weights from the round before.
     """
-    expected, variance = np.maximum(seen.power, _LEAST * seen.power.max()), 0.0
+    expected, variance = np.full_like(seen.power, np.average(seen.power, weights=seen.count)), 0.0
     for _ in range(_ROUNDS):
         weight = seen.count / expected**2
         white = float(weight @ (seen.power - seen.known) / weight.sum())
@@ -85,32 +84,32 @@ def _fitted(seen: _Spectrum, unit: Array) -> tuple[float, float]:
     return float(2 * (seen.count * (np.log(expected) + seen.power / expected)).sum()), variance
 
 
-def _plane(clues: Clues) -> tuple[tuple[int, int], int]:
-    """Return the shape of a channel's plane, and its pitch in pixels of the sensor."""
-    channel = clues.layout.channels[0]
-    return clues.shape(channel), 1 if channel == "MONO" else 2
+def _gains(clues: Clues) -> Array | None:
+    """Return what lines and surfaces leave of the gain, %, of all channels; None: no map of it.
 
-
-def _spectrum(clues: Clues) -> _Spectrum | None:
-    """Return the spectrum of the gain, of all channels by their weights; None: there is no map."""
-    shape, step = _plane(clues)
-    made, weights = [], []
-    for channel, (image, noise) in clues.image("gain").items():
-        own = parts(image, noise)
-        if image.shape != shape or not own.square > 0:
-            continue
-        limit = _FAR_OUT * own.square**0.5
-        unit = (noise * 100 / clues.scale("gain", channel)) ** 2
-        made.append(_binned(_power(np.clip(own.pixels, -limit, limit)), shape) * unit)
-        weights.append(1 / (own.square * unit) ** 2)
-    if not made:
+    What all colours share shows best in the whole mosaic.
+    """
+    sites, images = clues.layout.sites, clues.image("gain")
+    if set(images) != set(sites):
         return None
-    known = np.zeros_like(made[0])
+    whole, step = np.zeros((clues.layout.rows, clues.layout.columns)), 1 + (len(sites) > 1)
+    for channel, (image, noise) in images.items():
+        own = parts(image, noise)
+        limit = _FAR_OUT * own.square**0.5
+        y, x = sites[channel]
+        unit = noise * 100 / clues.scale("gain", channel)
+        whole[y::step, x::step] = np.clip(own.pixels, -limit, limit) * unit
+    return whole if whole.any() else None
+
+
+def _spectrum(clues: Clues, image: Array) -> _Spectrum:
+    """Return the spectrum of a map of gains beside that of the camera's own fields."""
+    known = np.zeros(_BINS)
     for effect in clues.camera.effect:
         if isinstance(effect, SmoothPrnu):
-            known += effect.sigma_percent**2 * _unit(shape, step, effect.length_pixels)
-    count = np.bincount(_bins(shape).ravel(), minlength=_BINS + 1)[:_BINS]
-    return _Spectrum(np.average(made, axis=0, weights=weights), known, count.astype(np.float64))
+            known += effect.sigma_percent**2 * _unit(image.shape, effect.length_pixels)
+    count = np.bincount(_bins(image.shape).ravel(), minlength=_BINS + 1)[:_BINS]
+    return _Spectrum(_binned(_power(image), image.shape), known, count.astype(np.float64))
 
 
 def _power(image: Array) -> Array:
@@ -120,23 +119,23 @@ def _power(image: Array) -> Array:
 
 
 @lru_cache(maxsize=64)
-def _unit(shape: tuple[int, int], step: int, length: float) -> Array:
-    """Return the power, in each bin, of a field of variance 1, seen at every `step` pixels."""
+def _unit(shape: tuple[int, ...], length: float) -> Array:
+    """Return the power, in each bin, of a field of variance 1."""
     y, x = (np.minimum(np.arange(size), size - np.arange(size)) for size in shape)
-    covariance = np.exp(-step * np.hypot(y[:, None], x) / length)
+    covariance = np.exp(-np.hypot(y[:, None], x) / length)
     return _binned(np.maximum(fft.rfft2(covariance).real, 0.0), shape)
 
 
-def _binned(power: Array, shape: tuple[int, int]) -> Array:
-    """Return the mean power in each bin of a plane's spectrum, 0 where there is none."""
+def _binned(power: Array, shape: tuple[int, ...]) -> Array:
+    """Return the mean power in each bin of a map's spectrum, 0 where there is none."""
     bins = _bins(shape).ravel()
     sums, count = np.bincount(bins, power.ravel(), _BINS + 1), np.bincount(bins, None, _BINS + 1)
     return np.asarray((sums / np.maximum(count, 1))[:_BINS])
 
 
 @lru_cache(maxsize=8)
-def _bins(shape: tuple[int, int]) -> NDArray[np.int64]:
-    """Return the bin of each frequency of a plane; `_BINS`: of none, for lines or surfaces."""
+def _bins(shape: tuple[int, ...]) -> NDArray[np.int64]:
+    """Return the bin of each frequency of a map; `_BINS`: of none, for lines or surfaces."""
     down, across = np.abs(fft.fftfreq(shape[0]))[:, None], fft.rfftfreq(shape[1])
     f, low = np.hypot(down, across), _LOWEST / min(shape)
     at = _BINS * np.log(np.maximum(f, low) / low) / np.log(_HIGHEST / low)

@@ -48,11 +48,14 @@ def pixels(look: Look, wanted: str, *free: str) -> Evidence:
 
 
 def blurred(look: Look, width: float, wanted: str, *free: str) -> Evidence:
-    """Return the variance of a coefficient map that is blurred, less its rows and columns."""
+    """Return the variance of a coefficient map that is blurred, less its lines and what is wide.
+
+    Uneven light is wide too: it says nothing.
+    """
 
     def value(m: np.ndarray) -> float:
-        soft = gaussian_filter(m - m.mean(0) - m.mean(1)[:, None], width)
-        return float(np.var(soft))
+        own = m - m.mean(0) - m.mean(1)[:, None]
+        return float(np.var(gaussian_filter(own, width) - gaussian_filter(own, min(m.shape) / 8)))
 
     return _of(look, wanted, free, value)
 

@@ -217,7 +217,7 @@ def _unsettled(case: Case, drawn: Drawn, x: float) -> dict[str, Any]:
 def _blots(rng: np.random.Generator, case: Case) -> dict[str, Any]:
     """Draw how far gains are alike, in pixels of a plane."""
     pitch = 1 if case.cfa == "MONO" else 2
-    return {"length_pixels": round(pitch * float(np.exp(rng.uniform(np.log(1.5), np.log(8)))), 2)}
+    return {"length_pixels": round(pitch * float(np.exp(rng.uniform(np.log(1.5), np.log(5)))), 2)}
 
 
 def _well(case: Case, drawn: Drawn, x: float) -> dict[str, Any]:

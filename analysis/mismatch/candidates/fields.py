@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,11 +19,12 @@ from dsis.effects.smooth_prnu import SmoothPrnu
 Array = NDArray[np.float64]
 _SHORTEST = 0.7  # pixels: neighbours of less have nothing in common
 _LENGTHS = 16
-_LONGEST = 1 / 6  # of the shorter side: what is longer is a smooth surface
+_LONGEST, _UNEVEN = 1 / 4, 1 / 3  # of the shorter side: what is longer is a smooth surface
 _BINS = 32
 _LOWEST, _HIGHEST = 4.0, 0.75  # cycles a plane, a pixel: smooth surfaces have what is lower
 _OF_LINES = 1.5  # cycles a plane along an axis, that means of lines have with the window
 _FAR_OUT = 5.0  # standard deviations of pixels, beyond which they count as so far out
+_ALIKE = 3.78  # frequencies that the window makes one: Hann's, in two dimensions
 _ROUNDS = 6
 _LEAST = 1e-9  # of the largest power
 
@@ -38,7 +40,7 @@ class _Spectrum:
     known
         Of the fields that the camera has already.
     count
-        Frequencies in each bin.
+        Independent frequencies in each bin.
     """
 
     power: Array
@@ -48,21 +50,34 @@ class _Spectrum:
 
 def _smooth_prnu(clues: Clues) -> Sequence[Proposal]:
     """Start from the field that, beside white gains, makes the gain's spectrum most likely."""
+    best = min(fields(clues), default=None)
+    if best is None or best.variance <= 0:
+        return []
+    return proposals(
+        "smooth_prnu",
+        ["sigma_percent", "length_pixels"],
+        sigma_percent=min(best.variance**0.5, 90.0),
+        length_pixels=best.length,
+    )
+
+
+class Field(NamedTuple):
+    """What a field leaves open of the gain's spectrum, chi-squared; its variance, %^2; pixels."""
+
+    left: float
+    variance: float
+    length: float
+
+
+def fields(clues: Clues) -> list[Field]:
+    """Return the field of each length that fits the gain's spectrum best; none without a map."""
     image = _gains(clues)
     if image is None:
         return []
     seen = _spectrum(clues, image)
     longest = max(min(image.shape) * _LONGEST, 2 * _SHORTEST)
     lengths = np.geomspace(_SHORTEST, longest, _LENGTHS).tolist()
-    _, variance, length = min((*_fitted(seen, _unit(image.shape, own)), own) for own in lengths)
-    if variance <= 0:
-        return []
-    return proposals(
-        "smooth_prnu",
-        ["sigma_percent", "length_pixels"],
-        sigma_percent=min(variance**0.5, 90.0),
-        length_pixels=length,
-    )
+    return [Field(*_fitted(seen, _unit(image.shape, own)), own) for own in lengths]
 
 
 def _fitted(seen: _Spectrum, unit: Array) -> tuple[float, float]:
@@ -109,7 +124,7 @@ def _spectrum(clues: Clues, image: Array) -> _Spectrum:
         if isinstance(effect, SmoothPrnu):
             known += effect.sigma_percent**2 * _unit(image.shape, effect.length_pixels)
     count = np.bincount(_bins(image.shape).ravel(), minlength=_BINS + 1)[:_BINS]
-    return _Spectrum(_binned(_power(image), image.shape), known, count.astype(np.float64))
+    return _Spectrum(_binned(_power(image), image.shape), known, count / _ALIKE)
 
 
 def _power(image: Array) -> Array:
@@ -146,7 +161,7 @@ def _bins(shape: tuple[int, ...]) -> NDArray[np.int64]:
 def _shorter(layout: Layout, effect: Effect) -> bool:
     """Return whether a field is far shorter than the sensor: longer ones are uneven light."""
     size = min(layout.rows, layout.columns)
-    return not isinstance(effect, SmoothPrnu) or effect.length_pixels < 2 * _LONGEST * size
+    return not isinstance(effect, SmoothPrnu) or effect.length_pixels < _UNEVEN * size
 
 
 CANDIDATES = (

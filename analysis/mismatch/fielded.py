@@ -1,4 +1,4 @@
-"""Uneven light and unequal halves that gains which neighbours share feign: long fields lean too."""
+"""Uneven light, halves and decays that gains which neighbours share feign: fields lean too."""
 
 from dataclasses import replace
 
@@ -14,7 +14,7 @@ from dsis.effects import Effect
 from dsis.effects.smooth_prnu import SmoothPrnu
 
 Array = NDArray[np.float64]
-_KINDS = frozenset({"shading", "tap_mismatch"})
+_KINDS = frozenset({"shading", "tap_mismatch", "line_settling"})
 _STATISTIC = "fixed_patch_variance"
 _AS_LIKELY = 4.0  # of chi-squared: lengths that the gain's spectrum may well have
 _CHANCE = 4.0  # standard deviations of a field: no direction of it is told beforehand
@@ -27,8 +27,8 @@ def fielded(state: State, effect: Effect) -> Denial | None:
     about how far. If fields of a length that may well be have the pattern by chance, there may be
     no uneven light.
     """
-    if effect.kind not in _KINDS:
-        return None
+    if effect.kind not in _KINDS or getattr(effect, "offset_dn", 0.0):
+        return None  # an offset is no gain
     named = any(isinstance(other, SmoothPrnu) for other in state.camera.effect)
     if not named and all(m.statistic != _STATISTIC for m in state.mismatches):
         return None

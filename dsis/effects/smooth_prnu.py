@@ -17,6 +17,7 @@ from dsis.kept import Kept
 
 _FIELDS = Kept(32 << 20)  # every frame of a sensor asks for its field
 _MARGIN = 8.0  # correlation lengths from one end of the sensor around to the other
+_PLACE = 1 << 20  # row and column of the sensor's first pixel among the draws
 
 
 class SmoothPrnu(Effect):
@@ -74,17 +75,18 @@ class SmoothPrnu(Effect):
 def _field(exposure: Exposure, length: float) -> NDArray[np.float32]:
     """Return the field of a whole sensor, of variance 1 and mean 0: float32 (row, column).
 
-    White noise of a torus, larger than the sensor, is given the amplitudes of the covariance. What
-    stands at a pixel depends on the length smoothly.
+    White noise of a torus, larger than the sensor, is given the amplitudes of the covariance. Each
+    place has its own draw, whatever the torus' size: the field depends on the length smoothly.
     """
     rows, columns = exposure.grid.sensor_shape
     around = _around(rows, length), _around(columns, length)
-    white = exposure.sensor.normal(
-        "smooth_prnu", PixelGrid(*around, Cfa.MONO), threads=exposure.threads
-    )
+    above, left = (around[0] - rows) // 2, (around[1] - columns) // 2
+    place = PixelGrid(*around, Cfa.MONO, _PLACE - above, _PLACE - left)
+    white = exposure.sensor.normal("smooth_prnu", place, threads=exposure.threads)
     bins = fft.rfft2(white, overwrite_x=True)
     bins *= _amplitudes(around, length)
-    field = fft.irfft2(bins, around, overwrite_x=True)[:rows, :columns]
+    whole = fft.irfft2(bins, around, overwrite_x=True)
+    field = whole[above : above + rows, left : left + columns]
     return np.array(field - field.mean(dtype=np.float64), np.float32)
 
 

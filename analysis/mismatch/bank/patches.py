@@ -46,7 +46,7 @@ def names() -> list[str]:
 def _sums(values: Array, size: int) -> Array:
     """Return sums of so many rows each; what is left over belongs to no patch."""
     count = len(values) // size
-    return np.asarray(values[: count * size].reshape(count, size, -1).sum(1))
+    return np.asarray(values[: count * size].reshape(count, size, values.shape[1]).sum(1))
 
 
 @lru_cache(maxsize=64)

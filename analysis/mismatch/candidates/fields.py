@@ -114,7 +114,7 @@ def _gains(clues: Clues) -> Array | None:
         y, x = sites[channel]
         unit = noise * 100 / clues.scale("gain", channel)
         whole[y::step, x::step] = np.clip(own.pixels, -limit, limit) * unit
-    return whole if whole.any() else None
+    return whole
 
 
 def _spectrum(clues: Clues, image: Array) -> _Spectrum:

@@ -11,6 +11,7 @@ from analysis.mismatch.candidates.patterns import gain_of
 from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.state import State
 from dsis.effects import Effect
+from dsis.effects.line_settling import LineSettling
 from dsis.effects.smooth_prnu import SmoothPrnu
 
 Array = NDArray[np.float64]
@@ -27,7 +28,7 @@ def fielded(state: State, effect: Effect) -> Denial | None:
     about how far. If fields of a length that may well be have the pattern by chance, there may be
     no uneven light.
     """
-    if effect.kind not in _KINDS or getattr(effect, "offset_dn", 0.0):
+    if effect.kind not in _KINDS or (isinstance(effect, LineSettling) and effect.offset_dn):
         return None  # an offset is no gain
     named = any(isinstance(other, SmoothPrnu) for other in state.camera.effect)
     if not named and all(m.statistic != _STATISTIC for m in state.mismatches):

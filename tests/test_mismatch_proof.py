@@ -162,6 +162,7 @@ PLANTED = {
     "rts": {"pixel_fraction": 0.01, "amplitude_dn": 8.0},
     "saturation": {"full_well_dn": 2690.0},
     "shading": {"falloff_percent": 0.4},
+    "smooth_prnu": {"sigma_percent": 0.15, "length_pixels": 6.0},
     "spatial_filtering": {"fraction": 0.015},
     "tap_mismatch": {"gain_percent": 0.18},
     "line_settling": {"gain_percent": 0.6, "offset_dn": -1.0, "length_pixels": 6.0},

@@ -29,8 +29,9 @@ _COSINE = 0.5  # of what two predictions change, from which they change the same
 _SPARSE = 4  # times as many simulations
 _BY_FRAME = frozenset({"frame_variance"})
 # A sign: half of the pairs of frames show nothing, half show it twice. A band: one bin's phase.
-# Pink noise: most of it in a frame's mean and in the first few bins.
-_BY_DRAW = frozenset({"bistable_pattern", "line_flicker", "pink_noise"})
+# Pink noise: most of it in a frame's mean and in the first few bins. Gains that neighbours share:
+# in few patches.
+_BY_DRAW = frozenset({"bistable_pattern", "line_flicker", "pink_noise", "smooth_prnu"})
 _BY_BIN = frozenset({"periodic_noise"})  # of few frames: the noise of one bin comes on top
 _TWINS = {"channel_imbalance": "tap_mismatch", "tap_mismatch": "channel_imbalance"}
 _FAR_OFF, _LITTLE = 8.0, 0.3  # departures, and the share of one that is little

@@ -41,6 +41,7 @@ _WORDS = {
     "fixed_smooth_tilt": "the mean frame leans to one side",
     "fixed_smooth_falloff": "the mean frame falls or rises towards its corners",
     "fixed_edge": "the mean frame decays from an edge",
+    "fixed_patch_variance": "pixels that lie together have fixed deviations in common",
     "fixed_correlation_0_1": "fixed deviations of neighbours along a row are alike",
     "fixed_correlation_1_0": "fixed deviations of neighbours along a column are alike",
     "half_seam": "the two halves of the sensor meet in a step",

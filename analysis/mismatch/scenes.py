@@ -31,6 +31,7 @@ _IN_THE_PICTURE = frozenset(
     {
         "shading",
         "prnu",
+        "smooth_prnu",
         "channel_imbalance",
         "tap_mismatch",
         "dsnu",

@@ -17,6 +17,8 @@ _PAIRS = {
     frozenset({"read_noise_spread", "heavy_tailed_read_noise"}): "two dark stacks: pixels persist",
     frozenset({"periodic_noise", "bistable_pattern"}): "more frames: how the phases are spread",
     frozenset({"shading", "amp_glow"}): "darks at two exposure times",
+    frozenset({"smooth_prnu", "shading"}): "flats with the camera turned before the light",
+    frozenset({"smooth_prnu", "crosstalk"}): "more frames: only one correlates what is new in each",
     frozenset({"line_settling", "amp_glow"}): "darks at two exposure times",
     frozenset({"tap_mismatch", "channel_imbalance"}): "the slope of each channel: more levels",
     frozenset({"dark_current", "black_level_drift"}): "darks at several exposure times, shuffled",

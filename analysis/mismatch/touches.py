@@ -46,6 +46,10 @@ _FOLLOWS = {
     "fixed_row_variance": frozenset({"fixed_row_variance", "row_variance"}),
     "fixed_column_variance": frozenset({"fixed_column_variance", "column_variance"}),
     "fixed_smooth_variance": frozenset({"fixed_smooth_variance"}) | _LINES,
+    "fixed_correlation_0_1": frozenset({"fixed_correlation_0_1"}) | _CORRELATIONS,
+    "fixed_correlation_1_0": frozenset({"fixed_correlation_1_0"}) | _CORRELATIONS,
+    "fixed_patch_variance": frozenset({"fixed_correlation_0_1", "fixed_correlation_1_0"})
+    | _CORRELATIONS,
     # Few electrons of several DN each leave codes out.
     "code_imbalance": frozenset({"code_imbalance", "skewness"}),
     "code_spacing": frozenset({"code_spacing", "skewness"}),

@@ -16,6 +16,7 @@ COMPARED: dict[str, tuple[str, ...]] = {
     "read_noise_spread": ("log_sigma",),
     "rts": ("pixel_fraction", "amplitude_dn"),
     "prnu": ("sigma_percent",),
+    "smooth_prnu": ("sigma_percent", "length_pixels"),
     "row_prnu": ("sigma_percent",),
     "column_prnu": ("sigma_percent",),
     "shading": ("falloff_percent",),

@@ -1,12 +1,16 @@
 """Mechanisms that change the expected signal: lens, lamp, pixel gains, charge without light."""
 
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from scipy.ndimage import gaussian_filter
+from scipy.special import ndtri
 
 from planter.view import Image, Mechanism, View, normal
+
+_WIDTHS = 12  # of blots
 
 
 def clean_signal(view: View) -> Image:
@@ -60,6 +64,31 @@ def shading(signal: Image, p: Mapping[str, Any], view: View) -> Image:
 def prnu(signal: Image, p: Mapping[str, Any], view: View) -> Image:
     """Give every pixel a gain."""
     gains = normal(view.of_sensor("prnu"), view.shape)
+    return signal * (1 + np.float32(p["sigma_percent"] / 100) * gains)
+
+
+@lru_cache(maxsize=8)
+def blots(seed: int, shape: tuple[int, int], length: float) -> Image:
+    """Return a field of variance 1 of blots whose widths are those of a half-normal law.
+
+    Blots of width s are alike over exp(-r^2 / (4 s^2)); over all widths that makes exp(-r / L).
+    """
+    rng, margin = np.random.default_rng([seed, 57]), int(6 * length) + 1
+    total = np.zeros(shape, np.float32)
+    for k in range(_WIDTHS):
+        width = length / np.sqrt(2) * float(ndtri(0.5 + (k + 0.5) / (2 * _WIDTHS)))
+        spot = np.zeros((2 * margin + 1, 2 * margin + 1))
+        spot[margin, margin] = 1
+        size = np.sqrt(np.sum(gaussian_filter(spot, width, mode="constant", truncate=4) ** 2))
+        grains = normal(rng, tuple(n + 2 * margin for n in shape))
+        made = gaussian_filter(grains, width, mode="constant", truncate=4) / size
+        total += made[margin:-margin, margin:-margin]
+    return (total / np.sqrt(_WIDTHS)).astype(np.float32)
+
+
+def smooth_prnu(signal: Image, p: Mapping[str, Any], view: View) -> Image:
+    """Let light pass glass and layers that are uneven over some pixels."""
+    gains = blots(view.case.sensor_seed, view.shape, p["length_pixels"])
     return signal * (1 + np.float32(p["sigma_percent"] / 100) * gains)
 
 
@@ -128,6 +157,7 @@ LIGHT: dict[str, Mechanism] = {
     "channel_imbalance": channel_imbalance,
     "shading": shading,
     "prnu": prnu,
+    "smooth_prnu": smooth_prnu,
     "row_prnu": row_prnu,
     "column_prnu": column_prnu,
     "flicker": flicker,

@@ -214,6 +214,12 @@ def _unsettled(case: Case, drawn: Drawn, x: float) -> dict[str, Any]:
     return {"gain_percent": 0.0, "offset_dn": 0.1 * read_dn(case) * size}
 
 
+def _blots(rng: np.random.Generator, case: Case) -> dict[str, Any]:
+    """Draw how far gains are alike, in pixels of a plane."""
+    pitch = 1 if case.cfa == "MONO" else 2
+    return {"length_pixels": round(pitch * float(np.exp(rng.uniform(np.log(1.5), np.log(5)))), 2)}
+
+
 def _well(case: Case, drawn: Drawn, x: float) -> dict[str, Any]:
     """Return a full well that comes nearer to the brightest flat's mean as x grows."""
     del drawn
@@ -269,6 +275,7 @@ RECIPES: dict[str, Recipe] = {
     "column_fpn": Recipe(_none, _sigma(0.1)),
     "dsnu": Recipe(_none, _sigma(0.3)),
     "prnu": Recipe(_none, _plain("sigma_percent", 0.5), most=10),
+    "smooth_prnu": Recipe(_blots, _plain("sigma_percent", 0.2), most=20),
     "row_prnu": Recipe(_none, _plain("sigma_percent", 0.1), most=20),
     "column_prnu": Recipe(_none, _plain("sigma_percent", 0.1), most=20),
     "shading": Recipe(

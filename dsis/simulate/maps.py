@@ -19,6 +19,7 @@ REPLACED = frozenset(
     {
         "dsnu",
         "prnu",
+        "smooth_prnu",
         "row_fpn",
         "column_fpn",
         "row_prnu",

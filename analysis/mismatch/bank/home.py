@@ -10,6 +10,7 @@ from analysis.mismatch.bank.common import SIGNS
 from analysis.mismatch.bank.edges import names as edge_names
 from analysis.mismatch.bank.key import MOSAIC, Key
 from analysis.mismatch.bank.parts import STANDING_OUT
+from analysis.mismatch.bank.patches import SIZES
 from analysis.mismatch.bank.persistent import OUTSTANDING
 from analysis.mismatch.bank.seams import WHOLE
 from analysis.mismatch.bank.surfaces import LOW
@@ -52,6 +53,7 @@ _POOLED = frozenset(
         ("fixed_row_variance", "offset", ""),
         ("fixed_column_variance", "offset", ""),
         *(("fixed_smooth_variance", name, LOW) for name in ("gain", "time")),
+        *(("fixed_patch_variance", "gain", f"{size} pixels") for size in SIZES),
         *((name, "gain", axis) for name in _STEPS for axis in _AXES),
         *(("half_seam", "gain", f"{axis}, {WHOLE}") for axis in _AXES),
         *(
@@ -76,7 +78,7 @@ _SPECTRA = frozenset({"spectral_peak", "row_spectrum_peak", "column_spectrum_pea
                       "slow_row_variance"})  # fmt: skip
 _SHARED = frozenset({"fixed_row_variance", "fixed_column_variance", "fixed_smooth_variance",
                      "fixed_smooth_tilt", "fixed_smooth_falloff", "fixed_edge",
-                     "half_seam"})  # fmt: skip
+                     "fixed_patch_variance", "half_seam"})  # fmt: skip
 
 
 def together_too(scope: str, detail: str) -> str:
@@ -100,6 +102,8 @@ def homes(keys: Sequence[Key], channels: Sequence[str]) -> list[float]:
             weight = LAG * (key.scope == summed)
         if key.statistic == "fixed_edge":
             weight *= LAG
+        if key.statistic == "fixed_patch_variance":
+            weight /= len(SIZES)
         if key.statistic == "carry_over":
             weight = LAG
         if key.statistic == "pixel_variance" and key.detail.startswith(ABOVE):

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.bank.edges import edges
+from analysis.mismatch.bank.patches import patches
 from analysis.mismatch.bank.scalars import Number, ratio_root
 from analysis.mismatch.bank.seams import seams
 from analysis.mismatch.bank.surfaces import slopes, surfaces
@@ -75,6 +76,7 @@ def parts(image: Array, noise: float) -> Parts:
         **surfaces(coefficients, (*lines, square), dof),
         **slopes(coefficients, (*lines, square), image.shape),
         **_correlations(pixels, mean_square),
+        **patches(pixels, square),
         "outlying_pixels": _outlying(scatter + mean_square**2, square, pixels.size),
         **_standing_out(pixels, square),
         **seams(by_row, by_column, lines),

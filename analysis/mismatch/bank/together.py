@@ -12,9 +12,11 @@ from numpy.typing import NDArray
 
 from analysis.mismatch.bank.edges import names as edge_names
 from analysis.mismatch.bank.parts import Parts, sure_of_lines
+from analysis.mismatch.bank.patches import patches
 from analysis.mismatch.bank.scalars import Number, ratio_root
 from analysis.mismatch.bank.seams import WHOLE
 from analysis.mismatch.bank.surfaces import slopes, surfaces
+from dsis.measures.fixed_pattern import Smooth
 
 Array = NDArray[np.float64]
 TOGETHER = "all channels"
@@ -62,6 +64,8 @@ def together(
         values = [np.array([parts[n].numbers[one][0]]) for n in names]
         size = float(_mean(values, [sharpness[n] for n in names])[0])
         found[f"{one}, {TOGETHER}"] = (size, 1.0)
+    for name, number in _patches(list(parts.values()), [sharpness[n] for n in names]).items():
+        found[f"{name}, {TOGETHER}"] = number
     least = min(len(parts[name].coefficients) for name in names)
     surface = _mean(
         [parts[name].coefficients[:least, :least] for name in names],
@@ -76,6 +80,14 @@ def together(
         detail = f"{order}, {TOGETHER}" if order else TOGETHER
         found[f"{statistic} of {detail}"] = number
     return found
+
+
+def _patches(parts: Sequence[Parts], sharpness: Sequence[float]) -> dict[str, Number]:
+    """Return the numbers of patches that channels share."""
+    rows, columns = np.min([own.pixels.shape for own in parts], axis=0)
+    pixels = _mean([own.pixels[:rows, :columns] for own in parts], sharpness)
+    dof = (rows - 1) * (columns - 1) - Smooth.of(rows, columns).kinds
+    return patches(pixels, float((pixels**2).sum()) / dof)
 
 
 def _mean(values: Sequence[Array], sharpness: Sequence[float]) -> Array:

@@ -1,11 +1,19 @@
 """Every effect's way of being recognised: the vocabulary of the diagnosis."""
 
-from analysis.mismatch.candidates import edges, neighbours, patterns, pixels, response, temporal
+from analysis.mismatch.candidates import (
+    edges,
+    fields,
+    neighbours,
+    patterns,
+    pixels,
+    response,
+    temporal,
+)
 from analysis.mismatch.candidates.candidate import Candidate, Proposal
 
 CANDIDATES: dict[str, Candidate] = {
     candidate.kind: candidate
-    for module in (temporal, pixels, neighbours, patterns, edges, response)
+    for module in (temporal, pixels, neighbours, patterns, fields, edges, response)
     for candidate in module.CANDIDATES
 }
 

@@ -10,9 +10,9 @@ from analysis.mismatch.bank.seams import WHOLE
 from analysis.mismatch.bank.together import TOGETHER
 from analysis.mismatch.candidates.candidate import Candidate, Proposal, proposals
 from analysis.mismatch.clues import Clues, alike
-from analysis.mismatch.layout import Place
+from analysis.mismatch.layout import Layout, Place
 from dsis.draw import Draw
-from dsis.effects import Exposure, Image
+from dsis.effects import Effect, Exposure, Image, ReadOut
 from dsis.grid import PixelGrid
 
 Array = NDArray[np.float64]
@@ -96,20 +96,24 @@ def had(clues: Clues, channel: str) -> Array:
 
     Those of uneven light, and those whose lines feign it: (pixel,).
     """
-    layout, camera = clues.layout, clues.camera
+    uneven = [e for e in clues.camera.effect if e.kind in _UNEVEN]
+    y, x = clues.layout.sites[channel]
+    step = 1 if len(clues.layout.sites) == 1 else 2
+    gain = gain_of(uneven, clues.layout, clues.camera.read_out)[y::step, x::step].ravel()
+    return np.asarray(gain - gain.mean())
+
+
+def gain_of(effects: Sequence[Effect], layout: Layout, read_out: ReadOut) -> Array:
+    """Return the gains, per cent beyond none, that effects without draws make: (row, column)."""
     grid = PixelGrid(layout.rows, layout.columns, layout.cfa)
-    uneven = [e for e in camera.effect if e.kind in _UNEVEN]
-    y, x = layout.sites[channel]
-    step = 1 if len(layout.sites) == 1 else 2
     made = []
     for signal in (0.0, _LIGHT_DN):
         image: Image = np.full(grid.shape, signal, np.float32)
-        exposure = Exposure(grid, 0, Draw(0), Draw(0), image, camera.read_out, _nothing)
-        for effect in uneven:
+        exposure = Exposure(grid, 0, Draw(0), Draw(0), image, read_out, _nothing)
+        for effect in effects:
             image = effect.apply(image, exposure)
         made.append(image.astype(np.float64))
-    gain = 100 * (made[1] - made[0])[y::step, x::step].ravel() / _LIGHT_DN
-    return np.asarray(gain - gain.mean())
+    return np.asarray(100 * ((made[1] - made[0]) / _LIGHT_DN - 1))
 
 
 def _nothing(_: int) -> Image:

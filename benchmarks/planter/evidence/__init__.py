@@ -52,6 +52,7 @@ EVIDENCE: dict[str, Callable[[Look, Parameters], Evidence]] = {
     "column_prnu": lambda look, _: maps.lines(look, 0, "gain", "offset"),
     "dsnu": lambda look, _: maps.pixels(look, "offset", "gain"),
     "prnu": lambda look, _: maps.pixels(look, "gain", "offset"),
+    "smooth_prnu": lambda look, p: maps.blurred(look, p["length_pixels"] / 2, "gain", "offset"),
     "shading": lambda look, p: maps.along(
         look, fall_off(_view(look), p.get("law", "quadratic")), "gain", "offset"
     ),

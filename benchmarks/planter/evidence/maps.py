@@ -3,6 +3,7 @@
 from collections.abc import Callable
 
 import numpy as np
+from scipy.ndimage import gaussian_filter
 
 from planter.evidence.look import Evidence, Look
 
@@ -44,6 +45,19 @@ def coefficient_map(look: Look, wanted: str, *free: str) -> np.ndarray | None:
 def pixels(look: Look, wanted: str, *free: str) -> Evidence:
     """Return the variance of a coefficient map less its rows and columns."""
     return _of(look, wanted, free, lambda m: np.var(m - m.mean(0) - m.mean(1)[:, None]))
+
+
+def blurred(look: Look, width: float, wanted: str, *free: str) -> Evidence:
+    """Return the variance of a coefficient map that is blurred, less its lines and what is wide.
+
+    Uneven light is wide too: it says nothing.
+    """
+
+    def value(m: np.ndarray) -> float:
+        own = m - m.mean(0) - m.mean(1)[:, None]
+        return float(np.var(gaussian_filter(own, width) - gaussian_filter(own, min(m.shape) / 8)))
+
+    return _of(look, wanted, free, value)
 
 
 def lines(look: Look, axis: int, wanted: str = "offset", free: str = "gain") -> Evidence:

@@ -36,6 +36,7 @@ NOISY_PIXELS = frozenset(
 )
 OFF_AXIS = frozenset({"spectral_peak", "phase", "alternation_variance"})
 OF_CODES = frozenset({"code_spacing", "code_imbalance"})
+_SURFACES = ("fixed_smooth_variance", "fixed_patch_variance")
 MANY_PIXELS = frozenset({"fixed_pixel_variance"})
 VARIANCE = "pixel_variance"
 _EXPOSURES = 3  # panels of frame means
@@ -184,7 +185,7 @@ def _pattern(m: Mismatch, name: str, shown: Shown, evidence: Evidence) -> Iterat
             stem = "-".join(part for part in (shown.map, axis, groups) if part)
             yield Picture(stem, _title(m, shown.map), (m,), profiles.size_inches(parts), draw)
     else:
-        looks: dict[str, Look] = {"fixed_smooth_variance": "smooth"}
+        looks: dict[str, Look] = dict.fromkeys(_SURFACES, "smooth")
         looks |= dict.fromkeys(MANY_PIXELS | {"outlying_pixels"}, "pixels")
         yield from _map(m, shown.map, evidence, looks.get(name, ""))
 

@@ -1,0 +1,58 @@
+"""Uneven light, halves and decays that gains which neighbours share feign: fields lean too."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+
+from analysis.mismatch.candidates.fields import fields
+from analysis.mismatch.candidates.patterns import gain_of
+from analysis.mismatch.contradicted import Denial
+from analysis.mismatch.state import State
+from dsis.effects import Effect
+from dsis.effects.line_settling import LineSettling
+from dsis.effects.smooth_prnu import SmoothPrnu
+
+Array = NDArray[np.float64]
+_KINDS = frozenset({"shading", "tap_mismatch", "line_settling"})
+_STATISTIC = "fixed_patch_variance"
+_AS_LIKELY = 4.0  # of chi-squared: lengths that the gain's spectrum may well have
+_CHANCE = 4.0  # standard deviations of a field: no direction of it is told beforehand
+
+
+def fielded(state: State, effect: Effect) -> Denial | None:
+    """Return how a pattern of the whole sensor is denied by a field of gains; None: it is not.
+
+    Where neighbours share gains, named or not, the map beyond smooth surfaces tells how much, and
+    about how far. If fields of a length that may well be have the pattern by chance, there may be
+    no uneven light.
+    """
+    if effect.kind not in _KINDS or (isinstance(effect, LineSettling) and effect.offset_dn):
+        return None  # an offset is no gain
+    named = any(isinstance(other, SmoothPrnu) for other in state.camera.effect)
+    if not named and all(m.statistic != _STATISTIC for m in state.mismatches):
+        return None
+    others = tuple(own for own in state.camera.effect if not isinstance(own, SmoothPrnu))
+    camera = state.camera.model_copy(update={"effect": others})
+    found = fields(replace(state.clues(), camera=camera))
+    pattern = gain_of([effect], state.setting.layout, camera.read_out)
+    pattern -= pattern.mean()
+    square = float((pattern**2).sum())
+    if not found or square == 0:
+        return None
+    least = min(found).left
+    likely = [own for own in found if own.left <= least + _AS_LIKELY and own.variance > 0]
+    most = max((own.variance * _along(pattern, own.length) for own in likely), default=0.0)
+    if square**2 >= _CHANCE**2 * most:
+        return None
+    share = 1 - _CHANCE * most**0.5 / square
+    return Denial(share, "gains that neighbours share are as uneven by chance")
+
+
+def _along(pattern: Array, length: float) -> float:
+    """Return the variance of a field's product with a pattern, for a field of variance 1."""
+    around = tuple(2 * size for size in pattern.shape)
+    y, x = (np.minimum(np.arange(size), size - np.arange(size)) for size in around)
+    power = fft.fft2(np.exp(-np.hypot(y[:, None], x) / length)).real
+    return float((np.abs(fft.fft2(pattern, around)) ** 2 * power).mean())

@@ -11,11 +11,13 @@ import pytest
 from analysis.mismatch import judge, name, rank
 from analysis.mismatch.candidates import Proposal
 from analysis.mismatch.contradicted import Denial
+from analysis.mismatch.instance import alike_effects
 from analysis.mismatch.judge import Judge
 from analysis.mismatch.name import Search
 from analysis.mismatch.named import Named
-from analysis.mismatch.rank import Ranked, _near, alike, ties
+from analysis.mismatch.rank import Ranked, alike, ties
 from analysis.mismatch.recalibrate import _moved
+from analysis.mismatch.resolved import explains
 from dsis.effects import registry
 
 NUMBERS = 12
@@ -176,6 +178,7 @@ def test_an_effect_is_dropped_only_where_many_simulations_say_so(
 
     state: Any = SimpleNamespace(predictor=predictor)
     monkeypatch.setattr(judge, "resolved", lambda *_: 1.0)
+    monkeypatch.setattr(judge, "locates", lambda *_: True)
     asked = Judge(state, lambda _: None, 16)  # type: ignore[arg-type, return-value] # no camera
     said = {"from": 16}
     assert asked.needless([effect]) is None
@@ -217,6 +220,46 @@ def test_what_takes_the_place_of_a_stronger_effect_goes_before_it(
     assert found is not None
     assert found[0].kind == dropped
     assert found[1].startswith(why)
+
+
+def test_an_effect_that_explains_nothing_located_is_asked_for_and_lines_are_not(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    tails = Named(
+        "heavy_tailed_read_noise", _proposal("heavy_tailed_read_noise", tail_df=60.0), {}, 3.0, ()
+    )
+    frequency = {"amplitude_dn": 0.2, "frequency": (0.1, 0.2)}
+    line = Named("periodic_noise", _proposal("periodic_noise", **frequency), {}, 3.0, ())
+    predictor = SimpleNamespace(replicates=16, ready=list, mean=lambda _: None, worth=lambda _: 5.0)
+    state: Any = SimpleNamespace(predictor=lambda *_: predictor)
+    monkeypatch.setattr(judge, "resolved", lambda *_: 1.0)
+    monkeypatch.setattr(judge, "locates", lambda *_: False)
+    asked = Judge(state, lambda _: None, 16)  # type: ignore[arg-type, return-value] # no camera
+    assert asked.needless([line]) is None
+    assert asked.needless([line, tails]) == (tails, judge.NOTHING)
+
+
+@pytest.mark.parametrize(
+    ("with_it", "without", "first", "explained"),
+    [
+        ({}, {"kurtosis": 6.0}, {}, True),
+        ({"frame_variance": 14.1}, {"frame_variance": 15.0}, {"frame_variance": 100.0}, False),
+        ({"frame_variance": 7.0}, {"frame_variance": 15.0}, {}, True),
+        ({}, {}, {"kurtosis": 4.2}, True),  # some of the frames do not show it for certain
+        ({}, {}, {"level": 4.2}, False),  # which calls for other effects
+    ],
+)
+def test_an_effect_explains_half_of_something_that_differs_without_it(
+    with_it: dict[str, float],
+    without: dict[str, float],
+    first: dict[str, float],
+    explained: bool,
+) -> None:
+    def of(found: dict[str, float]) -> Any:
+        mismatches = [SimpleNamespace(statistic=s, z=z) for s, z in found.items()]
+        return SimpleNamespace(mismatches=mismatches)
+
+    assert explains(of(with_it), of(without), of(first), {"kurtosis"}) == explained
 
 
 def test_beside_what_gains_much_only_what_gained_enough_is_tried_anew(
@@ -328,6 +371,6 @@ def test_a_denied_decay_waits_as_others_do_and_leaves_other_edges(
 
 def test_an_optional_number_is_near_its_like_only() -> None:
     kind, own = registry()["line_settling"], {"gain_percent": 1.0, "length_pixels": 5.0}
-    assert _near(kind(**own), kind(**own))
-    assert not _near(kind(**own), kind(**own, gain_length_pixels=3.0))
-    assert not _near(kind(**own, gain_length_pixels=3.0), kind(**own))
+    assert alike_effects(kind(**own), kind(**own))
+    assert not alike_effects(kind(**own), kind(**own, gain_length_pixels=3.0))
+    assert not alike_effects(kind(**own, gain_length_pixels=3.0), kind(**own))

@@ -9,15 +9,17 @@ from numpy.typing import NDArray
 
 from analysis.mismatch.contradicted import contradicted
 from analysis.mismatch.feigned import of_another
+from analysis.mismatch.instance import LINES
 from analysis.mismatch.named import Named
 from analysis.mismatch.predict import Predictor
 from analysis.mismatch.rank import LEAST_GAIN
-from analysis.mismatch.resolved import resolved
+from analysis.mismatch.resolved import locates, resolved
 from analysis.mismatch.state import State
 from dsis.camera import Camera
 
 Array = NDArray[np.float64]
 LITTLE, NEEDLESS = "it would explain", "the others explain what it would explain"
+NOTHING = "it explains nothing that differs for certain"
 INSTEAD = "it takes the place of what"
 _RESOLVED = 0.7  # share of what an effect touches that it must explain
 Verdict = tuple[float, str]
@@ -123,4 +125,6 @@ class Judge:
             return share, NEEDLESS
         if share < _RESOLVED:
             return share, f"{LITTLE} {max(share, 0):.0%} of what it changes"
+        if named.kind not in LINES and not locates(self.state, mean):  # frames show lines
+            return 1.0, NOTHING
         return None

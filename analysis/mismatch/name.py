@@ -10,7 +10,7 @@ from analysis.mismatch.candidates import CANDIDATES
 from analysis.mismatch.contradicted import refuted
 from analysis.mismatch.fitted import Fitted
 from analysis.mismatch.instance import LINES, Frequency, frequency_of, instance
-from analysis.mismatch.judge import LITTLE, NEEDLESS, Judge
+from analysis.mismatch.judge import LITTLE, NEEDLESS, NOTHING, Judge
 from analysis.mismatch.mapped import as_maps_show
 from analysis.mismatch.named import Named
 from analysis.mismatch.phase import ABSENT, WholeFrames
@@ -24,7 +24,7 @@ from analysis.mismatch.rank import (
     ties,
     twin,
 )
-from analysis.mismatch.resolved import opened
+from analysis.mismatch.resolved import explains, opened
 from analysis.mismatch.segments import second_path
 from analysis.mismatch.state import State
 from dsis.camera import Camera
@@ -312,11 +312,17 @@ class Search(Fitted):
             if worst is None:
                 break
             bare = State.of(self.setting, self.without(state, worst[0]), self.step, near=state)
-            if worst[1] == NEEDLESS and opened(state, bare):
+            if self._needed(state, bare, *worst):
                 needed.add(worst[0].name)
                 continue
             state = self._dropped(bare, *worst)
         return state
+
+    def _needed(self, state: State, bare: State, named: Named, why: str) -> bool:
+        """Return whether a state without an effect shows that it is no needless one after all."""
+        if why == NOTHING:
+            return explains(state, bare, self.base, CANDIDATES[named.kind].calls)
+        return why == NEEDLESS and opened(state, bare)
 
     def _judge(self, state: State) -> Judge:
         return Judge(state, lambda named: self.without(state, named), self.setting.nulls)

@@ -1,8 +1,12 @@
 """How much an effect explains of what it changes."""
 
+from collections.abc import Container
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.mismatch.locate import FAMILY, tested
 from analysis.mismatch.predict import Predictor
 from analysis.mismatch.state import State
 
@@ -11,6 +15,7 @@ _CLEAR = 3.0  # departures below are chance
 _MOST_OF, _LEAST_CHANGE = 0.7, 1.0
 _OPEN = 8.0  # standard errors
 _MINOR = 0.3  # share of a departure
+_LEFT = 0.5  # of a departure may be left where it is explained
 
 
 def resolved(predictor: Predictor, state: State, without: Array) -> float:
@@ -39,6 +44,29 @@ def resolved(predictor: Predictor, state: State, without: Array) -> float:
     left = np.maximum(np.abs(after[clear]) - allowed, 0.0).sum()
     total = np.maximum(np.maximum(before, np.abs(change[clear])) - limit, 0.0).sum()
     return float(1 - left / total) if total > 0 else 0.0
+
+
+def locates(state: State, without: Array) -> bool:
+    """Return whether something differs for certain without an effect, half of which it explains.
+
+    `without` are the numbers predicted without it; they scatter as with it.
+    """
+    null = state.null
+    known = null.known & np.isfinite(without)
+    bare = replace(null, mean=np.where(known, without, null.mean))
+    z, chances = tested(state.setting.layout, bare, state.vector)
+    off = chances < FAMILY
+    return bool((np.abs(state.departures[off]) < _LEFT * np.abs(z[off])).any())
+
+
+def explains(state: State, bare: State, base: State, calls: Container[str]) -> bool:
+    """Return whether a state with an effect explains half of something that one without it leaves.
+
+    Or what called for the effect at first, in frames of which the search sees some.
+    """
+    left = {m.statistic: abs(m.z) for m in state.mismatches}
+    beside = any(left.get(m.statistic, 0.0) < _LEFT * abs(m.z) for m in bare.mismatches)
+    return beside or any(m.statistic in calls and m.statistic not in left for m in base.mismatches)
 
 
 def opened(state: State, bare: State) -> bool:

@@ -17,6 +17,7 @@ from dsis.effects import Effect
 Array = NDArray[np.float64]
 STEP = 0.12  # of the logarithm, for the derivative
 _LARGEST = 1.2  # step of a logarithm
+_MOVED = 0.2  # share of parameters by which they may have moved since a slope was found
 _CYCLIC = {"at_code": "period_codes"}
 _SMALL = 0.05  # gain of log-likelihood below which another round is in vain
 Free = tuple[int, str, bool]
@@ -54,7 +55,11 @@ class Slopes:
 
     def of(self, effect: Effect, name: str) -> Array | None:
         """Return how numbers move with a parameter of an effect; None: it is not known."""
-        same = (j for known, own, j in self.found if own == name and alike_effects(known, effect))
+        same = (
+            slope
+            for known, own, slope in self.found
+            if own == name and alike_effects(known, effect, _MOVED)
+        )
         return next(same, None)
 
 

@@ -32,9 +32,9 @@ from dsis.effects import Effect
 
 Array = NDArray[np.float64]
 _WEAK = 30.0  # gain below which an effect may be what others, fitted one by one, left over
-_MOST_EFFECTS = 14  # some may have to go again
+_MOST_EFFECTS = 20  # some may have to go again
 _CHOSEN = frozenset({"adc_memory", "dual_gain"})  # a period, a gap between levels
-_MOST_LINES = 3  # further ones stay unexplained, located
+_MOST_LINES = 5  # further ones stay unexplained, located
 _SPIKY = 10.0  # standard errors from which tails bend the variances
 _TAILS = frozenset({"kurtosis", "kurtosis_within_pixels", "one_off_outliers"})
 

@@ -17,7 +17,7 @@ from analysis.mismatch.prove.gain import heldout_gain
 from analysis.mismatch.prove.gap import gap_closed
 from analysis.mismatch.prove.held import Held, hold
 from analysis.mismatch.prove.likelihood import Loglik
-from analysis.mismatch.prove.proof import loglik_of, prove_held
+from analysis.mismatch.prove.proof import hold_seen, loglik_of, prove_held
 from analysis.mismatch.prove.virtual import Signals
 from analysis.mismatch.source import Source
 from analysis.mismatch.split import Split
@@ -146,7 +146,10 @@ class Trial:
         if self.held is None:
             return Proof({}, nothing, counts, None, None, chi2)
         signals = final.calibrated.model.signals
-        numbers = prove_held(self.held, base.camera, final.camera, signals, seed=self.seed)
+        frames = self.split.development, self.split.locked
+        seen = hold_seen(self.recording, *frames, self.held)
+        models = base.camera, final.camera, signals
+        numbers = prove_held(self.held, *models, seed=self.seed, seen=seen)
         step()
         gap = self._gap(base, final, source) if base.mismatches else None
         locked = dict(self.split.locked)

@@ -14,7 +14,14 @@ from analysis.mismatch.prove.likelihood import (
     frame_loglik,
     likelihood_model,
 )
-from analysis.mismatch.prove.proof import ProofNumbers, gain_of, loglik_of, prove, prove_held
+from analysis.mismatch.prove.proof import (
+    ProofNumbers,
+    gain_of,
+    hold_seen,
+    loglik_of,
+    prove,
+    prove_held,
+)
 
 __all__ = [
     "Auc",
@@ -28,6 +35,7 @@ __all__ = [
     "gap_closed",
     "heldout_gain",
     "hold",
+    "hold_seen",
     "likelihood_model",
     "loglik_of",
     "prove",

@@ -24,6 +24,7 @@ MOST_EXPOSURES = 24  # with locked frames, and as many without
 STACK = 6  # frames from which an exposure shows more than a pair does
 MOST_CLIPPED = 0.05  # share of samples at an end of the converter: no law of noise is left there
 MOST_SAMPLES = 2**24  # in all: a larger sensor is proven on a window at its centre
+MOST_SEEN = 2**27  # by a classifier, whose features cost less than likelihoods
 
 
 @dataclass(frozen=True)
@@ -103,7 +104,9 @@ class Held:
         return self.grid.rows, self.grid.columns
 
 
-def hold(recording: Recording, training: Numbers, locked: Numbers) -> Held:
+def hold(
+    recording: Recording, training: Numbers, locked: Numbers, most_samples: int = MOST_SAMPLES
+) -> Held:
     """Return the frames of a recording that a proof needs; each is read once or twice."""
     known = [e for e in recording.exposures if training.get(e.name) or locked.get(e.name)]
     proving = _chosen([e for e in known if locked.get(e.name)])
@@ -115,7 +118,7 @@ def hold(recording: Recording, training: Numbers, locked: Numbers) -> Held:
         + 4
         for e in taken
     )
-    grid = _window(recording, MOST_SAMPLES // max(frames, 1))
+    grid = _window(recording, most_samples // max(frames, 1))
     read = [
         _hold(
             recording,

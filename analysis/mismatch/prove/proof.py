@@ -10,7 +10,7 @@ from analysis.mismatch.finding import Change, Gain
 from analysis.mismatch.model import in_threads
 from analysis.mismatch.prove.classifier import Auc, auc_of
 from analysis.mismatch.prove.gain import heldout_gain
-from analysis.mismatch.prove.held import Held, hold
+from analysis.mismatch.prove.held import MOST_SEEN, Held, hold
 from analysis.mismatch.prove.likelihood import (
     Loglik,
     frame_loglik,
@@ -87,34 +87,52 @@ def prove(
         Threads: the two models need no more than two.
 
     The result does not depend on `jobs`. A large sensor is seen through a window at its centre, and
-    gains are those of the window.
+    gains are those of the window; the classifier's is larger, most often the whole sensor.
     """
     held = hold(recording, training, locked)
-    return prove_held(held, before, after, signals, seed=seed, jobs=jobs)
+    seen = hold_seen(recording, training, locked, held)
+    return prove_held(held, before, after, signals, seed=seed, jobs=jobs, seen=seen)
+
+
+def hold_seen(recording: Recording, training: Numbers, locked: Numbers, held: Held) -> Held:
+    """Return the frames that a classifier looks at: of a large sensor more than is `held`."""
+    if held.shape == (recording.rows, recording.columns):
+        return held
+    return hold(recording, training, locked, MOST_SEEN)
 
 
 def prove_held(
-    held: Held, before: Camera, after: Camera, signals: Signals, *, seed: int, jobs: int = 1
+    held: Held,
+    before: Camera,
+    after: Camera,
+    signals: Signals,
+    *,
+    seed: int,
+    jobs: int = 1,
+    seen: Held | None = None,
 ) -> ProofNumbers:
-    """Compare two camera models on frames that were read before; see `prove`."""
+    """Compare two camera models on frames that were read before; see `prove`.
+
+    `seen` are those that the classifier looks at; None: the same.
+    """
 
     def judged(camera: Camera) -> tuple[Loglik, Auc | None]:
         return (
             loglik_of(held, camera, signals, seed=seed),
-            auc_of(held, camera, signals, seed=seed),
+            auc_of(held if seen is None else seen, camera, signals, seed=seed),
         )
 
     made = in_threads(judged, (before,) if after == before else (before, after), jobs)
-    (one, seen), (two, seen_after) = made[0], made[-1]
-    change = Change(seen.value, seen_after.value) if seen and seen_after else None
+    (one, told), (two, told_after) = made[0], made[-1]
+    change = Change(told.value, told_after.value) if told and told_after else None
     return ProofNumbers(
         one.per_frame,
         two.per_frame,
         heldout_gain(one, two, seed=seed),
         Change(mean_per_pixel(one, held), mean_per_pixel(two, held)),
         change,
-        seen,
-        seen_after,
+        told,
+        told_after,
         held.left_out,
         held.shape,
     )

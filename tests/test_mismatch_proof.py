@@ -13,8 +13,10 @@ from analysis.mismatch.prove import (
     gain_of,
     heldout_gain,
     hold,
+    hold_seen,
     loglik_of,
     prove,
+    prove_held,
 )
 from analysis.mismatch.prove import held as held_module
 from analysis.mismatch.prove.held import Held
@@ -332,3 +334,25 @@ def test_the_same_whatever_the_jobs() -> None:
     assert one.loglik_per_pixel.after - one.loglik_per_pixel.before == pytest.approx(
         one.gain.nats_per_frame / (ROWS * COLUMNS), rel=1e-6
     )
+
+
+def test_a_classifier_sees_more_of_a_large_sensor_than_likelihoods_do(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    recording, numbers = recorded(camera(), 11), {}
+    for e in recording.exposures:
+        numbers[e.name] = TRAINING
+    locked = dict.fromkeys(numbers, LOCKED)
+    held = hold(recording, numbers, locked)
+    assert hold_seen(recording, numbers, locked, held) is held  # the whole sensor already
+    monkeypatch.setattr("analysis.mismatch.prove.held.MOST_SAMPLES", 200_000)
+    window = hold(recording, numbers, locked)
+    seen = hold_seen(recording, numbers, locked, window)
+    assert window.grid.rows < recording.rows
+    assert (seen.grid.rows, seen.grid.columns) == (recording.rows, recording.columns)
+    before, after = camera(), camera(registry()["row_noise"](sigma_dn=2.0))
+    told = prove_held(window, before, after, signals(), seed=1, seen=seen)
+    own = prove_held(window, before, after, signals(), seed=1)
+    assert told.loglik_per_pixel == own.loglik_per_pixel
+    assert told.auc_after is not None
+    assert own.auc_after is None  # a single patch

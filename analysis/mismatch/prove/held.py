@@ -105,9 +105,12 @@ class Held:
 
 
 def hold(
-    recording: Recording, training: Numbers, locked: Numbers, most_samples: int = MOST_SAMPLES
+    recording: Recording, training: Numbers, locked: Numbers, most_samples: int | None = None
 ) -> Held:
-    """Return the frames of a recording that a proof needs; each is read once or twice."""
+    """Return the frames of a recording that a proof needs; each is read once or twice.
+
+    `most_samples` in all, of a window at the centre; None: `MOST_SAMPLES`.
+    """
     known = [e for e in recording.exposures if training.get(e.name) or locked.get(e.name)]
     proving = _chosen([e for e in known if locked.get(e.name)])
     others = _chosen([e for e in known if not locked.get(e.name)])
@@ -118,7 +121,7 @@ def hold(
         + 4
         for e in taken
     )
-    grid = _window(recording, most_samples // max(frames, 1))
+    grid = _window(recording, (most_samples or MOST_SAMPLES) // max(frames, 1))
     read = [
         _hold(
             recording,

@@ -127,7 +127,8 @@ class Search(Fitted):
                 state = self._resized(state, [again])
                 continue
             least = 0.0 if added is None else added[0].gain
-            some = [] if strong else self._called(state, less=added is not None)
+            later = strong or (self.setting.large and least >= _WEAK)  # simulations take long
+            some = [] if later else self._called(state, less=added is not None)
             sized = self._resized(state, some, least) if some else state
             if sized is not state:
                 state = sized

@@ -21,6 +21,7 @@ from dsis.effects import Effect
 
 _CLEAR = 3.0  # standard errors between two sizes that no chance sets apart
 _ROUNDS = 6  # of a fit, at most
+_FEW_ROUNDS = 2  # where simulations take long: all is fitted again in the end
 _FALLEN = 0.5  # of a size, below which it may be none: a fit of a logarithm hardly gets there
 _LITTLE = 1e-3  # of a size: as good as none
 
@@ -180,9 +181,10 @@ def refitted(state: State, some: Sequence[Own]) -> list[Own]:
     left = list(some)
     count = replicates_for(state.setting, [own.effect for own in some])
     predictor = state.predictor(count)
+    rounds = _FEW_ROUNDS if state.setting.large else _ROUNDS
     while left:
         bare = without_own(state.camera, left)
-        polished = polish(predictor, bare, [own.proposal for own in left], _ROUNDS)
+        polished = polish(predictor, bare, [own.proposal for own in left], rounds)
         if polished is None:
             break
         fitted = [

@@ -133,7 +133,6 @@ def _found(
     known: dict[str, Array] = {}
     if large:  # simulations of large recordings tell more, and cost more
         search.setting = replace(setting, nulls=setting.drafts)
-        final = search.sized_anew(final)
         final = _undenied(search, final)  # all frames may deny what some showed
         known = changes(whole, final, search.named, partial(search.without, final))
     final, gains = _proven(search, search.settle(final), trial, judged=large)

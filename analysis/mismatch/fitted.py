@@ -141,11 +141,6 @@ class Fitted:
             return []
         return called(left, [m for m in state.mismatches if not less or m.z < 0])
 
-    def sized_anew(self, state: State) -> State:
-        """Return the state with the sizes of own effects that its mismatches call for."""
-        self.sized = set()
-        return self._resized(state, self._called(state))
-
     def _resized(self, state: State, some: Sequence[Own], least: float = 0.0) -> State:
         """Return the state with own effects of the sizes that the recording shows, if others.
 

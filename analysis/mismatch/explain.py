@@ -44,7 +44,7 @@ def explained(
         left = max((abs(after.get(base.null.keys[i], 0.0)) for i in which), default=0.0)
         still = any(m.statistic == mismatch.statistic for m in final.mismatches)
         score = {
-            kind: float((np.clip(change[which] / z, -1, 2) * np.abs(z)).sum() / np.abs(z).sum())
+            kind: float((np.clip(change[which] / z, -1, 1) * np.abs(z)).sum() / np.abs(z).sum())
             for kind, change in both.items()
         }
         best = max(score, key=lambda kind: score[kind], default=None)

@@ -5,8 +5,8 @@ from dataclasses import dataclass, field, replace
 
 from analysis.mismatch.candidates import Proposal
 from analysis.mismatch.named import Named, camera_without, renewed
-from analysis.mismatch.own import Own, called, refitted, resized, sizes, without_own
-from analysis.mismatch.polish import Slopes, polish, with_effects
+from analysis.mismatch.own import Own, called, explained, refitted, resized, sizes, without_own
+from analysis.mismatch.polish import polish, with_effects
 from analysis.mismatch.predict import Predictor
 from analysis.mismatch.rank import Ranked, replicates_for
 from analysis.mismatch.state import Setting, State
@@ -41,8 +41,6 @@ class Fitted:
         Places of those whose size was fitted since an effect was taken in or dropped.
     polished
         The state that was fitted last.
-    known
-        How numbers moved with the parameters that were fitted.
     rough
         Whether a strong effect was taken in since.
     whole
@@ -59,7 +57,6 @@ class Fitted:
     own: list[Own] = field(default_factory=list)
     sized: set[int] = field(default_factory=set)
     polished: State | None = None
-    known: Slopes = field(default_factory=Slopes)
     rough: bool = False
     whole: Setting | None = None
 
@@ -151,11 +148,14 @@ class Fitted:
         while found := refitted(state, some):
             if state is before and max(own.gain for own in found) < least:
                 break
+            effects, camera = state.camera.effect, resized(state.camera, found)
+            anew = State.of(self.setting, camera, self.step, near=state)
+            if not explained(found, state, anew):  # it stands in for something else
+                break
             kept = {own.place: own for own in [*self.own, *found]}
             self.own = [kept[place] for place in sorted(kept)]
-            effects, camera = state.camera.effect, resized(state.camera, found)
             self.camera = resized(self.camera, found)
-            state = State.of(self.setting, camera, self.step, near=state)
+            state = anew
             # Far from where it was, a change is not known well enough to tell little from none.
             some = [own for own in found if own.fell_from(effects[own.place])]
             if not some:
@@ -174,8 +174,8 @@ class Fitted:
         sparse = replicates_for(self.setting, [p.effect for p in mine])
         predictor = state.predictor(max(self.setting.polishing, sparse))
         # Of a large recording each simulation tells much and costs much: `settle` steps once more.
-        rounds, known = (1, self.known) if self.setting.large else (2, None)
-        polished = polish(predictor, bare, mine, rounds, self._slopes(state), known)
+        rounds = 1 if self.setting.large else 2
+        polished = polish(predictor, bare, mine, rounds, self._slopes(state))
         self.polished = state
         if polished is None:
             return state

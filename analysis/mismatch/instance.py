@@ -44,13 +44,13 @@ def same_line(one: Frequency, other: Frequency, rows: int, columns: int, step: i
     return any(apart(s, 0, columns) < _SAME and apart(s, 1, rows) < _SAME for s in (1, -1))
 
 
-def alike_effects(one: Effect, other: Effect, share: float = _ALIKE) -> bool:
+def alike_effects(one: Effect, other: Effect) -> bool:
     """Return whether two effects are one but for a small share of each parameter."""
     if type(one) is not type(other):
         return False
     a, b = one.model_dump(), other.model_dump()
     return all(
-        abs(a[name] - b[name]) <= share * abs(a[name])
+        abs(a[name] - b[name]) <= _ALIKE * abs(a[name])
         if isinstance(a[name], float) and isinstance(b[name], float)
         else a[name] == b[name]
         for name in a

@@ -1,6 +1,6 @@
 """Which of the effects taken in the recording denies, and which the others make needless."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Container, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -44,15 +44,18 @@ class Judge:
     without: Callable[[Named], Camera]
     nulls: int
 
-    def denied(self, some: Sequence[Named]) -> tuple[Named, str] | None:
+    def denied(
+        self, some: Sequence[Named], needed: Container[str] = frozenset()
+    ) -> tuple[Named, str] | None:
         """Return the effect that the recording denies most, and why; None: it denies none.
 
-        What takes the place of an effect that explains more than itself goes first.
+        What takes the place of an effect that explains more than itself goes first, unless it is
+        `needed`.
         """
         worst = self._worst(self._denial, some)
         if worst is None:
             return None
-        weaker = self._in_place_of(worst[0], some)
+        weaker = self._in_place_of(worst[0], [one for one in some if one.name not in needed])
         return worst if weaker is None else (weaker, f"{INSTEAD} {worst[0].name} explains better")
 
     def _in_place_of(self, denied: Named, some: Sequence[Named]) -> Named | None:
@@ -60,11 +63,12 @@ class Judge:
 
         Each is judged beside the other: what is wrong itself explains little beside what is right.
         """
-        effects = [one for one in some if one.proposal is not None]
-        if denied not in effects:
+        if denied.proposal is None:
             return None
-        worths = {one.name: self._predictor.worth(self._mean(one)) for one in effects}
-        weaker = [one for one in effects if worths[one.name] < worths[denied.name]]
+        most = self._predictor.worth(self._mean(denied))
+        others = [n for n in some if n.proposal is not None and n.kind not in LINES]
+        worths = {one.name: self._predictor.worth(self._mean(one)) for one in others}
+        weaker = [one for one in others if worths[one.name] < most and one != denied]
         sure = self.state.predictor(max(self.nulls, self._predictor.replicates))
         for asked in (self._predictor, sure) if weaker else ():
             if self._shown(asked, denied, None):

@@ -10,11 +10,11 @@ from analysis.mismatch.candidates import CANDIDATES
 from analysis.mismatch.contradicted import refuted
 from analysis.mismatch.fitted import Fitted
 from analysis.mismatch.instance import LINES, Frequency, frequency_of, instance
-from analysis.mismatch.judge import LITTLE, NEEDLESS, NOTHING, Judge
+from analysis.mismatch.judge import INSTEAD, LITTLE, NEEDLESS, NOTHING, Judge
 from analysis.mismatch.mapped import as_maps_show
 from analysis.mismatch.named import Named
 from analysis.mismatch.phase import ABSENT, WholeFrames
-from analysis.mismatch.polish import Slopes, with_effects
+from analysis.mismatch.polish import with_effects
 from analysis.mismatch.rank import (
     LEAST_GAIN,
     Memory,
@@ -67,7 +67,6 @@ class Search(Fitted):
         frames tell better, is looked for once more, and everything fitted once more.
         """
         self.memory, self.refused, self.tied, self.sized = Memory(), {}, {}, set()
-        self.known = Slopes()
         for named in [n for n in self.named if n.kind in _CHOSEN]:
             self.named.remove(named)
             bare = self.without(state, named)
@@ -104,10 +103,15 @@ class Search(Fitted):
         return state
 
     def _forgiven(self, dropped: Sequence[Named]) -> dict[str, str]:
-        """Let effects be proposed again that explained too little of what they change, and why."""
+        """Let effects be proposed again that explained too little of what they change, and why.
+
+        Or that went for another which went as well.
+        """
         found = {}
         for one in dropped:
-            if self.refused.get(one.name, "").startswith(LITTLE):
+            why = self.refused.get(one.name, "")
+            stays = any(other.name in why for other in self.named)
+            if why.startswith(LITTLE) or (why.startswith(INSTEAD) and not stays):
                 found[one.name] = self.refused.pop(one.name)
                 line = frequency_of(None if one.proposal is None else one.proposal.effect)
                 self.settled = [own for own in self.settled if own != (one.kind, line)]
@@ -308,7 +312,7 @@ class Search(Fitted):
         while any(n.proposal is not None for n in self.named):
             judge = self._judge(state)
             # Denied ones first: they may explain what is another's.
-            worst = judge.denied(self.named)
+            worst = judge.denied(self.named, needed)
             worst = worst or judge.needless([n for n in self.named if n.name not in needed])
             if worst is None:
                 break
@@ -322,8 +326,12 @@ class Search(Fitted):
     def _needed(self, state: State, bare: State, named: Named, why: str) -> bool:
         """Return whether a state without an effect shows that it is no needless one after all."""
         if why == NOTHING:
-            return explains(state, bare, self.base, CANDIDATES[named.kind].calls)
-        return why == NEEDLESS and opened(state, bare)
+            kinds = {n.kind for n in self.named if n is not named and n.proposal is not None}
+            kinds |= {own.effect.kind for own in self.own}
+            others = {call for kind in kinds for call in CANDIDATES[kind].calls}
+            calls = frozenset(CANDIDATES[named.kind].calls) - others
+            return explains(state, bare, self.base, calls)
+        return why.startswith((NEEDLESS, INSTEAD)) and opened(state, bare)
 
     def _judge(self, state: State) -> Judge:
         return Judge(state, lambda named: self.without(state, named), self.setting.nulls)

@@ -23,6 +23,7 @@ _CLEAR = 3.0  # standard errors between two sizes that no chance sets apart
 _ROUNDS = 6  # of a fit, at most
 _FEW_ROUNDS = 2  # where simulations take long: all is fitted again in the end
 _FALLEN = 0.5  # of a size, below which it may be none: a fit of a logarithm hardly gets there
+_LEFT = 0.5  # of a departure may be left where a size explains it
 _LITTLE = 1e-3  # of a size: as good as none
 
 
@@ -97,11 +98,11 @@ class Own:
         return abs(self.value - self.model) > _CLEAR * self.error
 
     def like(self, effect: Effect) -> bool:
-        """Return whether an effect is the same but for its size."""
-        size = {self.name}
+        """Return whether an effect is the same but for its size and its shape."""
+        free = {self.name, *SHAPES}
         return effect.kind == self.effect.kind and effect.model_dump(
-            exclude=size
-        ) == self.effect.model_dump(exclude=size)
+            exclude=free
+        ) == self.effect.model_dump(exclude=free)
 
     @property
     def vanished(self) -> "Own":
@@ -135,12 +136,15 @@ def sizes(camera: Camera) -> tuple[Own, ...]:
 def _size(effect: Effect) -> str | None:
     """Return the parameter that is an effect's size; None: it has none, or is none."""
     fields = type(effect).model_fields.items()
-    needed = [name for name, own in fields if own.is_required() and own.annotation is float]
-    if len(needed) != 1 or needed[0] in SHAPES:
+    needed = [
+        name
+        for name, own in fields
+        if own.is_required() and own.annotation is float and name not in SHAPES
+    ]
+    if len(needed) != 1:
         return None
-    value = float(getattr(effect, needed[0]))
-    little = _of_size(effect, needed[0], _LITTLE * value)
-    return needed[0] if value != 0 and little is not None else None
+    little = _of_size(effect, needed[0], _LITTLE * float(getattr(effect, needed[0])))
+    return None if little is None else needed[0]
 
 
 def _of_size(effect: Effect, name: str, value: float) -> Effect | None:
@@ -154,7 +158,17 @@ def _of_size(effect: Effect, name: str, value: float) -> Effect | None:
 def called(some: Iterable[Own], mismatches: Iterable[Mismatch]) -> list[Own]:
     """Return the effects that mismatches call for."""
     off = {m.statistic for m in mismatches}
-    return [own for own in some if off & set(CANDIDATES[own.effect.kind].calls)]
+    return [own for own in some if own.value and off & set(CANDIDATES[own.effect.kind].calls)]
+
+
+def explained(some: Iterable[Own], before: State, after: State) -> bool:
+    """Return whether each of some sizes leaves less than half of what called for it."""
+    then, now = ({m.statistic: abs(m.z) for m in one.mismatches} for one in (before, after))
+    for own in some:
+        calls = [s for s in CANDIDATES[own.effect.kind].calls if s in then]
+        if calls and all(now.get(s, 0.0) > _LEFT * then[s] for s in calls):
+            return False
+    return True
 
 
 def resized(camera: Camera, some: Iterable[Own]) -> Camera:

@@ -15,7 +15,7 @@ Complex = NDArray[np.complex128]
 Array = NDArray[np.float64]
 _PHASES = 32  # of half a turn that are tried
 _STRENGTHS = np.array([0.7, 0.9, 1.1, 1.4])  # of an amplitude that is not exact
-_STEP = 0.5  # of m, in standard deviations of the noise
+_STEP = 0.5  # of m at most, in standard deviations of the noise
 _REACH = 3.5  # standard deviations of m
 _MOST = 6.0  # amplitude of one frame beyond which less noise tells no more
 
@@ -49,7 +49,8 @@ def _likelihoods(found: Complex, amplitude: float) -> tuple[Array, float]:
     centre = found.mean()
     reach = _REACH * (amplitude + 1) / np.sqrt(found.size)
     reach = min(reach, amplitude + _REACH)
-    side = np.arange(-reach, reach + _STEP, _STEP)
+    step = min(_STEP, 1 / np.sqrt(found.size))
+    side = np.arange(-reach, reach + step, step)
     shared = (centre + side[:, np.newaxis] + 1j * side).reshape(-1)
     squares = np.full(shared.size, -found.size * amplitude**2)
     free = np.zeros(shared.size)

@@ -1,7 +1,7 @@
 """Parameters of effects by Gauss-Newton steps on the bank's numbers, predicted by simulation."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import exp, log
 
 import numpy as np
@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from analysis.mismatch.candidates import Proposal
-from analysis.mismatch.instance import alike_effects
 from analysis.mismatch.predict import Predictor
 from dsis.camera import Camera
 from dsis.effects import Effect
@@ -17,7 +16,6 @@ from dsis.effects import Effect
 Array = NDArray[np.float64]
 STEP = 0.12  # of the logarithm, for the derivative
 _LARGEST = 1.2  # step of a logarithm
-_MOVED = 0.2  # share of parameters by which they may have moved since a slope was found
 _CYCLIC = {"at_code": "period_codes"}
 _SMALL = 0.05  # gain of log-likelihood below which another round is in vain
 Free = tuple[int, str, bool]
@@ -47,35 +45,17 @@ class Polished:
     errors: tuple[dict[str, float], ...]
 
 
-@dataclass
-class Slopes:
-    """How numbers moved with parameters before: with other effects beside it changes little."""
-
-    found: list[tuple[Effect, str, Array]] = field(default_factory=list)
-
-    def of(self, effect: Effect, name: str) -> Array | None:
-        """Return how numbers move with a parameter of an effect; None: it is not known."""
-        same = (
-            slope
-            for known, own, slope in self.found
-            if own == name and alike_effects(known, effect, _MOVED)
-        )
-        return next(same, None)
-
-
 def polish(
     predictor: Predictor,
     camera: Camera,
     start: Sequence[Proposal],
     rounds: int = 2,
     slopes: Callable[[Effect], Predictor] | None = None,
-    before: Slopes | None = None,
 ) -> Polished | None:
     """Return `camera` with effects whose parameters are fitted; None where it is no camera.
 
     `camera` holds what stays as it is; the effects of `start` are added to it. `slopes` gives what
-    tells how numbers move with the parameters of an effect, where fewer simulations do; `before`
-    holds what is known of it already, and takes what is found.
+    tells how numbers move with the parameters of an effect, where fewer simulations do.
     """
     free = free_of(start)
     effects = tuple(p.effect for p in start)
@@ -86,7 +66,7 @@ def polish(
     best = predictor.loglik(mean)
     errors: Array = np.full(len(free), np.inf)
     for _ in range(rounds if free else 0):
-        step, errors, promised = _newton(predictor, camera, effects, free, mean, slopes, before)
+        step, errors, promised = _newton(predictor, camera, effects, free, mean, slopes)
         if promised < _SMALL:
             break
         better = _along(predictor, camera, effects, free, step, best)
@@ -133,10 +113,9 @@ def _newton(
     free: Sequence[Free],
     mean: Array,
     slopes: Callable[[Effect], Predictor] | None,
-    before: Slopes | None = None,
 ) -> tuple[Array, Array, float]:
     """Return the Gauss-Newton step of the free parameters, their standard errors and its gain."""
-    j = jacobian(predictor if slopes is None else slopes, camera, effects, free, before)
+    j = jacobian(predictor if slopes is None else slopes, camera, effects, free)
     score, inverse = information(predictor, mean, j)
     rest, _, _ = predictor.weights(mean)
     along = score @ rest
@@ -149,25 +128,8 @@ def jacobian(
     camera: Camera,
     effects: tuple[Effect, ...],
     free: Sequence[Free],
-    before: Slopes | None = None,
 ) -> Array:
     """Return how the predicted numbers move with each free parameter: (number, parameter)."""
-    known = [None if before is None else before.of(effects[i], name) for i, name, _ in free]
-    left = [one for one, slope in zip(free, known, strict=True) if slope is None]
-    fresh = _simulated(predictor, camera, effects, left)
-    if before is not None:
-        before.found += [(effects[i], name, j) for (i, name, _), j in zip(left, fresh, strict=True)]
-    own = iter(fresh)
-    columns = [next(own) if slope is None else slope for slope in known]
-    return np.stack(columns, 1)
-
-
-def _simulated(
-    predictor: Predictor | Callable[[Effect], Predictor],
-    camera: Camera,
-    effects: tuple[Effect, ...],
-    free: Sequence[Free],
-) -> list[Array]:
     own = [predictor if isinstance(predictor, Predictor) else predictor(effects[i])
            for i, _, _ in free]  # fmt: skip
     built, beside = with_effects(camera, effects), list(shifted(camera, effects, free))
@@ -175,12 +137,13 @@ def _simulated(
         some = [other for one, (other, _) in zip(own, beside, strict=True)
                 if one.replicates >= most]  # fmt: skip
         next(one for one in own if one.replicates == most).ready([built, *some])
-    return [
+    columns = [
         np.zeros(one.forms.size)
         if other is None or built is None
         else (one.mean(other) - one.mean(built)) / step
         for one, (other, step) in zip(own, beside, strict=True)
     ]
+    return np.stack(columns, 1)
 
 
 def shifted(

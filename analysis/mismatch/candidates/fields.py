@@ -75,6 +75,8 @@ def fields(clues: Clues) -> list[Field]:
     if image is None:
         return []
     seen = _spectrum(clues, image)
+    if not seen.count.any():  # few rows or columns: they hold no frequency of a field
+        return []
     longest = max(min(image.shape) * _LONGEST, 2 * _SHORTEST)
     lengths = np.geomspace(_SHORTEST, longest, _LENGTHS).tolist()
     return [Field(*_fitted(seen, _unit(image.shape, own)), own) for own in lengths]

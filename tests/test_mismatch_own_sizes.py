@@ -56,6 +56,31 @@ def test_an_effect_that_is_not_there_has_next_to_no_size() -> None:
     assert error.recorded < SURE * error.standard_error < 0.5
 
 
+def test_a_size_of_none_is_no_reason_for_a_second_effect() -> None:
+    found = _found(camera(_prnu(1.0)), camera(_prnu(0.0)))
+    assert found.verdict == "parameters"
+    (error,) = found.parameter_errors
+    assert abs(error.recorded - 1.0) < SURE * error.standard_error
+    assert [own.kind for own in found.camera.effect] == ["prnu"]
+
+
+def test_a_right_size_does_not_stand_in_for_a_wrong_one_beside_it() -> None:
+    """Gains that neighbours share are too large: the white ones must not shrink instead."""
+    true, model = (
+        camera(_prnu(1.0), _effect("smooth_prnu", sigma_percent=percent, length_pixels=5.0))
+        for percent in (0.8, 1.1)
+    )
+    found = _found(true, model)
+    assert [error.parameter for error in found.parameter_errors] == [
+        "effect.smooth_prnu.sigma_percent"
+    ]
+    assert abs(found.parameter_errors[0].recorded - 0.8) < SURE * (
+        found.parameter_errors[0].standard_error
+    )
+    assert found.camera.effect[0] == _prnu(1.0)
+    assert any("z = -" in remark for remark in found.remarks)  # what the user's sizes leave
+
+
 def test_right_sizes_stay_as_they_are() -> None:
     own = (_prnu(1.0), _column_fpn(1.5), _effect("dsnu", sigma_dn=1.0))
     found = _found(camera(*own), camera(*own))
@@ -94,13 +119,17 @@ def test_an_effect_has_a_size_where_one_number_less_of_it_is_less() -> None:
         _effect("row_noise", sigma_dn=0.0),
         _effect("dsnu", sigma_dn=1.0),
         _effect("dsnu", sigma_dn=2.0),
+        _effect("smooth_prnu", sigma_percent=0.5, length_pixels=5.0),
     )
     found = sizes(camera(*some))
     assert [(own.effect.kind, own.name, own.model) for own in found] == [
         ("prnu", "sigma_percent", 1.0),
         ("tap_mismatch", "gain_percent", -1.0),
+        ("row_noise", "sigma_dn", 0.0),
+        ("smooth_prnu", "sigma_percent", 0.5),
     ]
-    prnu, taps = found
+    prnu, taps, _, smooth = found
+    assert smooth.like(_effect("smooth_prnu", sigma_percent=0.7, length_pixels=9.0))
     assert not prnu.proposal.signed
     assert taps.proposal.signed
     assert prnu.beside(_prnu(1.0)).value == pytest.approx(2**0.5)

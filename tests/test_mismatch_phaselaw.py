@@ -68,3 +68,15 @@ def test_noise_alone_tells_nothing() -> None:
     rng = np.random.default_rng(9)
     found = [_noise(rng, 8) for _ in range(6)]
     assert abs(kept_rather_than_free(found, [0.1] * 6)) < 0.2
+
+
+@pytest.mark.parametrize("frames", [16, 64])
+def test_of_many_frames_what_they_share_is_integrated_as_finely_as_it_is_known(
+    frames: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rng = np.random.default_rng(10)
+    found = 1.5 * rng.choice([-1, 1], frames) * np.exp(0.7j) + _noise(rng, frames)
+    one, other = phaselaw._likelihoods(found, 1.5)
+    monkeypatch.setattr(phaselaw, "_STEP", 0.05)
+    fine, finer = phaselaw._likelihoods(found, 1.5)
+    assert one.max() - other == pytest.approx(fine.max() - finer, abs=0.3)

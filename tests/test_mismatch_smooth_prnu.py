@@ -182,6 +182,13 @@ def test_without_a_map_of_gains_nothing_is_proposed() -> None:
     assert not CANDIDATES[0].propose(clues)
 
 
+@pytest.mark.parametrize("shape", [(4, 4), (5, 40), (64, 5)])
+def test_few_rows_or_columns_hold_no_frequency_of_a_field(shape: tuple[int, int]) -> None:
+    clues = _clues(np.random.default_rng(3).normal(size=shape), 1.0)
+    assert not fields(clues)
+    assert not CANDIDATES[0].propose(clues)
+
+
 @pytest.mark.parametrize(("length", "sane"), [(10.0, True), (40.0, False)])
 def test_a_field_as_long_as_the_sensor_is_uneven_light(length: float, sane: bool) -> None:
     layout: Any = Stub(rows=96, columns=128)

@@ -31,7 +31,7 @@ from analysis.mismatch.parameters import parameter_errors
 from analysis.mismatch.phase import WholeFrames
 from analysis.mismatch.pictures import Album, evidence_of
 from analysis.mismatch.recalibrate import Calibrated
-from analysis.mismatch.remarks import remarks_on
+from analysis.mismatch.remarks import remark_on_sizes, remarks_on
 from analysis.mismatch.segments import second_path
 from analysis.mismatch.settle import would_settle
 from analysis.mismatch.source import Source
@@ -139,7 +139,9 @@ def _found(
     if not large and (denied := _heated(search, final, whole, step)) is not None:
         final = search.further(search.drop(final, *denied))
         final, gains = _proven(search, search.settle(final), trial, judged=large)
-    scale, whole = whole.null.sd, search.rebased(whole)
+    scale, users, whole = whole.null.sd, whole.mismatches, search.rebased(whole)
+    if search.own:
+        remarks = (*remarks, remark_on_sizes(users, whole.mismatches))
     known = {name: change * scale / whole.null.sd for name, change in known.items()}
     proof = trial.proof(search.base, final, step, source)
     evidence = evidence_of(search.base, final, album, split)

@@ -2,8 +2,10 @@
 
 from collections.abc import Mapping, Sequence
 
+from analysis.mismatch.finding import Mismatch
 from analysis.mismatch.layout import Layout
 from analysis.mismatch.wholecells import Cropped
+from analysis.mismatch.words import statistic_words
 from dsis.recording import Recording
 
 _SHOWN = 8
@@ -47,6 +49,17 @@ def remarks_on(
             "The light of some flats is unknown: their levels cannot show a bent response."
         )
     return tuple(found)
+
+
+def remark_on_sizes(before: Sequence[Mismatch], after: Sequence[Mismatch]) -> str:
+    """Return what differs with the sizes of the user's camera, and what with those recorded."""
+    most = max(before, key=lambda m: abs(m.z))
+    many = f"{len(before)} statistics depart" if len(before) > 1 else "a statistic departs"
+    return (
+        f"With sizes of effects as camera.toml has them {many}, most of all the "
+        f"{statistic_words(most.statistic)} (z = {most.z:.3g}). With those recorded "
+        f"{len(after) or 'none'} would: what is said here is said of these."
+    )
 
 
 def _listed(names: Sequence[str]) -> str:

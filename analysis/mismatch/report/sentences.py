@@ -61,11 +61,20 @@ def _wrong_numbers(errors: tuple[ParameterError, ...], *, sure: bool) -> str:
     for error in errors[:_NAMED]:
         value = measured(error.recorded, error.standard_error)
         recorded = f"{value} {unit(error.parameter)}".rstrip()
-        said.append(f"{error.parameter} is {recorded}, not {plain(error.model, 5)}")
+        said.append(f"{_number_words(error.parameter)} is {recorded}, not {plain(error.model, 5)}")
     more = len(errors) - _NAMED
     rest = [f"{more} more"] if more > 0 else []
     off = "are off" if sure else "seem off, unless what differs shifts them"
     return f"Numbers of the camera model {off}: {'; '.join([*said, *rest])}."
+
+
+def _number_words(name: str) -> str:
+    """Return a number of the camera model in words: of an effect, its kind and what it is of it."""
+    section, _, rest = name.partition(".")
+    if section != "effect":
+        return name
+    kind, _, number = rest.partition(".")
+    return f"{parameter_words(number)} of {effect_words(kind)}".removeprefix(" of ")
 
 
 def parameter_words(name: str) -> str:

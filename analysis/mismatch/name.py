@@ -17,6 +17,7 @@ from analysis.mismatch.phase import ABSENT, WholeFrames
 from analysis.mismatch.polish import with_effects
 from analysis.mismatch.rank import (
     LEAST_GAIN,
+    SURE_GAIN,
     Memory,
     Ranked,
     ranked,
@@ -50,7 +51,7 @@ class Search(Fitted):
     absent: set[Frequency] = field(default_factory=set)  # peaks that were no line
     lines: WholeFrames | None = None
     memory: Memory = field(default_factory=Memory)
-    least: float = LEAST_GAIN  # for an effect to be taken in
+    least: float = SURE_GAIN  # for an effect to be taken in
 
     def run(self) -> State:
         """Return the final state."""
@@ -208,7 +209,7 @@ class Search(Fitted):
                 path.camera,
             )
         camera = with_effects(state.camera, fitted[0].polished.effects) if fitted else None
-        if camera is None or most < self.least:
+        if camera is None or most < self._least(fitted[0].kind):
             return None
         best = fitted[0]
         rivals = tuple((one.kind, best.gain - one.gain) for one in fitted[1:4])
@@ -216,6 +217,10 @@ class Search(Fitted):
             rivals = (*rivals, ("dual_gain", best.gain - path.gain))
         effect = replace(best.proposal, effect=best.polished.effects[0])
         return Named(best.kind, effect, best.polished.errors[0], best.gain, rivals), camera
+
+    def _least(self, kind: str) -> float:
+        """Return the gain from which an effect is taken in: whole frames show lines besides."""
+        return LEAST_GAIN if kind in LINES and self.least <= SURE_GAIN else self.least
 
     def _left(self) -> frozenset[str]:
         lines = sum(n.kind in LINES for n in self.named)

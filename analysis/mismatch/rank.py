@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Container, Iterable, Sequence
 from dataclasses import dataclass, field
+from math import log
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +20,9 @@ from analysis.mismatch.state import Setting, State
 from dsis.effects import Effect
 
 Array = NDArray[np.float64]
-LEAST_GAIN = 2.0  # of log-likelihood, for an effect to be taken in where something is located
+LEAST_GAIN = 2.0  # of log-likelihood, below which an effect is not worth its parameter
+# For an effect to be taken in: odds of 20, were any of the vocabulary as likely beforehand.
+SURE_GAIN = log(20 * len(CANDIDATES))
 _MOST = 4  # kinds that are fitted, after all were tried as proposed
 _FAR = 15.0  # of log-likelihood behind the best as proposed: fitting does not make up for it
 _SHARE = 0.03  # or that share of what the best gains

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from analysis.mismatch.layout import Layout, Taken
+from analysis.mismatch.rank import SURE_GAIN
 
 _STACK = 6  # frames from which an exposure shows more than a pair does
 
@@ -31,7 +32,7 @@ class Stage:
     least: float
 
 
-STAGES = (Stage(6, 6, 30.0), Stage(12, 10, 2.0))
+STAGES = (Stage(6, 6, 30.0), Stage(12, 10, SURE_GAIN))
 
 
 def stages(layout: Layout) -> list[tuple[Layout, float]]:

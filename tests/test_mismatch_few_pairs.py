@@ -15,6 +15,7 @@ KEYS = (
     Key("line_correlation", "all", "", "MONO", "rows 3"),
     Key("fixed_correlation_0_1", "exposure", "dark", "MONO"),
     Key("row_variance", "exposure", "dark", "MONO"),
+    Key("carry_over", "all", "", "MONO", "rows, sine over 16 codes"),
 )
 
 
@@ -28,9 +29,9 @@ def wide(kurtosis: float, recorded: float = 0.0) -> list[float]:
 
 
 def test_which_numbers_are_judged_with_care_and_which_not_at_all() -> None:
-    assert wide(0.5) == [1.0] * 6
+    assert wide(0.5) == [1.0] * 7
     own = 503 / SAMPLES**0.5
-    assert wide(500.0) == pytest.approx([1.0, own, 1.0, np.inf, 1.0, 1.0])
+    assert wide(500.0) == pytest.approx([1.0, own, 1.0, np.inf, 1.0, 1.0, np.inf])
     assert wide(0.5, recorded=500.0) == wide(500.0)  # the model does not know of them yet
     assert wide(500.0, recorded=0.5) == wide(500.0)
 

@@ -10,7 +10,7 @@ from analysis.mismatch.bank.key import Key
 
 Array = NDArray[np.float64]
 _TAILED = 1.0  # excess kurtosis of a sum of products, from which it is not near normal
-_OF_PRODUCTS = ("correlation", "spectr", "alternation")
+_OF_PRODUCTS = ("correlation", "spectr", "alternation", "carry_over")
 
 
 def widening(keys: Sequence[Key], values: Array, errors: Array, recorded: Array) -> Array:

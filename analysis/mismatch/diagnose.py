@@ -140,8 +140,8 @@ def _found(
         final = search.further(search.drop(final, *denied))
         final, gains = _proven(search, search.settle(final), trial, judged=large)
     scale, users, whole = whole.null.sd, whole.mismatches, search.rebased(whole)
-    if search.own:
-        remarks = (*remarks, remark_on_sizes(users, whole.mismatches))
+    if users and not whole.mismatches:  # all that differed
+        remarks = (*remarks, remark_on_sizes(users))
     known = {name: change * scale / whole.null.sd for name, change in known.items()}
     proof = trial.proof(search.base, final, step, source)
     evidence = evidence_of(search.base, final, album, split)

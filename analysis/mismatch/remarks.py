@@ -51,14 +51,14 @@ def remarks_on(
     return tuple(found)
 
 
-def remark_on_sizes(before: Sequence[Mismatch], after: Sequence[Mismatch]) -> str:
-    """Return what differs with the sizes of the user's camera, and what with those recorded."""
-    most = max(before, key=lambda m: abs(m.z))
-    many = f"{len(before)} statistics depart" if len(before) > 1 else "a statistic departs"
+def remark_on_sizes(users: Sequence[Mismatch]) -> str:
+    """Return what differs with the sizes of the user's camera, where nothing else is wrong."""
+    most = max(users, key=lambda m: abs(m.z))
+    many = f"{len(users)} statistics depart" if len(users) > 1 else "one statistic departs"
     return (
-        f"With sizes of effects as camera.toml has them {many}, most of all the "
-        f"{statistic_words(most.statistic)} (z = {most.z:.3g}). With those recorded "
-        f"{len(after) or 'none'} would: what is said here is said of these."
+        f"With sizes of effects as camera.toml has them {many}, most of all: "
+        f"{statistic_words(most.statistic)} (z = {most.z:.3g}). With those recorded none does, and "
+        "what is said here is said of these."
     )
 
 

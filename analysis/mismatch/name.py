@@ -17,6 +17,7 @@ from analysis.mismatch.phase import ABSENT, WholeFrames
 from analysis.mismatch.polish import with_effects
 from analysis.mismatch.rank import (
     LEAST_GAIN,
+    SURE_CHANCE,
     SURE_GAIN,
     Memory,
     Ranked,
@@ -209,7 +210,7 @@ class Search(Fitted):
                 path.camera,
             )
         camera = with_effects(state.camera, fitted[0].polished.effects) if fitted else None
-        if camera is None or most < self._least(fitted[0].kind):
+        if camera is None or most < self._least(state, fitted[0].kind):
             return None
         best = fitted[0]
         rivals = tuple((one.kind, best.gain - one.gain) for one in fitted[1:4])
@@ -218,9 +219,14 @@ class Search(Fitted):
         effect = replace(best.proposal, effect=best.polished.effects[0])
         return Named(best.kind, effect, best.polished.errors[0], best.gain, rivals), camera
 
-    def _least(self, kind: str) -> float:
-        """Return the gain from which an effect is taken in: whole frames show lines besides."""
-        return LEAST_GAIN if kind in LINES and self.least <= SURE_GAIN else self.least
+    def _least(self, state: State, kind: str) -> float:
+        """Return the gain from which an effect is taken in.
+
+        Less where what calls for it is sure, and of lines: whole frames show them besides.
+        """
+        calls = CANDIDATES[kind].calls
+        sure = any(m.statistic in calls and m.p_adjusted < SURE_CHANCE for m in state.mismatches)
+        return LEAST_GAIN if (sure or kind in LINES) and self.least <= SURE_GAIN else self.least
 
     def _left(self) -> frozenset[str]:
         lines = sum(n.kind in LINES for n in self.named)

@@ -21,8 +21,10 @@ from dsis.effects import Effect
 
 Array = NDArray[np.float64]
 LEAST_GAIN = 2.0  # of log-likelihood, below which an effect is not worth its parameter
-# For an effect to be taken in: odds of 20, were any of the vocabulary as likely beforehand.
-SURE_GAIN = log(20 * len(CANDIDATES))
+# For an effect to be taken in: odds of 20, were any of the vocabulary as likely beforehand. Where
+# that something calls for it is as sure, the likelihood need only tell it from others.
+SURE_CHANCE = 1 / (20 * len(CANDIDATES))
+SURE_GAIN = -log(SURE_CHANCE)
 _MOST = 4  # kinds that are fitted, after all were tried as proposed
 _FAR = 15.0  # of log-likelihood behind the best as proposed: fitting does not make up for it
 _SHARE = 0.03  # or that share of what the best gains

@@ -11,11 +11,10 @@ import pytest
 from analysis.mismatch import judge, name, rank
 from analysis.mismatch.candidates import Proposal
 from analysis.mismatch.contradicted import Denial
-from analysis.mismatch.instance import alike_effects
 from analysis.mismatch.judge import Judge
 from analysis.mismatch.name import Search
 from analysis.mismatch.named import Named
-from analysis.mismatch.rank import Ranked, alike, ties
+from analysis.mismatch.rank import Ranked, _near, alike, ties
 from analysis.mismatch.recalibrate import _moved
 from analysis.mismatch.resolved import explains
 from dsis.effects import registry
@@ -371,6 +370,6 @@ def test_a_denied_decay_waits_as_others_do_and_leaves_other_edges(
 
 def test_an_optional_number_is_near_its_like_only() -> None:
     kind, own = registry()["line_settling"], {"gain_percent": 1.0, "length_pixels": 5.0}
-    assert alike_effects(kind(**own), kind(**own))
-    assert not alike_effects(kind(**own), kind(**own, gain_length_pixels=3.0))
-    assert not alike_effects(kind(**own, gain_length_pixels=3.0), kind(**own))
+    assert _near(kind(**own), kind(**own))
+    assert not _near(kind(**own), kind(**own, gain_length_pixels=3.0))
+    assert not _near(kind(**own, gain_length_pixels=3.0), kind(**own))

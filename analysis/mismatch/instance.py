@@ -3,7 +3,6 @@
 from dsis.effects import Effect
 from dsis.effects.line_settling import LineSettling
 
-_ALIKE = 0.05  # relative difference of parameters up to which proposals are one
 LINES = frozenset({"periodic_noise", "bistable_pattern"})
 Frequency = tuple[float, float]
 _SAME = 1.5  # bins: a frequency is known no better than where it stands between two
@@ -42,16 +41,3 @@ def same_line(one: Frequency, other: Frequency, rows: int, columns: int, step: i
         return abs(turns - round(turns)) * size
 
     return any(apart(s, 0, columns) < _SAME and apart(s, 1, rows) < _SAME for s in (1, -1))
-
-
-def alike_effects(one: Effect, other: Effect) -> bool:
-    """Return whether two effects are one but for a small share of each parameter."""
-    if type(one) is not type(other):
-        return False
-    a, b = one.model_dump(), other.model_dump()
-    return all(
-        abs(a[name] - b[name]) <= _ALIKE * abs(a[name])
-        if isinstance(a[name], float) and isinstance(b[name], float)
-        else a[name] == b[name]
-        for name in a
-    )

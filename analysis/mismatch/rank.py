@@ -8,13 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.candidates import CANDIDATES, Proposal
-from analysis.mismatch.instance import (
-    Frequency,
-    alike_effects,
-    frequency_of,
-    instance,
-    same_line,
-)
+from analysis.mismatch.instance import Frequency, frequency_of, instance, same_line
 from analysis.mismatch.polish import Polished, needed, polish, stepped, with_effects
 from analysis.mismatch.state import Setting, State
 from dsis.effects import Effect
@@ -31,6 +25,7 @@ _SHARE = 0.03  # or that share of what the best gains
 _ROUNDS = 2  # of a fit, where each simulation takes long
 _TIE = 3.0  # of log-likelihood: odds below 20 do not tell two effects apart
 _COSINE = 0.5  # of what two predictions change, from which they change the same
+_ALIKE = 0.05  # relative difference of parameters up to which a proposal is an earlier one
 _SPARSE = 4  # times as many simulations
 _BY_FRAME = frozenset({"frame_variance"})
 # A sign: half of the pairs of frames show nothing, half show it twice. A band: one bin's phase.
@@ -64,7 +59,7 @@ class Memory:
         """Return the numbers with an effect added, as remembered; None: it must be simulated."""
         null = state.null
         for known, means, change in self.changes:
-            if not alike_effects(known, effect):
+            if not _near(known, effect):
                 continue
             size = np.where(null.known, np.abs(change) / null.sd, 0.0)
             moved = np.where(null.known, np.abs(null.mean - means) / null.sd, 0.0) > 1.0
@@ -91,6 +86,18 @@ def replicates_for(setting: Setting, effects: Iterable[Effect]) -> int:
 def _sparse(setting: Setting, effect: Effect) -> bool:
     few = not setting.large and effect.kind in _BY_BIN
     return few or effect.measures == _BY_FRAME or effect.kind in _BY_DRAW
+
+
+def _near(one: Effect, other: Effect) -> bool:
+    if type(one) is not type(other):
+        return False
+    a, b = one.model_dump(), other.model_dump()
+    return all(
+        abs(a[name] - b[name]) <= _ALIKE * abs(a[name])
+        if isinstance(a[name], float) and isinstance(b[name], float)
+        else a[name] == b[name]
+        for name in a
+    )
 
 
 @dataclass(frozen=True)

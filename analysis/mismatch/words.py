@@ -115,7 +115,9 @@ def effect_says(kind: str) -> str:
     if kind == "dual_gain":
         return DUAL_GAIN
     effect = registry().get(kind)
-    return (effect.__doc__ or "").strip().splitlines()[0] if effect is not None else ""
+    if effect is None:
+        return ""
+    return (effect.__doc__ or "").strip().splitlines()[0].replace("`", "")
 
 
 def unit(parameter: str) -> str:

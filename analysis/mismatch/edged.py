@@ -48,18 +48,40 @@ def edged(state: State, kind: str) -> Denial | None:
 def single(state: State, effect: Effect) -> Denial | None:
     """Return how a decay is denied by lines beyond the first; None: they show it.
 
-    One line that differs, at the edge, is no decay, however short.
+    One line that differs, at the edge, is no decay, however short. Where a smooth surface or a step
+    between halves is left unexplained, which lean towards the edges too, only what no such surface
+    has speaks for a decay.
     """
     if not isinstance(effect, LineSettling):
         return None
     rests: list[Rest] = [beyond_smooth]
-    if all(own.kind != "shading" for own in state.camera.effect):
+    why = "beyond the line at the edge nothing is seen of the decay"
+    if any(_of_surface(m.statistic) for m in state.mismatches):
+        rests = [_beyond_halves]
+        why = "surfaces or halves are left, and beside them nothing is seen of the decay"
+    elif all(own.kind != "shading" for own in state.camera.effect):
         rests.append(centred)  # of few lines the smooth part of a decay is most of it
     shares = [_shown(state, effect, rest) for rest in rests]
     if any(share is None for share in shares):
         return None
-    most = max(share for share in shares if share is not None)
-    return Denial(most, "beyond the line at the edge nothing is seen of the decay")
+    return Denial(max(share for share in shares if share is not None), why)
+
+
+def _of_surface(statistic: str) -> bool:
+    """Return whether a statistic tells of smooth surfaces, or of halves."""
+    return statistic == "half_seam" or statistic.startswith("fixed_smooth")
+
+
+def _beyond_halves(values: Array) -> Array:
+    """Return means of lines (line,) less smooth polynomials and the step between halves.
+
+    Of an odd number the step may be on either side of the middle line: one at an edge is left out.
+    """
+    line = np.arange(len(values))
+    places = {len(values) // 2, (len(values) + 1) // 2}
+    steps = beyond_smooth(np.stack([np.where(line < k, -0.5, 0.5) for k in sorted(places)], 1))
+    rest = beyond_smooth(values)
+    return np.asarray(rest - steps @ np.linalg.lstsq(steps, rest, rcond=None)[0])
 
 
 def _shown(state: State, effect: LineSettling, rest: Rest) -> float | None:

@@ -13,7 +13,7 @@ from analysis.mismatch.heldnumbers import HeldNumbers
 from analysis.mismatch.model import each, in_threads, simulate
 from analysis.mismatch.null import null_of
 from analysis.mismatch.observe import Observation, observe
-from analysis.mismatch.prove.gain import heldout_gain
+from analysis.mismatch.prove.gain import heldout_gain, telling
 from analysis.mismatch.prove.gap import gap_closed
 from analysis.mismatch.prove.held import Held, hold
 from analysis.mismatch.prove.likelihood import Loglik
@@ -115,9 +115,9 @@ class Trial:
             return {}
         cameras = [final.camera, *without.values()]
         whole, *rest = self._logliks(self.held, cameras, final.calibrated.model.signals)
-        frames = sum(own.size for own in whole.frames.values())
         found = {}
         for (kind, camera), less in zip(without.items(), rest, strict=True):
+            frames = sum(whole.frames[name].size for name in telling(less, whole))
             found[kind] = _of_pixels(heldout_gain(less, whole, seed=self.seed), frames)
             # Where the pixels are sure that it is worse, sums of numbers do not overrule them.
             if not found[kind].certain and not _denied(found[kind].gain, frames):

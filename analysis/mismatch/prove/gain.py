@@ -26,10 +26,12 @@ def heldout_gain(before: Loglik, after: Loglik, *, seed: int) -> Gain:
     however few they are (Rao & Wu, Resampling inference with complex survey data, JASA 83, 1988);
     blocks of neighbours where there are many. Exposures with one locked frame are drawn together;
     so are the gains of the exposures' levels. With one frame in all the interval is infinite.
+    Only exposures that tell count, see `telling`.
     """
-    strata = _strata([after.frames[name] - before.frames[name] for name in before.frames])
+    names = telling(before, after)
+    strata = _strata([after.frames[name] - before.frames[name] for name in names])
     frames = sum(gains.size for gains in strata)
-    strata.append(np.array([after.levels[name] - before.levels[name] for name in before.levels]))
+    strata.append(np.array([after.levels[name] - before.levels[name] for name in names]))
     mean = float(sum(float(gains.sum()) for gains in strata) / frames)
     if frames < 2:
         return Gain(mean, (-np.inf, np.inf))
@@ -37,6 +39,15 @@ def heldout_gain(before: Loglik, after: Loglik, *, seed: int) -> Gain:
     drawn = np.sum([gains.size * _drawn_means(gains, rng) for gains in strata], 0) / frames
     low, high = (float(q) for q in np.percentile(drawn, [2.5, 97.5]))
     return Gain(mean, (low, high))
+
+
+def telling(before: Loglik, after: Loglik) -> list[str]:
+    """Return the exposures that tell two models apart: not those that both say are full.
+
+    Where charge ends codes are so sharp that hundredths of a DN decide. If all are full, all tell.
+    """
+    full = before.filled & after.filled
+    return [name for name in before.frames if name not in full] or list(before.frames)
 
 
 def _strata(gains: list[Array]) -> list[Array]:

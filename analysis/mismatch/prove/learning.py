@@ -21,12 +21,30 @@ from analysis.mismatch.prove.patterns import Halves, Pattern, pattern_of
 from analysis.mismatch.prove.residuals import residuals_of
 from analysis.mismatch.prove.shape import NORMAL
 from analysis.mismatch.prove.sites import site_places
-from analysis.mismatch.prove.virtual import Signals, Stack, base_of, clean_signal, virtual_sensor
+from analysis.mismatch.prove.virtual import (
+    LEAST_DN2,
+    Signals,
+    Stack,
+    base_of,
+    clean_signal,
+    virtual_sensor,
+)
 from dsis.camera import Camera
 from dsis.effects import Image
 from dsis.measures.spikes import variance_of_most
 
-_LEAST_DN2 = 0.01  # codes are whole: less noise cannot be seen
+_OF_SINGLE_SAMPLES = frozenset(
+    {
+        "level",
+        "pixel_variance",
+        "skewness",
+        "kurtosis",
+        "variance_spread",
+        "code_imbalance",
+        "code_spacing",
+        "frame_variance",
+    }
+)
 
 
 def law_of(camera: Camera, held: Held, signals: Signals, seed: int) -> Law:
@@ -60,7 +78,7 @@ def _base_law(base: Camera, held: Held, exposure: HeldExposure, signals: Signals
     sites = len(site_places(held.cfa))
     scene = exposure.kind == "scene"  # the pattern that is used is a mean with an error
     return ExposureLaw(
-        np.maximum(variance, _LEAST_DN2),
+        np.maximum(variance, LEAST_DN2),
         np.full(sites, 1 + 1 / max(exposure.trained, 1) if scene else 1.0),
         np.zeros(sites),
         (NORMAL,) * sites,
@@ -79,14 +97,21 @@ def _learned(
     other: Mapping[str, Stack],
     seed: int,
 ) -> Law:
-    """Return the law with all that the virtual sensors show."""
-    law = replace(law, patterns=_patterns(law, held, model, other))
+    """Return the law with all that the virtual sensors show.
+
+    Of effects that neither last nor tie samples together there is no pattern, memory or spectrum:
+    those that spikes of a few virtual frames feign would be learned instead.
+    """
+    single = all(own.measures <= _OF_SINGLE_SAMPLES for own in law.camera.effect)
+    if not single:
+        law = replace(law, patterns=_patterns(law, held, model, other))
     base = residuals_of(base_law, held, other, seed)
     own = residuals_of(law, held, model, seed)
     own = replace(own, law=with_variances(own, base, held))
     own = replace(own, law=with_groups(own, base, held))
     own = replace(own, law=with_shapes(own, base, held))
-    own = replace(own, law=with_dependence(own, base, held))
+    if not single:
+        own = replace(own, law=with_dependence(own, base, held))
     return with_levels(own.law, held, model, other)
 
 

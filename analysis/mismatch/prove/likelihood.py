@@ -87,10 +87,13 @@ class Loglik:
         Of each locked frame about its exposure's level: by exposure, (frame,).
     levels
         Of each exposure's level, from the other exposures.
+    filled
+        Exposures of which too many samples reach the model's full well.
     """
 
     frames: Mapping[str, Array]
     levels: Mapping[str, float]
+    filled: frozenset[str] = frozenset()
 
     @property
     def per_frame(self) -> dict[str, Array]:

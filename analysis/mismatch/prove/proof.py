@@ -1,7 +1,7 @@
 """The proof: how much better the final model predicts the locked frames than the base model."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from analysis.mismatch.prove.likelihood import (
     likelihood_model,
     mean_per_pixel,
 )
-from analysis.mismatch.prove.virtual import Signals
+from analysis.mismatch.prove.virtual import Signals, filled
 from dsis.camera import Camera
 from dsis.recording import Recording
 
@@ -140,7 +140,8 @@ def prove_held(
 
 def loglik_of(held: Held, camera: Camera, signals: Signals, *, seed: int) -> Loglik:
     """Return the log-likelihood of the locked frames under a camera."""
-    return frame_loglik(likelihood_model(camera, held, signals, seed))
+    told = frame_loglik(likelihood_model(camera, held, signals, seed))
+    return replace(told, filled=filled(camera, held, signals))
 
 
 def gain_of(held: Held, with_: Camera, without: Camera, signals: Signals, *, seed: int) -> Gain:

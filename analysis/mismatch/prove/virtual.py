@@ -9,16 +9,19 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import ndtr
 
-from analysis.mismatch.prove.held import Held, HeldExposure
+from analysis.mismatch.prove.held import MOST_CLIPPED, Held, HeldExposure
 from analysis.mismatch.prove.sites import site_means, spread_over
 from dsis.camera import BaseNoise, Camera
 from dsis.draw import Draw
 from dsis.effects import Effect, Image, Stage
+from dsis.effects.saturation import Saturation
 from dsis.simulate.shot import tiled
 
 Array = NDArray[np.float64]
 Signals = Mapping[str, NDArray[np.float64]]
+LEAST_DN2 = 0.01  # codes are whole: less noise cannot be seen
 _SAMPLES = 400_000  # of an exposure, in frames that nothing was learned from
 
 
@@ -80,6 +83,24 @@ def clean_signal(held: Held, exposure: HeldExposure, signals: Signals) -> Image:
     black = float(np.mean(darks)) if darks else held.black_dn
     means = np.maximum(site_means(exposure.codes, held.cfa).mean(0) - black, 0.0)
     return spread_over(means, held.shape, held.cfa).astype(np.float32)
+
+
+def filled(camera: Camera, held: Held, signals: Signals) -> frozenset[str]:
+    """Return the exposures of which too many samples reach the full well of a camera.
+
+    The share is that of the clean signal with the base model's noise, of all pixels.
+    """
+    wells = [own.full_well_dn for own in camera.effect if isinstance(own, Saturation)]
+    wells += [camera.saturation_dn] if camera.saturation_dn else []
+    if not wells:
+        return frozenset()
+    found = set()
+    for exposure in held.exposures:
+        clean = clean_signal(held, exposure, signals)
+        sd = np.sqrt(np.maximum(base_of(camera).segments.variance_dn2(clean), LEAST_DN2))
+        if float(ndtr((clean - min(wells)) / sd).mean()) > MOST_CLIPPED:
+            found.add(exposure.name)
+    return frozenset(found)
 
 
 def virtual_sensor(camera: Camera, held: Held, signals: Signals, seed: int) -> dict[str, Stack]:

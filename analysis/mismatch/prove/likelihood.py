@@ -33,7 +33,7 @@ from analysis.mismatch.prove.law import (
 )
 from analysis.mismatch.prove.learning import law_of
 from analysis.mismatch.prove.levels import frame_means, level_loglik
-from analysis.mismatch.prove.sites import site_means, site_places, spread_over
+from analysis.mismatch.prove.sites import means_of_most, site_places, spread_over
 from analysis.mismatch.prove.virtual import Signals
 from analysis.mismatch.prove.whittle import bin_counts, whittle_gain
 from dsis.camera import Camera
@@ -132,7 +132,7 @@ def _scored(
     """Return ln P(code) and the normal score of each pixel."""
     law, held, sensed = model.law, model.held, model.sensed
     cells, pattern = law.cells, sensed.patterns[exposure.name]
-    means = site_means(codes, held.cfa)[np.newaxis]
+    means = means_of_most((codes - pattern)[np.newaxis], held.cfa)
     level = frame_means(law, held, exposure, means)[0]
     centre = spread_over(level, held.shape, held.cfa) + pattern
     variance = pixel_variance(law, exposure.name, pattern, sensed.groups, held)

@@ -80,22 +80,29 @@ def _growth(squares: Image, pattern: Array, variance: float) -> float:
 
 
 def with_groups(own: Residuals, base: Residuals, held: Held) -> Law:
-    """Return the law with the variances of groups of pixels."""
+    """Return the law with the variances of groups of pixels.
+
+    That of conspicuous ones is the scale of the many among their residuals: a pixel that was hit
+    once is no noisy pixel.
+    """
     excess, odd = np.zeros(GROUPS), {}
     sums = np.zeros((2, 2, GROUPS))  # of both sensors: excess, its weight
     for e in held.exposures:
         share = own.law.least_dn2 / own.law.exposures[e.name].variance_dn2
         for k, virtual in enumerate((own, base)):
             groups = virtual.sensed.groups.reshape(-1)
-            square = virtual.standardised(e.name, held) ** 2
-            square = np.where(virtual.sensed.groups < CONSPICUOUS, np.minimum(square, _CUT), square)
-            square = square.mean(0)
-            above = ((square - 1) * share).reshape(-1)
+            squares = virtual.standardised(e.name, held) ** 2
+            square = np.minimum(squares, _CUT).mean(0).reshape(-1)
+            for group in np.unique(groups[groups >= CONSPICUOUS]):
+                which = groups == group
+                of_group = squares.reshape(len(squares), -1)[:, which]
+                square[which] = _scale(of_group, base.standardised(e.name, held) ** 2)
+            above = (square - 1) * share.reshape(-1)
             frames = len(virtual.residuals[e.name])
             sums[k, 0] += frames * np.bincount(groups, above, GROUPS)
             sums[k, 1] += frames * np.bincount(groups, (share**2).reshape(-1), GROUPS)
             if k == 0 and (groups == OUTLIER).any():
-                odd[e.name] = max(float(square.reshape(-1)[groups == OUTLIER].mean()), 0.1)
+                odd[e.name] = max(float(square[groups == OUTLIER].mean()), 0.1)
     there = sums[0, 1] > 0
     size = np.where(there, sums[0, 1], 1.0)
     # Chance excesses of the base model's pixels, mostly the same ones, are taken off.

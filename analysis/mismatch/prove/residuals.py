@@ -9,7 +9,7 @@ import numpy as np
 from analysis.mismatch.prove.cells import converted
 from analysis.mismatch.prove.held import Held
 from analysis.mismatch.prove.law import Law, Sensed, pixel_variance, sense
-from analysis.mismatch.prove.sites import site_means, spread_over
+from analysis.mismatch.prove.sites import means_of_most, spread_over
 from analysis.mismatch.prove.virtual import Stack, sensor_draw
 from dsis.effects import Image
 
@@ -62,6 +62,7 @@ def residuals_of(law: Law, held: Held, stacks: Mapping[str, Stack], seed: int) -
     residuals = {}
     for e in held.exposures:
         fresh = stacks[e.name].fresh
-        means = spread_over(site_means(fresh, held.cfa), held.shape, held.cfa)
-        residuals[e.name] = (fresh - means - sensed.patterns[e.name]).astype(np.float32)
+        left = fresh - sensed.patterns[e.name].astype(np.float32)
+        means = spread_over(means_of_most(left, held.cfa), held.shape, held.cfa)
+        residuals[e.name] = (left - means).astype(np.float32)
     return Residuals(law, sensed, residuals)

@@ -8,6 +8,8 @@ from dsis.cfa import Cfa, pattern
 Place = tuple[slice, slice]
 _ALL = slice(None)
 
+_FAR = 6.0  # standard deviations that a normal law does not have
+
 
 def site_places(cfa: Cfa) -> tuple[Place, ...]:
     """Return where the pixels of each site lie: one plane of a monochrome sensor, else four."""
@@ -34,6 +36,23 @@ def site_means(frames: NDArray[np.generic], cfa: Cfa) -> NDArray[np.float64]:
     return np.stack(
         [frames[(..., *place)].mean((-2, -1), dtype=np.float64) for place in site_places(cfa)], -1
     )
+
+
+def means_of_most(frames: NDArray[np.generic], cfa: Cfa) -> NDArray[np.float64]:
+    """Return `site_means` of (frame, row, column) without spikes: (frame, site).
+
+    What lies beyond six standard deviations of the rest is left out, until nothing does.
+    """
+    made = site_means(frames, cfa)
+    for site, place in enumerate(site_places(cfa)):
+        for number, frame in enumerate(frames):
+            own = frame[place].astype(np.float64)
+            departure = np.abs(own - made[number, site])
+            while own.size and float(departure.max()) > _FAR * float(own.std()) > 0:
+                own = own[departure <= _FAR * own.std()]
+                made[number, site] = own.mean()
+                departure = np.abs(own - made[number, site])
+    return made
 
 
 def spread_over(

@@ -3,11 +3,13 @@
 from types import SimpleNamespace
 from typing import Any, cast
 
+import numpy as np
 import pytest
 
 from analysis.mismatch import trial
 from analysis.mismatch.finding import Gain
 from analysis.mismatch.given import Ratio
+from analysis.mismatch.prove import Loglik
 from analysis.mismatch.trial import Trial
 from dsis.camera import BaseNoise, Camera, Segment
 from dsis.cfa import Cfa
@@ -34,7 +36,7 @@ CAMERA = Camera(
 def test_who_decides(
     monkeypatch: pytest.MonkeyPatch, of_pixels: Gain, nats: float, certain: bool
 ) -> None:
-    frames = SimpleNamespace(frames={"dark": SimpleNamespace(size=FRAMES)})
+    frames = Loglik({"dark": np.zeros(FRAMES)}, {"dark": 0.0})
     monkeypatch.setattr(trial, "loglik_of", lambda *_, **__: frames)
     monkeypatch.setattr(trial, "heldout_gain", lambda *_, **__: of_pixels)
     numbers = SimpleNamespace(

@@ -129,10 +129,21 @@ def shape_of(counts: Array, base_counts: Array, exchanged: Array) -> Shape:
 
 
 def _sparse(expected: Array, difference: Array) -> Array:
-    """Return how many to expect where few are: none met is no proof that there are none."""
+    """Return how many to expect where few are: none met is no proof that there are none.
+
+    On each side, up to the interval beyond the farthest one that chance would hardly fill, half a
+    residual more than were met (Krichevsky and Trofimov, 1981): where spikes are, one more may be.
+    """
     met = np.rint(np.maximum(expected + difference, 0))
     crowded = (met > 0) & (pdtrc(np.maximum(met - 1, 0), expected) < _CHANCE)
-    return np.where(crowded, met, np.where(pdtr(met, expected) < _CHANCE, met + 1, expected))
+    made = np.where(crowded, met, np.where(pdtr(met, expected) < _CHANCE, met + 1, expected))
+    filled = np.flatnonzero(crowded)
+    if filled.size:
+        place = np.arange(met.size)
+        first, last = min(filled[0] - 1, _MIDDLE), max(filled[-1] + 1, _MIDDLE)
+        inside = (place >= first) & (place <= last)
+        made = np.where(inside, np.maximum(made, met + 0.5), made)
+    return np.asarray(made, np.float64)
 
 
 @inlined

@@ -15,6 +15,7 @@ from dsis.effects import Effect
 
 Array = NDArray[np.float64]
 STEP = 0.12  # of the logarithm, for the derivative
+_OF_NOISE = 0.25  # standard deviations by which a full well moves for its derivative
 _LARGEST = 1.2  # step of a logarithm
 _CYCLIC = {"at_code": "period_codes"}
 _SMALL = 0.05  # gain of log-likelihood below which another round is in vain
@@ -151,8 +152,20 @@ def shifted(
 ) -> Iterator[tuple[Camera | None, float]]:
     """Yield the camera with each free parameter moved in turn, or None, and by how much."""
     for i, name, signed in free:
-        other = moved(effects, i, name, signed, STEP)
+        other = moved(effects, i, name, signed, _step(camera, effects[i], name))
         yield (None, 1.0) if other is None else (with_effects(camera, other[0]), other[1])
+
+
+def _step(camera: Camera, effect: Effect, name: str) -> float:
+    """Return the step of a parameter for its derivative: of its logarithm, or share of its size.
+
+    A full well moves by a share of the noise there: farther off there is none, or nothing else.
+    """
+    if name != "full_well_dn":
+        return STEP
+    full: float = getattr(effect, name)
+    noise = float(camera.segments.variance_dn2(np.array([full], np.float32))[0]) ** 0.5
+    return float(min(STEP, _OF_NOISE * noise / full))
 
 
 def information(predictor: Predictor, mean: Array, j: Array) -> tuple[Array, Array]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.mismatch.candidates import CANDIDATES
+from analysis.mismatch.candidates import CANDIDATES, measured
 from analysis.mismatch.contradicted import refuted
 from analysis.mismatch.fitted import Fitted
 from analysis.mismatch.instance import LINES, Frequency, frequency_of, instance
@@ -216,8 +216,16 @@ class Search(Fitted):
         rivals = tuple((one.kind, best.gain - one.gain) for one in fitted[1:4])
         if path is not None:
             rivals = (*rivals, ("dual_gain", best.gain - path.gain))
-        effect = replace(best.proposal, effect=best.polished.effects[0])
-        return Named(best.kind, effect, best.polished.errors[0], best.gain, rivals), camera
+        proposal = replace(best.proposal, effect=best.polished.effects[0])
+        errors = best.polished.errors[0]
+        amplitude = None if self.lines is None else self.lines.measured(proposal.effect)
+        if amplitude is not None:  # better known than from the heights of peaks
+            proposal = measured(proposal, "amplitude_dn", *amplitude)
+            errors = dict(proposal.errors)
+            camera = with_effects(state.camera, [proposal.effect])
+        if camera is None:
+            return None
+        return Named(best.kind, proposal, errors, best.gain, rivals), camera
 
     def _least(self, state: State, kind: str) -> float:
         """Return the gain from which an effect is taken in.

@@ -15,17 +15,20 @@ from numpy.typing import NDArray
 
 from analysis.mismatch.instance import Frequency, frequency_of, same_line
 from analysis.mismatch.layout import Layout
-from analysis.mismatch.phaselaw import kept_rather_than_free
+from analysis.mismatch.phaselaw import kept_rather_than_free, strength_of
 from dsis.effects import Effect
 
 FramesOf = Callable[[str], Iterable[NDArray[np.generic]]]
 _ONE_LINE, _CIRCLE = 0.75, 0.45
 _LEAST = 8  # frames, to tell
+_CLEAR_POWER = 3.0  # standard errors of a line's power from which its amplitude is known
 _CLEAR = 8.0  # standard errors of the noise's power from which a line's phase is seen
 _SURE = 3.0  # of log-likelihood, to prefer one kind of phase
 _ASIDE = 3  # bins to the neighbours that say what is around
 _NEAR = (-2, -1, 1, 2)  # bins to those that a line leaves as they are
 _FAR = (-23, -17, -13, -9, 9, 13, 17, 23)  # bins to those that say what lines have in common
+_CROSS = ((-1 / 3, 0.0), (1 / 3, 0.0), (0.0, -1 / 3), (0.0, 1 / 3))  # bins, beside the best
+_MOST_CREST = 1.15  # power between steps: a sixth of a bin off on both axes loses as much at most
 _BETWEEN = (-1 / 3, 0.0, 1 / 3)  # bins by which a frequency may be off
 _CHANCE = 0.05  # of a line as strong among all frequencies
 _RAISED, _SHARE = 4.0, 0.3  # standard errors, and of the line's power, from which neighbours are
@@ -85,6 +88,26 @@ class WholeFrames:
             return None
         return _PHASE_WORDS[effect.kind]
 
+    def measured(self, effect: Effect) -> tuple[float, float] | None:
+        """Return the amplitude of a line, DN, and its standard error; None: too little is seen.
+
+        What frames of an exposure have in common is taken off: free phases that agree by chance are
+        an error, signs are integrated over.
+        """
+        frequency = frequency_of(effect)
+        if frequency is None or self.denial(effect) is not None:
+            return None
+        seen = self._looks[frequency]
+        power = 0.0 if seen.line is None else float(seen.line.excess[0])
+        if seen.line is None or not power > _CLEAR_POWER * seen.line.error:
+            return None
+        kept, real = effect.kind == "bistable_pattern", all((2 * f) % 1 == 0 for f in frequency)
+        strength, error = seen.line.strength(power, kept=kept, real=real)
+        # A cosine has a quarter of its power at +f; samples that are all real have all of it there.
+        pixels = self.layout.rows * self.layout.columns
+        unit = float(np.sqrt(power * seen.crest / (pixels if real else pixels / 4)))
+        return unit * strength, unit * error
+
 
 @dataclass(frozen=True)
 class Look:
@@ -98,11 +121,17 @@ class Look:
         Whether frequencies beside it are raised as well.
     kept
         Whether the phase is kept but for its sign; None where the frames cannot tell.
+    line
+        Projections at the frequency looked at that shows most; None: of too few frames.
+    crest
+        Power between the frequencies looked at over that of `line`, 1 or more.
     """
 
     absent: bool
     broad: bool
     kept: bool | None
+    line: "_Power | None" = None
+    crest: float = 1.0
 
 
 def look(layout: Layout, frames_of: FramesOf, frequency: Frequency) -> Look:
@@ -122,8 +151,12 @@ def look(layout: Layout, frames_of: FramesOf, frequency: Frequency) -> Look:
         [(fx + k / columns, fy) for k in (*_NEAR, *_FAR)],
         [(fx, fy + k / rows) for k in (*_NEAR, *_FAR)],
     ]
-    around = _Power.of(layout, _projections(layout, frames_of, [f for axis in axes for f in axis]))
+    beside = [(fx + u / columns, fy + w / rows) for u, w in _CROSS]
+    looked_at = [*axes[0], *axes[1], *beside]
+    around = _Power.of(layout, _projections(layout, frames_of, looked_at))
     count = len(axes[0])
+    crest = 1.0 if exact else _crest(float(power.excess[best]), around.excess[-len(_CROSS) :])
+    around = around.at(range(2 * count))
     # What rows or columns have in common is noise beside which a line must stand out.
     ground = max(
         float(np.median(around.excess[i * count + len(_NEAR) : (i + 1) * count])) for i in (0, 1)
@@ -141,10 +174,26 @@ def look(layout: Layout, frames_of: FramesOf, frequency: Frequency) -> Look:
         ]
         if exact or not some:
             continue
-        beside = float(np.median(around.excess[some]))  # one of them may be a line itself
-        raised = beside / around.error * np.sqrt(len(some)) > _RAISED
-        broad |= bool(raised) and beside > _SHARE * float(own.excess[0])
-    return Look(own.chance(real=real) * bins > _CHANCE, broad, own.keeps_phase(real=real))
+        level = float(np.median(around.excess[some]))  # one of them may be a line itself
+        raised = level / around.error * np.sqrt(len(some)) > _RAISED
+        broad |= bool(raised) and level > _SHARE * float(own.excess[0])
+    absent = own.chance(real=real) * bins > _CHANCE
+    return Look(absent, broad, own.keeps_phase(real=real), own, crest)
+
+
+def _crest(at: float, beside: NDArray[np.float64]) -> float:
+    """Return the power at the top of a line over that at a frequency; `beside` it as `_CROSS` has.
+
+    Between three equidistant frequencies its logarithm is a parabola, nearly.
+    """
+    found = 1.0
+    for below, above in (beside[:2], beside[2:]):
+        if min(below, at, above) <= 0:
+            continue
+        low, high = np.log(below / at), np.log(above / at)
+        if low + high < 0:
+            found *= float(np.exp(-((low - high) ** 2) / (8 * (low + high))))
+    return min(found, _MOST_CREST)
 
 
 def _apart(layout: Layout, one: Frequency, other: Frequency) -> bool:
@@ -208,6 +257,17 @@ class _Power:
     def error(self) -> float:
         """Standard error of the excess in white noise."""
         return float(1 / np.sqrt(self._sum(2)))
+
+    def strength(self, power: float, *, kept: bool, real: bool) -> tuple[float, float]:
+        """Return the first pattern's amplitude over that of a power, DN^2, and its error."""
+        if kept:
+            own = [float(np.sqrt(power * w)) for w in self.weights]
+            return strength_of([one[:, 0] for one in self.found], own, real=real)
+        total = 0.0
+        for found, weight in zip(self.found, self.weights, strict=True):
+            n, each = len(found), power * weight
+            total += weight**2 * ((n - 1) * (1 + 2 * each) + (1 - 1 / n) * each**2)
+        return 1.0, float(np.sqrt(total) / self._sum(2) / power / 2)
 
     def chance(self, *, real: bool) -> float:
         """Return the chance of as much at the first frequency: a sum of squares as Gamma's.

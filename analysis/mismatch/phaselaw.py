@@ -8,6 +8,7 @@ so badly that it is integrated out; u is one phase, s a random sign, phi a rando
 from collections.abc import Iterator, Sequence
 
 import numpy as np
+import scipy.optimize
 import scipy.special
 from numpy.typing import NDArray
 
@@ -15,6 +16,7 @@ Complex = NDArray[np.complex128]
 Array = NDArray[np.float64]
 _PHASES = 32  # of half a turn that are tried
 _STRENGTHS = np.array([0.7, 0.9, 1.1, 1.4])  # of an amplitude that is not exact
+_WITHIN, _EXACT, _ASIDE = (0.4, 1.6), 2e-3, 0.02  # of an amplitude by its mean square
 _STEP = 0.5  # of m at most, in standard deviations of the noise
 _REACH = 3.5  # standard deviations of m
 _MOST = 6.0  # amplitude of one frame beyond which less noise tells no more
@@ -35,17 +37,53 @@ def kept_rather_than_free(found: Sequence[Complex], amplitudes: Sequence[float])
     kept, free = np.zeros((_STRENGTHS.size, _PHASES)), np.zeros(_STRENGTHS.size)
     for own, amplitude in zip(found, amplitudes, strict=True):
         for i, strength in enumerate(_STRENGTHS):
-            one, other = _likelihoods(own, strength * amplitude)
+            scale = _MOST / max(strength * amplitude, _MOST)
+            one, other = _likelihoods(own * scale, strength * amplitude * scale)
             kept[i] += one
             free[i] += other
     both = (scipy.special.logsumexp(x) - np.log(x.size) for x in (kept, free))
     return float(next(both) - next(both))
 
 
-def _likelihoods(found: Complex, amplitude: float) -> tuple[Array, float]:
+def strength_of(
+    found: Sequence[Complex], amplitudes: Sequence[float], *, real: bool
+) -> tuple[float, float]:
+    """Return by how much the amplitudes of a kept phase are to be multiplied, and its error.
+
+    The most likely strength, and the curvature there.
+
+    Parameters
+    ----------
+    found, amplitudes
+        As above.
+    real
+        Whether all samples of the pattern are real: projections are, noise and all.
+    """
+    phases = (1.0 + 0.0j,) if real else tuple(_phases())
+    most = 2 * _MOST if real else _MOST  # one phase is soon asked
+    scales = [
+        most / max(amplitude, most) * (np.sqrt(0.5) if real else 1.0) for amplitude in amplitudes
+    ]
+
+    def unlikely(strength: float) -> float:
+        total = np.zeros(len(phases))
+        for own, amplitude, scale in zip(found, amplitudes, scales, strict=True):
+            total += _likelihoods(own * scale, strength * amplitude * scale, phases)[0]
+        return -float(scipy.special.logsumexp(total))
+
+    best = scipy.optimize.minimize_scalar(
+        unlikely, bounds=_WITHIN, method="bounded", options={"xatol": _EXACT}
+    )
+    beside = [unlikely(best.x + side * _ASIDE) for side in (-1, 1)]
+    bend = max((sum(beside) - 2 * float(best.fun)) / _ASIDE**2, 1 / (_WITHIN[1] - _WITHIN[0]) ** 2)
+    return float(best.x), 1 / float(np.sqrt(bend))
+
+
+def _likelihoods(
+    found: Complex, amplitude: float, phases: Sequence[complex] | None = None
+) -> tuple[Array, float]:
     """Return log-likelihoods of each phase that is kept, and of free phases, up to a constant."""
-    if amplitude > _MOST:
-        found, amplitude = found * (_MOST / amplitude), _MOST
+    phases = tuple(_phases()) if phases is None else phases
     centre = found.mean()
     reach = _REACH * (amplitude + 1) / np.sqrt(found.size)
     reach = min(reach, amplitude + _REACH)
@@ -54,13 +92,13 @@ def _likelihoods(found: Complex, amplitude: float) -> tuple[Array, float]:
     shared = (centre + side[:, np.newaxis] + 1j * side).reshape(-1)
     squares = np.full(shared.size, -found.size * amplitude**2)
     free = np.zeros(shared.size)
-    kept = np.zeros((_PHASES, shared.size))
+    kept = np.zeros((len(phases), shared.size))
     for apart in (one - shared for one in found):
         size = np.abs(apart)
         squares -= size**2
         turned = 2 * amplitude * size
         free += np.log(scipy.special.i0e(turned)) + turned
-        for i, phase in enumerate(_phases()):
+        for i, phase in enumerate(phases):
             along = np.abs(2 * amplitude * np.real(apart * phase))
             kept[i] += along + np.log1p(np.exp(-2 * along)) - np.log(2)  # of cosh
     return (

@@ -9,7 +9,7 @@ from analysis.mismatch.candidates import (
     response,
     temporal,
 )
-from analysis.mismatch.candidates.candidate import Candidate, Proposal
+from analysis.mismatch.candidates.candidate import Candidate, Proposal, measured
 
 CANDIDATES: dict[str, Candidate] = {
     candidate.kind: candidate
@@ -17,4 +17,4 @@ CANDIDATES: dict[str, Candidate] = {
     for candidate in module.CANDIDATES
 }
 
-__all__ = ["CANDIDATES", "Candidate", "Proposal"]
+__all__ = ["CANDIDATES", "Candidate", "Proposal", "measured"]

@@ -1,7 +1,7 @@
 """What an effect needs to be diagnosed: statistics that call for it, parameters to start from."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from pydantic import ValidationError
 
@@ -55,6 +55,13 @@ class Candidate:
     propose: Callable[[Clues], Sequence[Proposal]]
     hints: tuple[str, ...] = ()
     sane: Callable[[Layout, Effect], bool] = lambda _layout, _effect: True
+
+
+def measured(proposal: Proposal, name: str, value: float, error: float) -> Proposal:
+    """Return a proposal one of whose parameters was measured by itself: it is fitted no more."""
+    effect = type(proposal.effect)(**{**proposal.effect.model_dump(), name: value})
+    free = tuple(own for own in proposal.free if own != name)
+    return replace(proposal, effect=effect, free=free, errors={**proposal.errors, name: error})
 
 
 def build(kind: str, **parameters: object) -> Effect | None:

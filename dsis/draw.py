@@ -10,7 +10,8 @@ same bytes wherever IEEE 754 holds. The largest deviate is 6.7.
 
 import hashlib
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
+from math import prod
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from numpy.typing import NDArray
 from dsis.cfa import Cfa
 from dsis.compiled import inlined, kernel, over_rows
 from dsis.grid import PixelGrid
+from dsis.kept import Kept
 
 _M0, _M1 = np.uint64(0xD2511F53), np.uint64(0xCD9E8D57)
 _W0, _W1 = np.uint64(0x9E3779B9), np.uint64(0xBB67AE85)
@@ -31,6 +33,7 @@ _NINE, _UNIT_23 = np.uint64(9), np.float32(2.0**-23)
 _F, _I = np.float32, np.int32
 _SQRT_HALF_BITS = np.int32(0x3F3504F3)
 _LN_2 = np.float32(np.log(2.0))
+_FIELDS = Kept(0, patience=16)
 
 
 @inlined
@@ -228,7 +231,15 @@ class Draw:
     def normal_rows(
         self, purpose: str, grid: PixelGrid, frame: int, first: int, last: int
     ) -> NDArray[np.float32]:
-        """Return rows first..last-1 of `normal(purpose, grid, frame)`, for work in row blocks."""
+        """Return rows first..last-1 of `normal(purpose, grid, frame)`, for work in row blocks.
+
+        Of a field that is kept, read-only: see `keep_fields`.
+        """
+        key = self.seed, self.scope, purpose, grid, frame
+        made = partial(self._field, purpose, grid, frame, 1, normal=True)
+        whole = _FIELDS.if_room(key, 4 * prod(grid.shape), made)
+        if whole is not None:
+            return whole[first:last]
         block = PixelGrid(
             last - first, grid.columns, grid.cfa, grid.first_row + first, grid.first_column
         )
@@ -255,6 +266,11 @@ class Draw:
             hashlib.blake2b(name, digest_size=8).digest(), "<u4"
         )
         return words.astype(np.uint64)
+
+
+def keep_fields(most_bytes: int) -> None:
+    """Keep up to so many bytes of the fields asked for by rows, where the same come back."""
+    _FIELDS.keep(most_bytes)
 
 
 @lru_cache(maxsize=8)

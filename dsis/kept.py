@@ -15,11 +15,15 @@ class Kept:
     ----------
     most_bytes
         Of all arrays; a larger one is not kept.
+    patience
+        How often, for each array kept, others may be asked for before the oldest goes. Where more
+        arrays than fit are asked for in turn, without it each would go before its turn.
     """
 
-    def __init__(self, most_bytes: int) -> None:
+    def __init__(self, most_bytes: int, patience: int = 0) -> None:
         self._most, self._bytes, self._lock = most_bytes, 0, Lock()
-        self._arrays: OrderedDict[Hashable, NDArray[Any]] = OrderedDict()
+        self._patience, self._asked = patience, 0
+        self._arrays: OrderedDict[Hashable, tuple[NDArray[Any], int]] = OrderedDict()
 
     def keep(self, most_bytes: int) -> None:
         """Keep so much at least from now on."""
@@ -28,16 +32,47 @@ class Kept:
 
     def of(self, key: Hashable, make: Callable[[], NDArray[Any]]) -> NDArray[Any]:
         """Return the array of a key, read-only, made now unless it is there."""
+        found = self._found(key)
+        return self._made(key, make) if found is None else found
+
+    def if_room(
+        self, key: Hashable, size_bytes: int, make: Callable[[], NDArray[Any]]
+    ) -> NDArray[Any] | None:
+        """Return the array of a key as `of` does; None, and nothing made, if it would not stay."""
+        found = self._found(key)
+        if found is None:
+            with self._lock:
+                room = self._room(size_bytes)
+            found = self._made(key, make) if room else None
+        return found
+
+    def _found(self, key: Hashable) -> NDArray[Any] | None:
         with self._lock:
-            if key in self._arrays:
-                self._arrays.move_to_end(key)
-                return self._arrays[key]
+            self._asked += 1
+            if key not in self._arrays:
+                return None
+            self._arrays.move_to_end(key)
+            array = self._arrays[key][0]
+            self._arrays[key] = (array, self._asked)
+            return array
+
+    def _made(self, key: Hashable, make: Callable[[], NDArray[Any]]) -> NDArray[Any]:
         made = make()
         made.flags.writeable = False
         with self._lock:
-            if key not in self._arrays and made.nbytes <= self._most:
-                self._arrays[key] = made
+            if key not in self._arrays and self._room(made.nbytes):
+                self._arrays[key] = (made, self._asked)
                 self._bytes += made.nbytes
-            while self._bytes > self._most:
-                self._bytes -= self._arrays.popitem(last=False)[1].nbytes
         return made
+
+    def _room(self, size_bytes: int) -> bool:
+        """Return whether there is room; what is in the way goes, unless its turn may come again."""
+        if size_bytes > self._most:
+            return False
+        while self._bytes + size_bytes > self._most:
+            key, (array, asked) = next(iter(self._arrays.items()))
+            if self._asked - asked < self._patience * len(self._arrays):
+                return False
+            del self._arrays[key]
+            self._bytes -= array.nbytes
+        return True

@@ -20,7 +20,7 @@ from analysis.mismatch.layout import Layout
 from analysis.mismatch.observe import Observation, observe
 from analysis.mismatch.scenes import without_picture
 from dsis.camera import Camera
-from dsis.draw import Draw
+from dsis.draw import Draw, keep_fields
 from dsis.effects import Image
 from dsis.effects.pink_noise import keep_series
 from dsis.grid import PixelGrid
@@ -31,6 +31,7 @@ Sites = NDArray[np.float64]
 T = TypeVar("T")
 R = TypeVar("R")
 _KEPT_BYTES = 400 << 20  # of pink noise, in each process: 300 frames of VGA
+_FIELDS_BYTES = 256 << 20  # of shot and read noise: cheaper to make
 _pool: ContextVar[Workers | None] = ContextVar("pool", default=None)
 
 
@@ -57,6 +58,7 @@ class Model:
     def frames(self, layout: Layout, replicate: int, seed: int) -> Callable[[str], Iterator[Image]]:
         """Return what gives the codes of an exposure's frames: float32 (row, column), DN."""
         keep_series(_KEPT_BYTES)
+        keep_fields(_FIELDS_BYTES)
         grid = PixelGrid(layout.rows, layout.columns, layout.cfa)
         sensor = Draw(seed).within("sensor", str(replicate))
         times = {e.name: e.exposure_time_s for e in layout.exposures}

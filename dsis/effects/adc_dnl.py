@@ -16,6 +16,7 @@ from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, Stage
 from dsis.grid import PixelGrid
 
 BLOCK_CODES = 64
+_TOGETHER = 4096  # samples whose codes stay in the cache
 
 
 class AdcDnl(Effect):
@@ -47,8 +48,9 @@ class AdcDnl(Effect):
         edges = code_edges(exposure.sensor, int(exposure.read_out.white_level_dn), self.rms_lsb)
         out = np.empty_like(image, order="C")
         ideal = np.arange(edges.size) - 0.5
-        near = bool((np.abs(edges - ideal) < 1).all())
-        _convert(np.ascontiguousarray(image).reshape(-1), black, edges, near, out.reshape(-1))
+        steps = int(np.abs(edges - ideal).max()) + 1
+        flat = np.ascontiguousarray(image).reshape(-1)
+        _convert(flat, black, _reached(edges), steps, out.reshape(-1))
         return out
 
     def contributions(self, point: OperatingPoint) -> Mapping[str, float]:
@@ -80,29 +82,34 @@ def code_edges(sensor: Draw, white_code: int, rms_lsb: float) -> NDArray[np.floa
     return edges
 
 
+def _reached(edges: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Return the least single-precision values that are not below the edges."""
+    nearest = edges.astype(np.float32)
+    above = np.nextafter(nearest, np.float32(np.inf))
+    return np.where(nearest < edges, above, nearest)
+
+
 @kernel
 def _convert(
     signal: NDArray[np.float32],
     black: np.float32,
-    edges: NDArray[np.float64],
-    near: bool,
+    edges: NDArray[np.float32],
+    steps: int,
     out: NDArray[np.float32],
 ) -> None:
-    """Write codes less black; `near`: no edge is a code or more away from its place."""
+    """Write codes less black; no edge is so many codes, `steps`, or more away from its place."""
     last = np.int32(edges.size - 2)
-    # One step from the nearest code, without a branch: such loops become vector instructions.
-    for i in range(signal.size):
-        v = signal[i] + black
-        code = np.int32(min(max(np.rint(v), np.float32(0)), np.float32(last)))
-        step = np.int32(v >= edges[code + 1]) - np.int32(v < edges[code])
-        out[i] = np.float32(min(max(code + step, np.int32(0)), last)) - black
-    if near:
-        return
-    for i in range(signal.size):
-        v = signal[i] + black
-        found = min(max(int(np.rint(v)), 0), int(last))
-        while found > 0 and v < edges[found]:
-            found -= 1
-        while found < last and v >= edges[found + 1]:
-            found += 1
-        out[i] = np.float32(found) - black
+    codes = np.empty(_TOGETHER, np.int32)
+    for start in range(0, signal.size, _TOGETHER):
+        line, into = signal[start : start + _TOGETHER], out[start : start + _TOGETHER]
+        for i in range(line.size):
+            nearest = np.rint(line[i] + black)
+            codes[i] = np.int32(min(max(nearest, np.float32(0)), np.float32(last)))
+        # Step by step from the nearest code, without a branch: vector instructions.
+        for _ in range(steps):
+            for i in range(line.size):
+                v, place = line[i] + black, np.uintp(codes[i])
+                step = np.int32(v >= edges[place + np.uintp(1)]) - np.int32(v < edges[place])
+                codes[i] = min(max(codes[i] + step, np.int32(0)), last)
+        for i in range(line.size):
+            into[i] = np.float32(codes[i]) - black

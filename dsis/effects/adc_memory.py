@@ -5,6 +5,7 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
+from dsis.compiled import inlined, kernel
 from dsis.effects.effect import Effect, Exposure, Image, Stage
 
 
@@ -51,14 +52,42 @@ class AdcMemory(Effect):
     def apply(self, image: Image, exposure: Exposure) -> Image:
         """Add the residue of the sample before."""
         first = np.float32(exposure.read_out.black_level_dn - self.at_code)
-        phase = np.roll(image, 1, axis=1 if self.along == "rows" else 0)
-        phase += first
-        phase /= np.float32(self.period_codes)
-        phase -= np.floor(phase)
-        phase -= np.float32(0.5)
-        phase *= np.float32(self.step_dn)
-        return np.asarray(image + phase)
+        along_rows, rows = self.along == "rows", len(image)
+        return _with_residues(
+            np.ascontiguousarray(image).reshape(rows, -1),
+            (0, image[0, 0].size) if along_rows else (1, 0),
+            first,
+            np.float32(self.period_codes),
+            np.float32(self.step_dn),
+        ).reshape(image.shape)
 
     def reach_pixels(self) -> int:
         """Return how far away a pixel may matter."""
         return 1
+
+
+@kernel
+def _with_residues(
+    image: Image, before: tuple[int, int], first: np.float32, period: np.float32, step: np.float32
+) -> Image:
+    """Return an image (row, sample) with the residue of what is so far `before`: down, right.
+
+    The first has the last before it.
+    """
+    rows, size = image.shape
+    down, right = before
+    out = np.empty_like(image)
+    for y in range(rows):
+        line, own, into = image[y - down], image[y], out[y]
+        _add_residues(line[size - right :], own[:right], first, period, step, into[:right])
+        _add_residues(line[: size - right], own[right:], first, period, step, into[right:])
+    return out
+
+
+@inlined
+def _add_residues(
+    line: Image, own: Image, first: np.float32, period: np.float32, step: np.float32, out: Image
+) -> None:
+    for x in range(out.size):
+        phase = (line[x] + first) / period
+        out[x] = own[x] + (phase - np.floor(phase) - np.float32(0.5)) * step

@@ -58,7 +58,8 @@ class LineSettling(Effect):
             np.exp(-distance / length) for length in (self.length_pixels, self.gain_length)
         )
         gain = (1 + self.gain_percent / 100 * of_gain).astype(np.float32)
-        made: Image = image * gain + (self.offset_dn * share).astype(np.float32)
+        made: Image = image * gain
+        made += (self.offset_dn * share).astype(np.float32)
         return made
 
     @property

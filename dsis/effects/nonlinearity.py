@@ -6,6 +6,7 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
+from dsis.compiled import kernel
 from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, Stage
 
 
@@ -35,10 +36,8 @@ class Nonlinearity(Effect):
         """Bend the response."""
         full_scale = exposure.read_out.full_scale_dn
         bend, end = np.float32(self._bend(full_scale)), np.float32(0.85 * full_scale)
-        bent: Image = np.minimum(image, np.float32(full_scale))
-        shift = bend * bent
-        shift *= end - bent
-        return image + shift
+        flat = np.ascontiguousarray(image).reshape(-1)
+        return _bent(flat, bend, end, np.float32(full_scale)).reshape(image.shape)
 
     def contributions(self, point: OperatingPoint) -> Mapping[str, float]:
         """Return the shift of the mean, and what the local gain makes of shot noise."""
@@ -53,3 +52,13 @@ class Nonlinearity(Effect):
     def _bend(self, full_scale_dn: float) -> float:
         """Return a, 1/DN: the parabola's top is p F above the line at 0.425 F."""
         return self.percent_full_scale / 100 * full_scale_dn / (0.425 * full_scale_dn) ** 2
+
+
+@kernel
+def _bent(signal: Image, bend: np.float32, end: np.float32, full_scale: np.float32) -> Image:
+    """Return a signal with its bend; beyond full scale that of full scale."""
+    out = np.empty_like(signal)
+    for i in range(signal.size):
+        own = min(signal[i], full_scale)
+        out[i] = signal[i] + bend * own * (end - own)
+    return out

@@ -4,9 +4,11 @@ from collections.abc import Mapping
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, field_validator
 
 from dsis.cfa import Cfa
+from dsis.compiled import kernel
 from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, Stage
 from dsis.grid import PixelGrid
 
@@ -66,11 +68,13 @@ class PeriodicNoise(Effect):
         # cos(a + b) from rows and columns: one product per pixel instead of one cosine.
         along = np.exp(2j * np.pi * (u * grid.column_numbers() + turn)).astype(np.complex64)
         down = np.exp(2j * np.pi * w * grid.row_numbers()).astype(np.complex64)
-        cosine, sine = np.ascontiguousarray(along.real), np.ascontiguousarray(along.imag)
-        wave: Image = down.real * cosine
-        wave -= down.imag * sine
-        wave *= np.float32(self.amplitude_dn)
-        return image + wave
+        planes = image.size // (grid.rows * grid.columns)
+        return _with_wave(
+            np.ascontiguousarray(image).reshape(grid.rows, -1),
+            down.reshape(-1),
+            np.repeat(along.reshape(-1), planes),
+            np.float32(self.amplitude_dn),
+        ).reshape(image.shape)
 
     def contributions(self, point: OperatingPoint) -> Mapping[str, float]:
         """Return A^2 / 2, split between pixels and means of lines, and its covariances."""
@@ -80,3 +84,17 @@ class PeriodicNoise(Effect):
         return point.components(
             variance, variance * in_row, variance * in_column, variance * in_row * in_column
         )
+
+
+@kernel
+def _with_wave(
+    image: Image, down: NDArray[np.complex64], along: NDArray[np.complex64], amplitude: np.float32
+) -> Image:
+    """Return an image (row, sample) with the amplitude times the real part of down x along."""
+    out = np.empty(image.shape, np.float32)
+    cosine, sine = along.real.copy(), along.imag.copy()
+    for y in range(image.shape[0]):
+        line, into, real, imaginary = image[y], out[y], down[y].real, down[y].imag
+        for x in range(into.size):
+            into[x] = line[x] + (real * cosine[x] - imaginary * sine[x]) * amplitude
+    return out

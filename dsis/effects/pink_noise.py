@@ -14,7 +14,8 @@ from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, Stage
 from dsis.grid import PixelGrid
 from dsis.kept import Kept
 
-_SERIES = Kept(96 << 20)  # many cameras are simulated on the same draws; all frames of a proof fit
+# Many cameras are simulated on the same draws; all frames of a proof fit.
+_SERIES = Kept(96 << 20, patience=16)
 
 
 class PinkNoise(Effect):

@@ -27,7 +27,10 @@ class Prnu(Effect):
     def apply(self, image: Image, exposure: Exposure) -> Image:
         """Multiply each pixel by its gain."""
         gains = exposure.sensor.fixed("prnu", exposure.grid, threads=exposure.threads)
-        return image * (np.float32(1) + np.float32(self.sigma_percent / 100) * gains)
+        made: Image = np.float32(self.sigma_percent / 100) * gains
+        made += np.float32(1)
+        made *= image
+        return made
 
     def contributions(self, point: OperatingPoint) -> Mapping[str, float]:
         """Return (sigma S)^2 for the fixed pixel variance, its share for the shot variance."""

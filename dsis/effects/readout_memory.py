@@ -6,6 +6,7 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
+from dsis.compiled import kernel
 from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, Stage
 
 
@@ -56,14 +57,14 @@ class ReadoutMemory(Effect):
 
     def apply(self, image: Image, exposure: Exposure) -> Image:
         """Add the remembered noise."""
-        made, noise = image.copy(), image - exposure.expected_dn
-        noise *= np.float32(self.fraction)
-        k = self.lag_pixels
-        if self.along == "rows":
-            made[:, k:] += noise[:, :-k]
-        else:
-            made[k:] += noise[:-k]
-        return made
+        along_rows, rows = self.along == "rows", len(image)
+        lag = self.lag_pixels * (image[0, 0].size if along_rows else 1)
+        return _remembering(
+            np.ascontiguousarray(image).reshape(rows, -1),
+            np.ascontiguousarray(exposure.expected_dn).reshape(rows, -1),
+            np.float32(self.fraction),
+            (0, lag) if along_rows else (lag, 0),
+        ).reshape(image.shape)
 
     def reach_pixels(self) -> int:
         """Return how far away a pixel may matter."""
@@ -77,3 +78,20 @@ class ReadoutMemory(Effect):
         lag = (0, k) if self.along == "rows" else (k, 0)
         noise = point.coupled({(0, 0): v * f**2 * max(across - k, 0) / across, lag: v * f})
         return noise | {"level": 0.0}  # of the effect alone
+
+
+@kernel
+def _remembering(
+    image: Image, expected: Image, fraction: np.float32, lag: tuple[int, int]
+) -> Image:
+    """Return an image (row, sample) with a share of the noise some rows above and samples before.
+
+    What has no such neighbour stays as it is.
+    """
+    out = image.copy()
+    down, right = lag
+    for y in range(down, image.shape[0]):
+        line, light, into = image[y - down], expected[y - down], out[y, right:]
+        for x in range(into.size):
+            into[x] += (line[x] - light[x]) * fraction
+    return out

@@ -62,7 +62,8 @@ class SmoothPrnu(Effect):
         gains = _FIELDS.of(key, partial(_field, exposure, self.length_pixels))
         first, left = grid.first_row, grid.first_column
         seen = gains[first : first + grid.rows, left : left + grid.columns]
-        own = np.float32(1) + np.float32(self.sigma_percent / 100) * seen
+        own = np.float32(self.sigma_percent / 100) * seen
+        own += np.float32(1)
         made: Image = image * own.reshape(*own.shape, *(1,) * (image.ndim - 2))
         return made
 

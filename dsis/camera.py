@@ -266,7 +266,9 @@ def _drawn(
     for link in chain:
         seen[link.kind] += 1
         nth = () if seen[link.kind] == 1 else (f"{link.kind} {seen[link.kind]}",)
-        yield link, temporal.within(*nth), sensor.within(*nth)
+        yield (
+            (link, temporal.within(*nth), sensor.within(*nth)) if nth else (link, temporal, sensor)
+        )
 
 
 @dataclass(frozen=True)

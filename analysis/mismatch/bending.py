@@ -97,7 +97,10 @@ def _pairs(layout: Layout, frames: Iterable[NDArray[np.generic]]) -> dict[str, P
     found = {}
     for channel, (y, x) in layout.sites.items():
         planes = [np.ascontiguousarray(f[y::step, x::step], np.float32) for f in stack]
-        mean = sum((p.astype(np.float64) for p in planes), np.zeros(planes[0].shape)) / len(planes)
+        mean: NDArray[np.float64] = np.zeros(planes[0].shape)
+        for plane in planes:
+            mean += plane
+        mean /= len(planes)
         squares = sum(_squares_within(plane, mean) for plane in planes)
         n, m = mean.shape
         dof = (len(stack) - 1) * (n - 1) * (m - 1)

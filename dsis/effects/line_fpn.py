@@ -7,6 +7,7 @@ import numpy as np
 from pydantic import Field
 
 from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, Stage
+from dsis.lines import moved
 
 
 class RowFpn(Effect):
@@ -33,8 +34,7 @@ class RowFpn(Effect):
     def apply(self, image: Image, exposure: Exposure) -> Image:
         """Add the offset of each row."""
         offsets = exposure.sensor.rows("row_fpn", exposure.grid)
-        shape = (-1,) + (1,) * (image.ndim - 1)
-        return image + np.float32(self.sigma_dn) * offsets.reshape(shape)
+        return moved(image, np.float32(self.sigma_dn) * offsets.reshape(-1, 1))
 
     def contributions(self, point: OperatingPoint) -> Mapping[str, float]:
         """Return sigma^2 for the fixed row variance."""
@@ -65,8 +65,7 @@ class ColumnFpn(Effect):
     def apply(self, image: Image, exposure: Exposure) -> Image:
         """Add the offset of each column."""
         offsets = exposure.sensor.columns("column_fpn", exposure.grid)
-        shape = (1, -1) + (1,) * (image.ndim - 2)
-        return image + np.float32(self.sigma_dn) * offsets.reshape(shape)
+        return moved(image, np.float32(self.sigma_dn) * offsets.reshape(1, -1))
 
     def contributions(self, point: OperatingPoint) -> Mapping[str, float]:
         """Return sigma^2 for the fixed column variance."""

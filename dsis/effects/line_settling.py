@@ -7,6 +7,7 @@ import numpy as np
 from pydantic import Field
 
 from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, Stage
+from dsis.lines import settled
 
 Edge = Literal["left", "right", "top", "bottom"]
 
@@ -58,9 +59,7 @@ class LineSettling(Effect):
             np.exp(-distance / length) for length in (self.length_pixels, self.gain_length)
         )
         gain = (1 + self.gain_percent / 100 * of_gain).astype(np.float32)
-        made: Image = image * gain
-        made += (self.offset_dn * share).astype(np.float32)
-        return made
+        return settled(image, gain, (self.offset_dn * share).astype(np.float32))
 
     @property
     def gain_length(self) -> float:

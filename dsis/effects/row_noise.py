@@ -7,6 +7,7 @@ import numpy as np
 from pydantic import Field
 
 from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, Stage
+from dsis.lines import moved
 
 
 class RowNoise(Effect):
@@ -30,8 +31,7 @@ class RowNoise(Effect):
     def apply(self, image: Image, exposure: Exposure) -> Image:
         """Add the offset of each row."""
         offsets = exposure.temporal.rows("row_noise", exposure.grid, exposure.frame)
-        shape = (-1,) + (1,) * (image.ndim - 1)
-        return image + np.float32(self.sigma_dn) * offsets.reshape(shape)
+        return moved(image, np.float32(self.sigma_dn) * offsets.reshape(-1, 1))
 
     def contributions(self, point: OperatingPoint) -> Mapping[str, float]:
         """Return sigma^2 for the row variance."""
@@ -57,8 +57,7 @@ class ColumnNoise(Effect):
     def apply(self, image: Image, exposure: Exposure) -> Image:
         """Add the offset of each column."""
         offsets = exposure.temporal.columns("column_noise", exposure.grid, exposure.frame)
-        shape = (1, -1) + (1,) * (image.ndim - 2)
-        return image + np.float32(self.sigma_dn) * offsets.reshape(shape)
+        return moved(image, np.float32(self.sigma_dn) * offsets.reshape(1, -1))
 
     def contributions(self, point: OperatingPoint) -> Mapping[str, float]:
         """Return sigma^2 for the column variance."""

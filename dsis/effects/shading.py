@@ -7,6 +7,7 @@ import numpy as np
 from pydantic import Field
 
 from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, Stage
+from dsis.lines import lit
 
 
 class Shading(Effect):
@@ -56,10 +57,10 @@ class Shading(Effect):
         across = -fall * x**2 + self.tilt_right_percent / 100 * u
         down += self.bow_down_percent / 100 * (v**2 - 1 / 3)
         across += self.bow_right_percent / 100 * (u**2 - 1 / 3)
+        if down.min() + across.min() >= 0:
+            return lit(image, down.astype(np.float32), across.astype(np.float32))
         light = down.astype(np.float32) + across.astype(np.float32)
-        if down.min() + across.min() < 0:
-            light = np.maximum(light, np.float32(0))
-        return image * light
+        return image * np.maximum(light, np.float32(0))
 
     def contributions(self, point: OperatingPoint) -> Mapping[str, float]:
         """Return what mean and shot noise lose, and the variance of the whole sensor's light."""

@@ -195,7 +195,7 @@ def _observed(
     Frames are simulated once and kept, or again where there are too many to keep.
     """
     if rest.samples > _MOST_KEPT:
-        return observe(whole, frames), observe(rest, again)
+        return observe(whole, frames, places=False), observe(rest, again, places=False)
     numbers = {e.name: e.numbers for e in whole.exposures}
     wanted = {e.name: frozenset(e.numbers) for e in rest.exposures}
     kept: dict[str, list[NDArray[np.uint16]]] = {name: [] for name in wanted}
@@ -206,4 +206,4 @@ def _observed(
                 kept[name].append(codes.astype(np.uint16))
             yield codes
 
-    return observe(whole, watched), observe(rest, kept.pop)
+    return observe(whole, watched, places=False), observe(rest, kept.pop, places=False)

@@ -90,7 +90,7 @@ def simulate(
 def simulated(layout: Layout, seed: int, which: tuple[Model, int]) -> Observation:
     """Return the observation of one simulated recording, of a model and replicate number."""
     model, replicate = which
-    return observe(layout, model.frames(layout, replicate, seed))
+    return observe(layout, model.frames(layout, replicate, seed), places=False)
 
 
 @contextmanager

@@ -24,9 +24,12 @@ from analysis.mismatch.bank.waves import Waves, WaveSums
 from analysis.mismatch.layout import Layout, Place
 from analysis.mismatch.scenes import Local
 from dsis.measures import Accumulator, Channel, Measured
+from dsis.measures.accumulator import LAGS
 from dsis.measures.plane import Transforms
 
 Array = NDArray[np.float64]
+_FEW_LAGS = 2  # of neighbours: the bank asks for no farther ones
+_MANY_PIXELS = 2e5  # of which farther ones would take long
 
 Frames = Callable[[str], Iterable[NDArray[np.generic]]]
 Watcher = Callable[[str, Measured], None]
@@ -116,7 +119,8 @@ def measure(
 ) -> Measured:
     """Return the measures of one exposure's frames; `spectra` as an `Accumulator` has it."""
     size, codes = (layout.rows, layout.columns), (layout.black_dn, layout.white_dn)
-    sums = Accumulator(*size, layout.cfa, *codes, spectra=spectra)
+    lags = _FEW_LAGS if layout.rows * layout.columns > _MANY_PIXELS else LAGS
+    sums = Accumulator(*size, layout.cfa, *codes, lags=lags, spectra=spectra)
     for frame in frames:
         sums.add(frame)
     return sums.result()
@@ -199,6 +203,7 @@ def observe(
     *,
     keep: bool = False,
     samples: bool = True,
+    places: bool = True,
 ) -> Observation:
     """Return the observation of a recording.
 
@@ -214,6 +219,8 @@ def observe(
         Whether to keep the maps, and of samples those before them.
     samples
         Whether to keep the latter, if anything.
+    places
+        Whether to look where spectra are largest: of simulations only numbers are asked for.
     """
     levels: dict[Place, Level] = {}
     found: dict[Place, Mapping[str, Number]] = {}
@@ -246,7 +253,7 @@ def observe(
             sums[name].add(exposure.name, channel, frames, variance, signal)
     local = _scenes(layout, frames_of, watch, found, whole.common)
     maps, images = _maps(layout, sums)
-    pooled, peaks = _pooled(sums, whole)
+    pooled, peaks = _pooled(sums, whole, places=places)
     return Observation(
         levels,
         found,
@@ -261,7 +268,7 @@ def observe(
 
 
 def _pooled(
-    sums: Mapping[str, _Channel], whole: _Whole
+    sums: Mapping[str, _Channel], whole: _Whole, *, places: bool
 ) -> tuple[dict[str, Mapping[str, Number]], dict[tuple[str, str], Peak]]:
     """Return spectra and persistent variances, and where spectra are largest; "": a mosaic's."""
     spectra = {name: own.spectra for name, own in sums.items()}
@@ -269,10 +276,12 @@ def _pooled(
         spectra[""] = SpectrumSums.merged(list(spectra.values()))
     persistent = {name: own.variances.numbers() for name, own in sums.items()}
     pooled = {name: {**persistent.get(name, {}), **own.numbers()} for name, own in spectra.items()}
-    peaks = {(name, kind): peak for name, own in spectra.items() for kind, peak in own.peaks()}
     all_of_it = "" if whole.mosaic else whole.layout.channels[0]
     slow = spectra[all_of_it].slow_rows() if not whole.mosaic and all_of_it in spectra else {}
     pooled.setdefault(all_of_it, {}).update({**whole.numbers(), **slow})
+    if not places:
+        return dict(pooled), {}
+    peaks = {(name, kind): peak for name, own in spectra.items() for kind, peak in own.peaks()}
     peaks |= {(all_of_it, kind): peak for kind, peak in whole.peaks().items()}
     return dict(pooled), peaks
 

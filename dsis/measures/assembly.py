@@ -107,8 +107,7 @@ def _noise(sums: Accumulator, sheet: Sheets) -> list[_Noise]:
         )
         for k, plane in enumerate(sheet.planes)
     ]
-    # As exact as the transforms of the frames, from whose power its own is taken off.
-    transform = scipy.fft.rfft2(changes.astype(np.float32), workers=sums.threads, overwrite_x=True)
+    powers = _temporal_powers(sums, sheet, changes)
     noise = []
     for k, plane in enumerate(sheet.planes):
         share = kept(frames, n, m, 2)
@@ -130,11 +129,28 @@ def _noise(sums: Accumulator, sheet: Sheets) -> list[_Noise]:
                 column_power[k],
                 *first[k],
                 mean_frames[k],
-                kernels.temporal_power(sheet.power[k], transform[k], m, frames),
+                powers[k],
                 np.ascontiguousarray(surfaces[:, k]),
             )
         )
     return noise
+
+
+def _temporal_powers(sums: Accumulator, sheet: Sheets, changes: Array) -> list[Array]:
+    """Return the power of each plane over frames, less that of their mean: (row, column).
+
+    `changes` of the mean since the first frame: (plane, row, column). Of two frames it is half of
+    the second's, and half of the power is left.
+    """
+    frames, (_, n, m) = sums.frames, sheet.images.shape
+    if sums.moments is None:
+        return [power / (2 * n * m) for power in sheet.power]
+    # As exact as the transforms of the frames, from whose power its own is taken off.
+    transform = scipy.fft.rfft2(changes.astype(np.float32), workers=sums.threads, overwrite_x=True)
+    return [
+        kernels.temporal_power(power, own, m, frames)
+        for power, own in zip(sheet.power, transform, strict=True)
+    ]
 
 
 def _temporal_correlations(sums: Accumulator, noise: list[_Noise]) -> list[Autocorrelation]:

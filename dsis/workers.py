@@ -27,6 +27,7 @@ from importlib.metadata import version
 from threading import Lock
 from typing import Any, Literal, TypeVar, cast
 
+from dsis.blas import one_thread
 from dsis.errors import DsisError, Fault, InputError
 from dsis.freed import keep_freed
 
@@ -185,6 +186,7 @@ def _begin() -> None:
     """
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     keep_freed()
+    one_thread()
 
 
 def completed(pool: Workers, work: Callable[[T], R], items: Iterable[T]) -> Iterator[tuple[T, R]]:

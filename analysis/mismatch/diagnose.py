@@ -41,6 +41,7 @@ from analysis.mismatch.taking import layout_of
 from analysis.mismatch.thinned import stages
 from analysis.mismatch.trial import Gained, Trial
 from analysis.mismatch.wholecells import whole_cells
+from dsis.blas import one_thread
 from dsis.camera import Camera
 from dsis.freed import keep_freed
 from dsis.recording import Recording
@@ -66,7 +67,8 @@ def find_mismatch(
     """Return where a recording differs from a camera model, and what physics was left out.
 
     With `jobs` above 1, simulations run in processes that are started afresh: a program that calls
-    this needs its `__main__` guard. From then on it keeps some freed memory (`keep_freed`).
+    this needs its `__main__` guard. From then on it keeps some freed memory (`keep_freed`), and
+    linear algebra has one thread (`one_thread`).
     """
     done = 0
 
@@ -80,6 +82,7 @@ def find_mismatch(
     samples = sum(len(e.frames) for e in recording.exposures) * recording.rows * recording.columns
     jobs = jobs if samples > _SMALL else 1  # processes take longer to start
     keep_freed()
+    one_thread()
     with processes(jobs):
         return _found(camera, recording, (seed, jobs), words, step)
 

@@ -15,7 +15,7 @@ from dsis.grid import PixelGrid
 from dsis.kept import Kept
 
 # Many cameras are simulated on the same draws; all frames of a proof fit.
-_SERIES = Kept(96 << 20, patience=16)
+_SERIES = Kept(96 << 20, patience=3)
 
 
 class PinkNoise(Effect):

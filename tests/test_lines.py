@@ -1,0 +1,31 @@
+"""Promise: lines are added and scaled in one pass, to the same bytes as term by term."""
+
+import numpy as np
+import pytest
+
+from dsis.lines import lit, moved, settled
+
+RNG = np.random.default_rng(1)
+
+
+def _some(*shape: int) -> np.ndarray:
+    return RNG.normal(100, 30, shape).astype(np.float32)
+
+
+@pytest.mark.parametrize("lines", [(7, 1), (1, 5)])
+def test_lines_are_added_and_scaled_as_numpy_does(lines: tuple[int, int]) -> None:
+    image, gains, offsets = _some(7, 5), _some(*lines), _some(*lines)
+    np.testing.assert_array_equal(moved(image, offsets), image + offsets)
+    np.testing.assert_array_equal(settled(image, gains, offsets), image * gains + offsets)
+
+
+def test_light_is_a_sum_of_two_lines() -> None:
+    image, down, across = _some(7, 5), _some(7, 1), _some(1, 5)
+    np.testing.assert_array_equal(lit(image, down, across), image * (down + across))
+
+
+def test_full_planes_share_their_lines() -> None:
+    planes, down, across = _some(7, 5, 3), _some(7, 1, 1), _some(1, 5, 1)
+    np.testing.assert_array_equal(moved(planes, down[..., 0]), planes + down)
+    np.testing.assert_array_equal(settled(planes, across, across), planes * across + across)
+    np.testing.assert_array_equal(lit(planes, down, across), planes * (down + across))

@@ -9,13 +9,15 @@ import pytest
 from analysis.mismatch.bank.key import Key
 from analysis.mismatch.contradicted import Denial, contradicted, refuted
 from analysis.mismatch.observe import observe
+from analysis.mismatch.polish import Polished
+from analysis.mismatch.predict import Predictor
 from analysis.mismatch.source import Source
 from analysis.mismatch.split import Split
 from analysis.mismatch.state import Setting, State
 from analysis.mismatch.taking import layout_of
 from dsis.camera import Camera
-from dsis.effects import registry
-from mismatch_recordings import Array, camera, recorded
+from dsis.effects import Effect, registry
+from mismatch_recordings import Array, InMemory, camera, recorded
 
 GAIN_PERCENT = 1.0
 LEVELS = (250.0, 900.0, 1600.0)
@@ -30,12 +32,23 @@ def with_taps(gains: Array, model: Camera = camera(TAPS)) -> State:  # noqa: B00
     for i, level in enumerate(LEVELS):
         added = np.rint(level * (gains - 1))[:, np.newaxis]
         recording.stacks[f"flat-{i}"] = (recording.stacks[f"flat-{i}"] + added).astype(np.uint16)
+    return state_of(recording, model)
+
+
+def state_of(recording: InMemory, model: Camera) -> State:
+    """Return the state of a camera beside a recording."""
     split, source = Split.of(recording), Source(recording)
     layout = layout_of(recording, split.development, source.frames)
     numbers = {e.name: e.numbers for e in layout.exposures}
     seen = observe(layout, lambda name: source.frames(name, numbers[name]))
     setting = Setting(layout, seen, None, 1, 1, 8, 8, 2, 2, 2)
     return State.of(setting, model, lambda: None)
+
+
+def as_fitted(state: State, predictor: Predictor, effect: Effect) -> Polished:
+    """Return an effect as if it had been fitted with these parameters."""
+    mean = predictor.mean(state.camera.model_copy(update={"effect": (effect,)}))
+    return Polished((effect,), predictor.loglik(mean), mean, ({},))
 
 
 def fixed(gains: Array) -> Denial | None:
@@ -58,9 +71,31 @@ def test_an_effect_is_denied_before_it_is_taken_in_too(jump: bool, denied: bool)
     shape = np.where(lines < ROWS / 2, -0.5, 0.5) if jump else np.linspace(-1, 1, ROWS)
     state = with_taps(1 + GAIN_PERCENT / 100 * shape, camera())
     predictor = state.predictor()
-    having = state.camera.model_copy(update={"effect": (TAPS,)})
-    said = refuted(state, predictor, "tap_mismatch", predictor.mean(having))
+    fitted = as_fitted(state, predictor, TAPS)
+    said = refuted(state, predictor, "tap_mismatch", fitted)
     assert (said is not None) == denied
+
+
+@pytest.mark.parametrize("spikes", [("flat-1",), ("dark-1", "flat-0")])
+def test_a_few_spikes_are_believed_though_most_exposures_have_none(spikes: tuple[str, ...]) -> None:
+    """Counts of rare hits are Poisson's: of 1 expected in 5 exposures, most hold none."""
+    recording = recorded(camera(), 5, rows=ROWS, columns=COLUMNS, levels=LEVELS)
+    assert recording.stacks is not None
+    for name in spikes:
+        recording.stacks[name][4, 30, 40] += 1500
+    state = state_of(recording, camera())
+    rate = len(spikes) / (5 * 8 * ROWS * COLUMNS / 1e6)
+    hits = registry()["impulse"](per_megapixel_frame=rate, mean_dn=1500.0)
+    predictor = state.predictor(8)
+    assert refuted(state, predictor, "impulse", as_fitted(state, predictor, hits)) is None
+
+
+def test_many_spikes_are_denied_where_none_are_seen() -> None:
+    """Of 100 expected in every exposure none is no chance."""
+    state = state_of(recorded(camera(), 5, rows=ROWS, columns=COLUMNS, levels=LEVELS), camera())
+    hits = registry()["impulse"](per_megapixel_frame=2000.0, mean_dn=1500.0)
+    predictor = state.predictor(8)
+    assert refuted(state, predictor, "impulse", as_fitted(state, predictor, hits)) is not None
 
 
 @pytest.mark.parametrize("direction", [1, -1])

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.candidates import CANDIDATES
+from analysis.mismatch.polish import Polished, with_effects
 from analysis.mismatch.predict import Predictor
 from analysis.mismatch.state import State
 from analysis.mismatch.words import statistic_words
@@ -47,11 +48,17 @@ def contradicted(
     return _denied(state, predictor, kind, mean + shift, own + shift, state.null.sd)
 
 
-def refuted(state: State, predictor: Predictor, kind: str, mean: Array) -> Denial | None:
-    """Return the same of an effect that a state's camera has not: `mean` is predicted with it."""
+def refuted(state: State, predictor: Predictor, kind: str, fitted: Polished) -> Denial | None:
+    """Return the same of an effect that a state's camera has not, as it was fitted.
+
+    What the effect itself draws makes numbers scatter too: of a few spikes in a recording most
+    exposures have none, and that denies none elsewhere.
+    """
+    camera, mean = with_effects(state.camera, fitted.effects), fitted.mean
     _, sd, known = predictor.weights(mean)
     change = np.where(known, predictor.forms * (mean - state.null.mean), 0.0)
-    scatter = np.sqrt(np.maximum(sd**2 - change**2, state.null.sd**2))
+    drawn = 0.0 * sd if camera is None else np.where(known, predictor.spread(camera), 0.0)
+    scatter = np.sqrt(np.maximum(sd**2 - change**2, state.null.sd**2) + drawn**2)
     return _denied(state, predictor, kind, state.null.mean, mean, scatter)
 
 

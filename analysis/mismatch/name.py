@@ -291,7 +291,7 @@ class Search(Fitted):
         while fitted and fitted[0].gain >= LEAST_GAIN and fitted[0].kind not in LINES:
             best, *others = fitted
             predictor = state.predictor(replicates_for(self.setting, [best.proposal.effect]))
-            denial = refuted(state, predictor, best.kind, best.polished.mean)
+            denial = refuted(state, predictor, best.kind, best.polished)
             if denial is None:
                 break
             fitted = others

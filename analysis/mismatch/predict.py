@@ -97,6 +97,14 @@ class Predictor:
             kept = np.where(mean == 0, 0.0, mean**2 / (mean**2 + noise))
         return np.asarray(self.reference.null.mean + mean * kept)
 
+    def spread(self, camera: Camera) -> Array:
+        """Return how far what a camera changes scatters from recording to recording.
+
+        Of every number, in its unit; 0 where one replicate is all there is.
+        """
+        change = self.changes(camera)
+        return np.asarray(change.std(0, ddof=1) if len(change) > 1 else np.zeros(change.shape[1]))
+
     def weights(self, mean: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
         """Return residuals, their standard deviations under a prediction, and which are known."""
         null = self.reference.null

@@ -5,6 +5,7 @@ law than the one that is fitted.
 """
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
@@ -25,6 +26,11 @@ from analysis.mismatch.bank.carryover import (
     profile,
     sawteeth,
 )
+from analysis.mismatch.observe import observe
+from analysis.mismatch.rank import SURE_GAIN, Memory, ranked
+from analysis.mismatch.source import Source
+from analysis.mismatch.state import Setting, State
+from analysis.mismatch.taking import layout_of
 from dsis.camera import read_camera
 from dsis.recording import read_recording
 
@@ -143,12 +149,17 @@ def test_frames_of_one_kind_say_nothing() -> None:
     assert all(np.isnan(value) for value, _ in sums.numbers().values())
 
 
-def _found(folder: Path, cfa: str, *vocabulary: str) -> tuple[Case, Finding]:
+def _planted(folder: Path, cfa: str) -> Case:
     choice = Choice(cfa=cfa, segments=1, bit_depth=12, light=True, times="darks")
     case = draw_case(3, "small", choice)
     planted = {"period_codes": 64, "at_code": 20.0, "step_dn": 1.5, "along": "rows"}
     case = case.having(Planted("adc_memory", planted))
     plant(folder, case)
+    return case
+
+
+def _found(folder: Path, cfa: str, *vocabulary: str) -> tuple[Case, Finding]:
+    case = _planted(folder, cfa)
     camera, recording = read_camera(folder / "camera.toml"), read_recording(folder)
     return case, find_mismatch(camera, recording, seed=5, vocabulary=frozenset(vocabulary))
 
@@ -163,3 +174,19 @@ def test_it_is_named_with_its_numbers(tmp_path: Path, cfa: str) -> None:
         parameter = own.parameters[name]
         assert abs(parameter.value - truth) < 4 * parameter.standard_error  # type: ignore[operator] # fitted
     assert own.heldout_gain.ci95[0] > 0
+
+
+def test_levels_that_are_off_call_for_a_trial(tmp_path: Path) -> None:
+    """Each level has the mean residue of its codes: that may be all that is located."""
+    _planted(tmp_path, "MONO")
+    camera, recording = read_camera(tmp_path / "camera.toml"), read_recording(tmp_path)
+    source = Source(recording)
+    numbers = {e.name: tuple(range(len(e.frames))) for e in recording.exposures}
+    layout = layout_of(recording, numbers, source.frames)
+    seen = observe(layout, lambda name: source.frames(name, numbers[name]), keep=True)
+    state = State.of(Setting.of(layout, seen, None, 1, 1), camera, lambda: None)
+    assert "level" in {m.statistic for m in state.mismatches}
+    levels = replace(state, mismatches=tuple(m for m in state.mismatches if m.statistic == "level"))
+    found = ranked(levels, ["adc_memory"], Memory(), lambda: None)
+    assert found
+    assert found[0].gain > SURE_GAIN

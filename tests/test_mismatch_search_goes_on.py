@@ -10,9 +10,11 @@ from analysis.mismatch.candidates import Proposal
 from analysis.mismatch.diagnose import _proven
 from analysis.mismatch.name import Search
 from analysis.mismatch.named import Named, unclear
+from analysis.mismatch.state import State
 from dsis.effects import registry
 
-OPEN = Stub(mismatches=["something"])
+SOMETHING = Stub(statistic="something", p_adjusted=0.0)
+OPEN = Stub(mismatches=[SOMETHING])
 
 
 def _named(kind: str, **errors: float) -> Named:
@@ -189,7 +191,7 @@ def test_with_more_frames_all_is_judged_again_and_a_period_chosen_anew(
     monkeypatch.setattr(search, "without", lambda *_: None)
     search.named = [_named("wrong"), _named("adc_memory")]
     search.refused = {"other": "too few frames said so"}
-    search.resumed(Stub(camera=None, mismatches=["something"]))  # type: ignore[arg-type] # a stub
+    search.resumed(Stub(camera=None, mismatches=[SOMETHING]))  # type: ignore[arg-type] # a stub
     assert [n.kind for n in search.named] == ["adc_memory"]
     assert search.seen[0] == frozenset({"adc_memory"})  # type: ignore[attr-defined] # its own
     assert search.refused == {"wrong": "denied"}
@@ -220,7 +222,7 @@ class Refitted(Scripted):
         return FITTED
 
 
-FITTED = Stub(mismatches=["something"])
+FITTED = Stub(mismatches=[SOMETHING])
 
 
 def test_all_is_fitted_again_once_before_what_is_weak_is_taken_in(
@@ -236,3 +238,54 @@ def test_all_is_fitted_again_once_before_what_is_weak_is_taken_in(
     search._sought(nothing)
     assert [n.kind for n in search.named] == ["strong", "weaker"]
     assert search.fits == 1  # type: ignore[attr-defined] # its own
+
+
+class Emerging(Scripted):
+    """A search of which a fit of all together, or all frames, show what no search had seen."""
+
+    def _polished(self, state: Any) -> Any:
+        return self.then if self.then is not None and len(self.named) == 1 else state
+
+
+OTHER = Stub(statistic="other", p_adjusted=0.0)
+
+
+@pytest.mark.parametrize("where", ["fit", "frames", "nowhere"])
+def test_what_differs_only_beside_what_is_named_is_looked_for(
+    monkeypatch: pytest.MonkeyPatch, where: str
+) -> None:
+    """It differs once all is fitted together, or in all frames, of which the search sees some."""
+    now = Stub(mismatches=[OTHER]) if where == "fit" else None
+    search = _search(monkeypatch, "", "first", "second")
+    search.__class__ = Emerging
+    search.then = now  # type: ignore[attr-defined] # its own
+    found: list[Any] = []
+
+    def best(state: Any) -> Any:
+        kind = "second" if search.named else "first"
+        open_to = [m.statistic for m in state.mismatches]
+        fits = open_to == (["something"] if kind == "first" else ["other"])
+        return (_named(kind), None) if fits and kind in search._left() else None
+
+    monkeypatch.setattr(search, "_best", best)
+    if where == "frames":
+        whole: Any = Stub(mismatches=[OTHER])
+        monkeypatch.setattr(search, "_of_all_frames", lambda state: found.append(state) or whole)
+    search.run()
+    expected = ["first"] if where == "nowhere" else ["first", "second"]
+    assert [n.kind for n in search.named] == expected
+    assert bool(found) == (where == "frames")
+
+
+def test_all_frames_are_asked_once_something_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    search = _search(monkeypatch, "", "first")
+    state: Any = State.__new__(State)
+    state.__dict__.update(mismatches=(), calibrated=Stub(model=Stub(camera=None)))
+    assert search._of_all_frames(state) is state  # nothing is named
+    search.named = [_named("first")]
+    assert search._of_all_frames(state) is state  # of a large recording there are no others
+    search.whole = Stub()  # type: ignore[assignment] # a stub
+    monkeypatch.setattr(
+        search_module, "replace", lambda own, **new: Stub(**{**own.__dict__, **new})
+    )
+    assert search._of_all_frames(state).mismatches == [SOMETHING]

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from analysis.mismatch.candidates import CANDIDATES, measured
 from analysis.mismatch.contradicted import refuted
+from analysis.mismatch.finding import Mismatch
 from analysis.mismatch.fitted import Fitted
 from analysis.mismatch.instance import LINES, Frequency, frequency_of, instance
 from analysis.mismatch.judge import INSTEAD, LITTLE, NEEDLESS, NOTHING, Judge
@@ -37,8 +38,18 @@ _WEAK = 30.0  # gain below which an effect may be what others, fitted one by one
 _MOST_EFFECTS = 20  # some may have to go again
 _CHOSEN = frozenset({"adc_memory", "dual_gain"})  # a period, a gap between levels
 _MOST_LINES = 5  # further ones stay unexplained, located
+_ROUNDS = 3  # of a search that goes on
 _SPIKY = 10.0  # standard errors from which tails bend the variances
 _TAILS = frozenset({"kurtosis", "kurtosis_within_pixels", "one_off_outliers"})
+
+
+def _differ(before: Sequence[Mismatch], now: Sequence[Mismatch]) -> bool:
+    """Return whether something differs now that did not before, or not surely."""
+    sure = {m.statistic: m.p_adjusted < SURE_CHANCE for m in before}
+    return any(
+        m.statistic not in sure or (m.p_adjusted < SURE_CHANCE and not sure[m.statistic])
+        for m in now
+    )
 
 
 @dataclass
@@ -82,27 +93,42 @@ class Search(Fitted):
         """Return the final state of a search that goes on from one.
 
         What was dropped had hidden something: it is looked for once more. An effect that explained
-        some of what it changes, while others were missing, may come back. `again`: what is named
-        is judged even where nothing is added.
+        some of what it changes, while others were missing, may come back. So is what differs only
+        since all was fitted together, or in all frames. `again`: what is named is judged even where
+        nothing is added.
         """
         forgiven: dict[str, str] = {}
-        for last in (False, True):
+        for number in range(_ROUNDS):
             known = len(self.named)
             state = self._sought(state)
             if len(self.named) == known and not again:
                 break
             again = False
+            sought = state.mismatches
             state = self._polished(state)
             taken = list(self.named)
-            state = self._pruned(state)
+            state = self._of_all_frames(self._pruned(state))
             kept = {one.name for one in self.named}
             dropped = [one for one in taken if one.name not in kept]
-            if last or not dropped or not state.mismatches:
+            hidden = bool(dropped) and number == 0
+            if not (hidden or _differ(sought, state.mismatches)) or not state.mismatches:
                 break
-            forgiven |= self._forgiven(dropped)
+            forgiven |= self._forgiven(dropped) if hidden else {}
         left = forgiven.keys() - {one.name for one in self.named}
         self.refused |= self.doubted | {name: forgiven[name] for name in sorted(left)}
         return state
+
+    def _of_all_frames(self, state: State) -> State:
+        """Return the state with what differs in all frames of a small recording beside its camera.
+
+        What differs is asked of all frames, what it is of those that are not locked.
+        """
+        if not self.named or self.whole is None:
+            return state
+        whole = State.of(self.whole, state.camera, self.step)
+        seen = replace(state, mismatches=whole.mismatches)
+        self.polished = seen if self.polished is state else self.polished
+        return seen
 
     def _forgiven(self, dropped: Sequence[Named]) -> dict[str, str]:
         """Let effects be proposed again that explained too little of what they change, and why.

@@ -116,6 +116,9 @@ CANDIDATES = (
          "correlation_2_0"),
         _memory,
     ),
-    Candidate("adc_memory", ("carry_over", _ALONG_ROWS, _ALONG_COLUMNS), _converter),
+    # Levels too have the mean residue of their codes, for which there are many other reasons.
+    Candidate(
+        "adc_memory", ("carry_over", _ALONG_ROWS, _ALONG_COLUMNS), _converter, hints=("level",)
+    ),
     Candidate("image_lag", ("frame_correlation",), _lag),
 )  # fmt: skip

@@ -10,15 +10,18 @@ from numpy.typing import NDArray
 
 from analysis.mismatch.bank.home import (
     ABOVE,
+    BENT,
     BOTH,
     PERSISTENT,
     READ_NOISE,
     SHAPED,
+    STEPPED,
     TIME,
     together_too,
 )
 from analysis.mismatch.bank.key import MOSAIC, Key
 from analysis.mismatch.bank.scalars import OF_MEAN_FRAMES
+from analysis.mismatch.basefit import colour
 from analysis.mismatch.layout import Layout
 from analysis.mismatch.scenes import SCENE
 from analysis.mismatch.vector import Vector
@@ -86,6 +89,9 @@ def contrasts(layout: Layout, reference: Vector, known: NDArray[np.bool_]) -> Co
     if grown is not None:
         keys.append(Key("level", "contrast", "", "", TIME))
         rows.append(grown)
+    for detail, row in _bent_levels(layout, reference, known):
+        keys.append(Key("level", "contrast", "", "", detail))
+        rows.append(row)
     for signal, row in _second_paths(layout, reference, known):
         keys.append(Key("pixel_variance", "contrast", "", "", f"{ABOVE} {signal:.4g} DN"))
         rows.append(row)
@@ -157,6 +163,49 @@ def _with_time(layout: Layout, reference: Vector, known: NDArray[np.bool_]) -> A
         row[own] = (time - time.mean()) / reference.errors[own]
     size = float(np.linalg.norm(row))
     return row / size if size else None
+
+
+def _bent_levels(
+    layout: Layout, reference: Vector, known: NDArray[np.bool_]
+) -> Iterator[tuple[str, Array]]:
+    """Yield sums of the levels of flats that bend, or whose gain steps between successive flats.
+
+    What each colour's sensitivity and each channel's ground can follow, base numbers that are
+    fitted to the same levels, is projected out.
+    """
+    lit = {e.name for e in layout.uniform if e.kind == "flat" and e.light}
+    which = [
+        i
+        for i, key in enumerate(reference.keys)
+        if (key.statistic, key.scope) == ("level", "exposure") and key.exposure in lit and known[i]
+    ]
+    if not which:
+        return
+    places = [reference.keys[i].place for i in which]
+    signal = np.array([max(layout.signal_dn[place], 0.0) for place in places])
+    channels = np.array([channel for _, channel in places])
+    colours = np.array([colour(channel) for channel in channels])
+    size = reference.errors[which]
+    free = [np.where(colours == own, signal, 0.0) / size for own in sorted(set(colours.tolist()))]
+    free += [(channels == own) / size for own in sorted(set(channels.tolist()))]
+    base = np.stack(free, 1)
+    levels = sorted(set(signal[channels == channels[0]].tolist()))
+    shapes = {BENT: signal**2}
+    for low, high in pairwise(levels):
+        switch = sqrt(max(low, 1.0) * high)
+        shapes[f"{STEPPED} {switch:.4g} DN"] = np.where(signal > switch, signal, 0.0)
+    kept: list[Array] = []
+    for name, shape in shapes.items():
+        own = shape / size
+        left = own - base @ np.linalg.lstsq(base, own, rcond=None)[0]
+        norm = float(np.linalg.norm(left))
+        if norm <= _LEAST_BEND * float(np.linalg.norm(own)):
+            continue
+        row = np.zeros(len(reference.keys))
+        row[which] = left / norm
+        if all(abs(float(row @ other)) <= _SAME for other in kept):
+            kept.append(row)
+            yield name, row
 
 
 def _second_paths(

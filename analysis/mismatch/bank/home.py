@@ -19,6 +19,8 @@ from analysis.mismatch.bank.together import TOGETHER
 BOTH = "along rows and columns"
 TIME = "with the exposure time"
 ABOVE = "steeper above"
+BENT = "bent with the signal"
+STEPPED = "another gain above"
 READ_NOISE = "of read noise"
 PERSISTENT = "of read noise, in all exposures"
 LAG = 0.1  # share of one of many lags along a line, in that of another sum
@@ -42,7 +44,7 @@ SHAPED: Mapping[str, tuple[str, ...]] = {
     "correlation_0_2": ("at all levels",),
     "frame_correlation": ("with the signal",),
     "channel_ratio": ("at all levels",),
-    "level": (TIME,),
+    "level": (TIME, BENT),
 }
 _IN_COMMON = frozenset({"row_variance", "column_variance", "frame_variance"})
 _STEPS, _AXES = ("half_seam", "parity"), ("rows", "columns")
@@ -94,6 +96,7 @@ def homes(keys: Sequence[Key], channels: Sequence[str]) -> list[float]:
     summed = "all" if joint or not mosaic else "contrast"
     wanted = _pooled({key.scope for key in keys}, mosaic=mosaic, joint=joint)
     wanted |= _shaped(mosaic=mosaic)
+    steps = max(sum(_stepped(key) for key in keys), 1)
     found = []
     for key in keys:
         own = (key.statistic, key.scope, key.channel, key.detail)
@@ -108,13 +111,20 @@ def homes(keys: Sequence[Key], channels: Sequence[str]) -> list[float]:
             weight = LAG
         if key.statistic == "pixel_variance" and key.detail.startswith(ABOVE):
             weight = 1.0
+        if _stepped(key):
+            weight = 1 / steps
         found.append(weight)
     return found
 
 
 def one_sided(key: Key) -> bool:
     """Return whether the effects that a number is home of can only raise it."""
-    return key.statistic not in _TWO_SIDED
+    return key.statistic not in _TWO_SIDED and not (_stepped(key) or key.detail == BENT)
+
+
+def _stepped(key: Key) -> bool:
+    """Return whether a number is a step of the response between two levels."""
+    return key.statistic == "level" and key.detail.startswith(STEPPED)
 
 
 def _shaped(*, mosaic: bool) -> set[tuple[str, str, str, str]]:

@@ -372,9 +372,10 @@ class Search(Fitted):
         """Return whether a state without an effect shows that it is no needless one after all."""
         if why == NOTHING:
             kinds = {n.kind for n in self.named if n is not named and n.proposal is not None}
-            kinds |= {own.effect.kind for own in self.own}
+            kinds |= {one.effect.kind for one in self.own}
             others = {call for kind in kinds for call in CANDIDATES[kind].calls}
-            calls = frozenset(CANDIDATES[named.kind].calls) - others
+            own = CANDIDATES[named.kind]
+            calls = frozenset({*own.calls, *own.hints}) - others
             return explains(state, bare, self.base, calls)
         return why.startswith((NEEDLESS, INSTEAD)) and opened(state, bare)
 

@@ -171,6 +171,7 @@ CANDIDATES = (
         "smooth_prnu",
         ("fixed_patch_variance", "fixed_correlation_0_1", "fixed_correlation_1_0"),
         _smooth_prnu,
+        hints=("fixed_smooth_variance",),  # a field has long waves too; so have many other surfaces
         sane=_shorter,
     ),
 )

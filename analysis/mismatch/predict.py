@@ -2,7 +2,9 @@
 
 Cameras are compared on the same few simulated recordings: draws are counted, so what two cameras
 have in common cancels. The likelihood has heavy tails, and allows every predicted change an error
-of its own: no effect of the vocabulary is exactly what a sensor does.
+of its own: no effect of the vocabulary is exactly what a sensor does. Mean squares of few frames
+scatter by more than that, and by a law that is known: chi-squared (Wilson & Hilferty, 1931, of
+their cube roots).
 """
 
 from collections import Counter
@@ -11,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import gammaln
 
 from analysis.mismatch.bank.key import Key
 from analysis.mismatch.null import Null
@@ -20,8 +23,10 @@ from analysis.mismatch.vector import Vector
 from dsis.camera import Camera
 
 Array = NDArray[np.float64]
+_OF_FRAMES = "frame_variance"
 _NU = 6.0  # degrees of freedom of the likelihood's tails
 _FLOOR = 0.3  # of a cube root that is 1 in white noise: below it, chance
+_LEAST_ROOT = 1e-2  # frames that agree to their last digit are no surer than that
 _FORM = 0.08  # relative error of a predicted change
 _FORMS = {
     "spectral_peak": 0.3,
@@ -69,6 +74,7 @@ class Predictor:
         self.simulations, self.reference, self.replicates = simulations, reference, replicates
         self.forms = form_errors(reference.vector.keys)
         self.base = simulations.of(reference.camera, replicates)
+        self.few = np.array([key.statistic == _OF_FRAMES for key in reference.vector.keys], bool)
 
     def ready(self, cameras: Iterable[Camera | None]) -> None:
         """Simulate side by side, where processes are, what will be asked for one by one."""
@@ -144,6 +150,15 @@ class Predictor:
         )
 
     def _likely(self, rest: Array, sd: Array, known: NDArray[np.bool_]) -> float:
-        own = rest[known] / sd[known]
-        spread = np.log(sd[known] / self.reference.null.sd[known])
-        return float(-((_NU + 1) / 2 * np.log1p(own**2 / _NU) + spread).sum())
+        few, many = known & self.few, known & ~self.few
+        own = rest[many] / sd[many]
+        spread = np.log(sd[many] / self.reference.null.sd[many])
+        total = float(-((_NU + 1) / 2 * np.log1p(own**2 / _NU) + spread).sum())
+        if not few.any():
+            return total
+        value = self.reference.vector.values[few]
+        mean = np.maximum(value - rest[few], _FLOOR)
+        half = (mean / sd[few]) ** 2 / 9  # of the degrees of freedom: var of the root 2 / (9 dof)
+        scale = mean**3 / half
+        ratio = np.maximum(value, _LEAST_ROOT) ** 3 / scale  # a gamma variate
+        return total + float((half * np.log(ratio) - ratio - gammaln(half)).sum())

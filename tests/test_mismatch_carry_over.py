@@ -123,6 +123,24 @@ def test_a_residue_is_found_with_its_period_step_and_place() -> None:
     assert best.step_dn == pytest.approx(STEP_DN, rel=0.3)
 
 
+def test_spikes_do_not_hide_a_residue() -> None:
+    """One spike in each level leaves what was found: of 144000 samples it is one."""
+    levels = [_carrying(frames) for frames in _white(9)]
+    clean, samples = _observed(levels)
+    for i, frames in enumerate(levels):
+        frames[i, 20 + i, 30] += 2500.0
+    seen, struck = _observed(levels)
+    known = [name for name, (v, _) in clean.items() if np.isfinite(v)]
+    away = [(seen[name][0] - clean[name][0]) / clean[name][1] for name in known]
+    assert np.abs(away).max() < 1
+    assert all(seen[name][1] < 1.05 * clean[name][1] for name in known)
+    one, other = (
+        max(sawteeth(tuple(own)), key=lambda tooth: tooth.chi2) for own in (samples, struck)
+    )
+    assert other.period == one.period
+    assert other.chi2 == pytest.approx(one.chi2, rel=0.15)
+
+
 def test_the_profile_is_the_sawtooth() -> None:
     levels = [(mean, 20.0) for mean in (120.0, 150.0, 180.0)]
     rng = np.random.default_rng(10)

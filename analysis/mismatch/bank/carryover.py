@@ -27,6 +27,8 @@ _FOLDED = PERIODS[-1]
 _LEAST = 4.0  # times what means of lines take: what must be left of a wave, to say anything
 _SAMPLES = 2**16  # of a difference, roughly: every so many lines are looked at
 _KEPT = 2**15  # samples of a difference of frames that are kept one by one
+_FARTHEST = 6.0  # standard deviations of a change of samples: beyond it is a spike
+_ASKED = 4096  # samples that tell how far changes scatter
 _PLACES, _FINER = 32, 8  # of a step in its period that are looked at, and between two of them
 Array = NDArray[np.float64]
 Frame = NDArray[np.int32]
@@ -102,7 +104,7 @@ class CarryOver:
 
     def _take(self, one: Frame, other: Frame) -> None:
         self.size = {"rows": one.shape[1], "columns": one.shape[0]}
-        still = _still(one, other)
+        still = _still(one, other, *_ends(one, other))
         every = max(one.size // _SAMPLES, 1) | 1  # odd: no colour is left out
         found = _sums(one, other, still, every)
         for axis in AXES:
@@ -266,8 +268,21 @@ def _against(
     return square, along, through
 
 
+def _ends(one: Frame, other: Frame) -> tuple[int, int]:
+    """Return the least and the largest change of samples that is no spike, DN.
+
+    Six standard deviations from the middle, which normal changes never reach: a spike, or a few,
+    would bend all that is summed, and its own lines' means.
+    """
+    size, every = one.size, max(one.size // _ASKED, 1) | 1
+    change = one.reshape(size)[::every] - other.reshape(size)[::every]
+    low, middle, high = np.percentile(change, [15.865, 50, 84.135])
+    far = _FARTHEST * max(float(high - low) / 2, 0.5)
+    return int(np.floor(middle - far)), int(np.ceil(middle + far))
+
+
 @kernel
-def _still(one: Frame, other: Frame) -> NDArray[np.float32]:
+def _still(one: Frame, other: Frame, least: int, most: int) -> NDArray[np.float32]:
     """Return the change of samples less that of rows and columns: lines move for other reasons."""
     rows, columns = one.shape
     by_column, whole = np.zeros(columns, np.int64), np.int64(0)
@@ -276,7 +291,7 @@ def _still(one: Frame, other: Frame) -> NDArray[np.float32]:
     for y in range(rows):
         first, second, total = one[y], other[y], np.int64(0)
         for x in range(columns):
-            change = first[x] - second[x]
+            change = min(max(first[x] - second[x], least), most)
             by_column[x] += change
             total += change
         of_row[y] = np.float32(total) / np.float32(columns)
@@ -286,7 +301,8 @@ def _still(one: Frame, other: Frame) -> NDArray[np.float32]:
     for y in range(rows):
         first, second, line, own = one[y], other[y], found[y], of_row[y]
         for x in range(columns):
-            line[x] = np.float32(first[x] - second[x]) - own - of_column[x] + mean
+            change = min(max(first[x] - second[x], least), most)
+            line[x] = np.float32(change) - own - of_column[x] + mean
     return found
 
 

@@ -123,6 +123,25 @@ def test_a_residue_is_found_with_its_period_step_and_place() -> None:
     assert best.step_dn == pytest.approx(STEP_DN, rel=0.3)
 
 
+def test_a_residue_whose_steps_noise_does_not_reach_is_found_by_its_slope() -> None:
+    """Between steps it goes in proportion, d / P a code; how far its steps are the levels tell."""
+    rng = np.random.default_rng(11)
+    between = [(AT + PERIOD * k + place, 3.0) for k, place in ((0, 20.0), (1, 32.0), (4, 45.0))]
+    levels = [_carrying(mean + sd * rng.standard_normal((6, 200, 200))) for mean, sd in between]
+    _, samples = _observed(levels)
+    hidden = max(sawteeth(tuple(samples)), key=lambda one: one.chi2)
+    shown = max(sawteeth(tuple(samples), whole=True), key=lambda one: one.chi2)
+    pairs = sum(own.moved.size for own in samples)
+    assert hidden.chi2 < 30
+    assert shown.chi2 == pytest.approx(pairs * (STEP_DN / PERIOD) ** 2, rel=0.5)
+    assert shown.step_dn / shown.period == pytest.approx(STEP_DN / PERIOD, rel=0.3)
+
+
+def test_white_noise_has_no_slope() -> None:
+    _, samples = _observed(_white(12))
+    assert max(one.chi2 for one in sawteeth(tuple(samples), whole=True)) < 30
+
+
 def test_spikes_do_not_hide_a_residue() -> None:
     """One spike in each level leaves what was found: of 144000 samples it is one."""
     levels = [_carrying(frames) for frames in _white(9)]

@@ -51,6 +51,8 @@ class Samples:
         Of the change.
     square_dn2
         Sum of the squares of `before`.
+    follows
+        What was taken off, in proportion to `before`.
     """
 
     one: Frame
@@ -59,6 +61,7 @@ class Samples:
     before: Array
     variance_dn2: float
     square_dn2: float
+    follows: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -126,12 +129,17 @@ class CarryOver:
         square = float(before @ before)
         if square <= 0:
             return None
-        rest = moved - before * float(before @ moved) / square
+        follows = float(before @ moved) / square
+        rest = moved - before * follows
         variance = float(rest.var())
         if variance <= 0:
             return None
         first, second = (part.astype(np.int32) & (_FOLDED - 1) for part in (one, other))
-        return Samples(first, second, rest / sqrt(variance), before, variance, square)
+        own = rest / sqrt(variance)
+        # Neighbours less the mean of their line differ from it in opposite ways, by one over its
+        # length.
+        follows += 1 / self.size[axis]
+        return Samples(first, second, own, before, variance, square, follows)
 
 
 class CarryOverSums:
@@ -191,21 +199,24 @@ class CarryOverSums:
         return found
 
 
-@lru_cache(maxsize=4)
-def sawteeth(samples: tuple[Samples, ...]) -> tuple[Sawtooth, ...]:
-    """Return for each of `PERIODS` the sawtooth that explains most, by least squares."""
+@lru_cache(maxsize=8)
+def sawteeth(samples: tuple[Samples, ...], *, whole: bool = False) -> tuple[Sawtooth, ...]:
+    """Return for each of `PERIODS` the sawtooth that explains most, by least squares.
+
+    `whole`: of what goes in proportion too. Between its steps a residue is nothing else.
+    """
     found = []
     for period in PERIODS:
         best, coarse = Sawtooth(0.0, period, 0.0, 0.0), period / _PLACES
         for at in coarse * np.arange(_PLACES):
-            best = _better(samples, best, float(at))
+            best = _better(samples, best, float(at), whole=whole)
         for at in best.at_code + coarse / _FINER * np.arange(1 - _FINER, _FINER):
-            best = _better(samples, best, float(at) % period)
+            best = _better(samples, best, float(at) % period, whole=whole)
         found.append(best)
     return tuple(found)
 
 
-def _better(samples: Sequence[Samples], best: Sawtooth, at: float) -> Sawtooth:
+def _better(samples: Sequence[Samples], best: Sawtooth, at: float, *, whole: bool) -> Sawtooth:
     """Return the better of a sawtooth and that of its period which falls at `at`."""
     phase = (np.arange(_FOLDED) - at) / best.period
     residue = phase - np.floor(phase) - 0.5
@@ -213,7 +224,8 @@ def _better(samples: Sequence[Samples], best: Sawtooth, at: float) -> Sawtooth:
     for own in samples:
         square, moved, before = _against(residue, own.one, own.other, own.moved, own.before)
         top += moved / sqrt(own.variance_dn2)
-        bottom += (square - before**2 / own.square_dn2) / own.variance_dn2
+        top += whole * own.follows * before / own.variance_dn2
+        bottom += (square - (not whole) * before**2 / own.square_dn2) / own.variance_dn2
     if bottom > 0 and top**2 / bottom > best.chi2:
         return Sawtooth(top / bottom, best.period, at, top**2 / bottom)
     return best

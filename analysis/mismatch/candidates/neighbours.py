@@ -75,8 +75,19 @@ def _memory(clues: Clues) -> Sequence[Proposal]:
 
 
 def _converter(clues: Clues) -> Sequence[Proposal]:
-    """Propose the residues, of either direction, that explain most of what samples carry over."""
-    tried = [(axis, one) for axis, own in clues.seen.carried.items() for one in sawteeth(own)]
+    """Propose the residues, of either direction, that explain most of what samples carry over.
+
+    Beyond what goes in proportion, and with that: where noise covers no step there is nothing else.
+    """
+    return [*_residues(clues, whole=False), *_residues(clues, whole=True)]
+
+
+def _residues(clues: Clues, *, whole: bool) -> list[Proposal]:
+    tried = [
+        (axis, one)
+        for axis, own in clues.seen.carried.items()
+        for one in sawteeth(own, whole=whole)
+    ]
     best = max((one.chi2 for _, one in tried), default=0.0)
     found: list[Proposal] = []
     for axis, own in tried:

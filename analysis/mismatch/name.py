@@ -20,6 +20,7 @@ from analysis.mismatch.rank import (
     LEAST_GAIN,
     SURE_CHANCE,
     SURE_GAIN,
+    TOLD_APART,
     Memory,
     Ranked,
     ranked,
@@ -256,11 +257,14 @@ class Search(Fitted):
     def _least(self, state: State, kind: str) -> float:
         """Return the gain from which an effect is taken in.
 
-        Less where what calls for it is sure, and of lines: whole frames show them besides.
+        Less where what calls for it is sure: it need only be told from none. And of lines: whole
+        frames show them besides.
         """
         calls = CANDIDATES[kind].calls
         sure = any(m.statistic in calls and m.p_adjusted < SURE_CHANCE for m in state.mismatches)
-        return LEAST_GAIN if (sure or kind in LINES) and self.least <= SURE_GAIN else self.least
+        if self.least > SURE_GAIN:
+            return self.least
+        return LEAST_GAIN if kind in LINES else TOLD_APART if sure else self.least
 
     def _left(self) -> frozenset[str]:
         lines = sum(n.kind in LINES for n in self.named)

@@ -23,7 +23,7 @@ _MOST = 4  # kinds that are fitted, after all were tried as proposed
 _FAR = 15.0  # of log-likelihood behind the best as proposed: fitting does not make up for it
 _SHARE = 0.03  # or that share of what the best gains
 _ROUNDS = 2  # of a fit, where each simulation takes long
-_TIE = 3.0  # of log-likelihood: odds below 20 do not tell two effects apart
+TOLD_APART = 3.0  # of log-likelihood: odds below 20 do not tell two effects apart
 _COSINE = 0.5  # of what two predictions change, from which they change the same
 _ALIKE = 0.05  # relative difference of parameters up to which a proposal is an earlier one
 _SPARSE = 4  # times as many simulations
@@ -282,7 +282,7 @@ def alike(state: State, one: Array, other: Array) -> bool:
 
 def ties(state: State, best: Ranked, other: Ranked) -> bool:
     """Return whether another effect explains the same numbers nearly as well as the best."""
-    near = other.gain > best.gain - _TIE and other.kind != best.kind
+    near = other.gain > best.gain - TOLD_APART and other.kind != best.kind
     if not near or _other_line(state, best, other):
         return False
     return alike(state, best.polished.mean, other.polished.mean)

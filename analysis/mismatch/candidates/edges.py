@@ -1,6 +1,6 @@
 """Lines that begin, or end, before the read-out has settled."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -49,16 +49,25 @@ def _of_rest(clues: Clues, rest: Rest) -> list[Proposal]:
     for edge, of_maps, own, opposite in zip(_EDGES, best, worth, opposites, strict=True):
         clear = {name: fit for name, fit in of_maps.items() if abs(fit.z) > _CLEAR}
         if clear and own > _NEAR * opposite:
-            start = {
-                _NUMBERS[name]: float(np.clip(fit.size, -90, 90)) if name == "gain" else fit.size
-                for name, fit in clear.items()
-            }
-            lengths = {"length_pixels": next(iter(clear.values())).length}
-            if len(clear) > 1:
-                lengths["gain_length_pixels"] = clear["gain"].length
-            free = [*start, *lengths]
-            found += proposals("line_settling", free, list(start), **start, **lengths, edge=edge)
+            # What one map shows may be the other's shadow: each is tried alone, too.
+            alone = [{name: fit} for name, fit in clear.items()] if len(clear) > 1 else []
+            for some in (clear, *alone):
+                found += _settled(edge, some)
     return found
+
+
+def _settled(edge: str, fits: Mapping[str, "_Fit"]) -> list[Proposal]:
+    """Return the proposal of an edge with the decays that its maps show."""
+    start = {
+        _NUMBERS[name]: float(np.clip(fit.size, -90, 90)) if name == "gain" else fit.size
+        for name, fit in fits.items()
+    }
+    lengths = {"length_pixels": next(iter(fits.values())).length}
+    if len(fits) > 1:
+        lengths["gain_length_pixels"] = fits["gain"].length
+    return proposals(
+        "line_settling", [*start, *lengths], list(start), **start, **lengths, edge=edge
+    )
 
 
 @dataclass(frozen=True)

@@ -372,7 +372,7 @@ def _omitted(named: Named, why: tuple[str, ...], gain: Gain) -> OmittedEffect:
             if isinstance(value, str):
                 choices[name] = value
             elif isinstance(value, tuple):
-                parameters[name] = FittedParameter(value, 0.0)
+                parameters[name] = FittedParameter(value, named.proposal.errors.get(name, 0.0))
             elif isinstance(value, (int, float)) and not isinstance(value, bool):
                 own = named.proposal
                 known = np.inf if name in own.free else own.errors.get(name, 0.0)

@@ -245,9 +245,11 @@ class Search(Fitted):
             rivals = (*rivals, ("dual_gain", best.gain - path.gain))
         proposal = replace(best.proposal, effect=best.polished.effects[0])
         errors = best.polished.errors[0]
-        amplitude = None if self.lines is None else self.lines.measured(proposal.effect)
-        if amplitude is not None:  # better known than from the heights of peaks
-            proposal = measured(proposal, "amplitude_dn", *amplitude)
+        line = None if self.lines is None else self.lines.measured(proposal.effect)
+        if line is not None:  # better known than from the heights of peaks
+            values = {"amplitude_dn": line.amplitude_dn, "frequency": line.frequency}
+            known = {"amplitude_dn": line.amplitude_error_dn, "frequency": line.frequency_error}
+            proposal = measured(proposal, values, known)
             errors = dict(proposal.errors)
             camera = with_effects(state.camera, [proposal.effect])
         if camera is None:

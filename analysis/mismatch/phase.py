@@ -88,11 +88,12 @@ class WholeFrames:
             return None
         return _PHASE_WORDS[effect.kind]
 
-    def measured(self, effect: Effect) -> tuple[float, float] | None:
-        """Return the amplitude of a line, DN, and its standard error; None: too little is seen.
+    def measured(self, effect: Effect) -> "Line | None":
+        """Return amplitude and frequency of a line; None: too little is seen.
 
         What frames of an exposure have in common is taken off: free phases that agree by chance are
-        an error, signs are integrated over.
+        an error, signs are integrated over. Errors of frequencies are those of a sinusoid in white
+        noise (Rife & Boorstyn, 1974), of frames that do not know one another's phase.
         """
         frequency = frequency_of(effect)
         if frequency is None or self.denial(effect) is not None:
@@ -106,7 +107,23 @@ class WholeFrames:
         # A cosine has a quarter of its power at +f; samples that are all real have all of it there.
         pixels = self.layout.rows * self.layout.columns
         unit = float(np.sqrt(power * seen.crest / (pixels if real else pixels / 4)))
-        return unit * strength, unit * error
+        at = frequency if seen.frequency is None else seen.frequency
+        off = 0.0 if at == frequency else seen.line.bins(power) / min(self._size)
+        return Line(unit * strength, unit * error, at, off)
+
+    @property
+    def _size(self) -> tuple[int, int]:
+        return self.layout.rows, self.layout.columns
+
+
+@dataclass(frozen=True)
+class Line:
+    """Amplitude (DN) and frequency (cycles per pixel, x and y) of a line, with standard errors."""
+
+    amplitude_dn: float
+    amplitude_error_dn: float
+    frequency: Frequency
+    frequency_error: float
 
 
 @dataclass(frozen=True)
@@ -125,6 +142,8 @@ class Look:
         Projections at the frequency looked at that shows most; None: of too few frames.
     crest
         Power between the frequencies looked at over that of `line`, 1 or more.
+    frequency
+        Where that is; None: where it was looked for.
     """
 
     absent: bool
@@ -132,6 +151,7 @@ class Look:
     kept: bool | None
     line: "_Power | None" = None
     crest: float = 1.0
+    frequency: Frequency | None = None
 
 
 def look(layout: Layout, frames_of: FramesOf, frequency: Frequency) -> Look:
@@ -155,7 +175,7 @@ def look(layout: Layout, frames_of: FramesOf, frequency: Frequency) -> Look:
     looked_at = [*axes[0], *axes[1], *beside]
     around = _Power.of(layout, _projections(layout, frames_of, looked_at))
     count = len(axes[0])
-    crest = 1.0 if exact else _crest(float(power.excess[best]), around.excess[-len(_CROSS) :])
+    crest, off = _top(float(power.excess[best]), around.excess[-len(_CROSS) :])
     around = around.at(range(2 * count))
     # What rows or columns have in common is noise beside which a line must stand out.
     ground = max(
@@ -178,22 +198,33 @@ def look(layout: Layout, frames_of: FramesOf, frequency: Frequency) -> Look:
         raised = level / around.error * np.sqrt(len(some)) > _RAISED
         broad |= bool(raised) and level > _SHARE * float(own.excess[0])
     absent = own.chance(real=real) * bins > _CHANCE
-    return Look(absent, broad, own.keeps_phase(real=real), own, crest)
+    kept = own.keeps_phase(real=real)
+    if exact:
+        return Look(absent, broad, kept, own)
+    there = (fx + off[0] / columns, fy + off[1] / rows)
+    # What lies along an axis of the frequencies, as stripes do, stays there.
+    asked = zip(frequency, there, strict=True)
+    x, y = (f if (2 * f) % 1 == 0 else (at + 0.5) % 1 - 0.5 for f, at in asked)
+    return Look(absent, broad, kept, own, crest, (x, y))
 
 
-def _crest(at: float, beside: NDArray[np.float64]) -> float:
-    """Return the power at the top of a line over that at a frequency; `beside` it as `_CROSS` has.
+def _top(at: float, beside: NDArray[np.float64]) -> tuple[float, list[float]]:
+    """Return the power at the top of a line over that at a frequency, and how far off it is.
 
-    Between three equidistant frequencies its logarithm is a parabola, nearly.
+    In bins, along x and y; `beside` the frequency as `_CROSS` has. Between three equidistant ones
+    the logarithm of the power is a parabola, nearly.
     """
-    found = 1.0
-    for below, above in (beside[:2], beside[2:]):
+    found, off = 1.0, [0.0, 0.0]
+    for axis, (below, above) in enumerate((beside[:2], beside[2:])):
         if min(below, at, above) <= 0:
             continue
         low, high = np.log(below / at), np.log(above / at)
         if low + high < 0:
             found *= float(np.exp(-((low - high) ** 2) / (8 * (low + high))))
-    return min(found, _MOST_CREST)
+            farthest = _CROSS[1][0] / 2
+            step = _CROSS[1][0] * (low - high) / (2 * (low + high))
+            off[axis] = float(np.clip(step, -farthest, farthest))
+    return min(found, _MOST_CREST), off
 
 
 def _apart(layout: Layout, one: Frequency, other: Frequency) -> bool:
@@ -268,6 +299,13 @@ class _Power:
             n, each = len(found), power * weight
             total += weight**2 * ((n - 1) * (1 + 2 * each) + (1 - 1 / n) * each**2)
         return 1.0, float(np.sqrt(total) / self._sum(2) / power / 2)
+
+    def bins(self, power: float) -> float:
+        """Return the standard error of a line's frequency along an axis, in bins."""
+        total = sum(
+            (len(own) - 1) * power * w for own, w in zip(self.found, self.weights, strict=True)
+        )
+        return float(np.sqrt(1.5 / max(total, 1e-9)) / np.pi)
 
     def chance(self, *, real: bool) -> float:
         """Return the chance of as much at the first frequency: a sum of squares as Gamma's.

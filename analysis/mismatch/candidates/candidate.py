@@ -57,11 +57,13 @@ class Candidate:
     sane: Callable[[Layout, Effect], bool] = lambda _layout, _effect: True
 
 
-def measured(proposal: Proposal, name: str, value: float, error: float) -> Proposal:
-    """Return a proposal one of whose parameters was measured by itself: it is fitted no more."""
-    effect = type(proposal.effect)(**{**proposal.effect.model_dump(), name: value})
-    free = tuple(own for own in proposal.free if own != name)
-    return replace(proposal, effect=effect, free=free, errors={**proposal.errors, name: error})
+def measured(
+    proposal: Proposal, values: Mapping[str, object], errors: Mapping[str, float]
+) -> Proposal:
+    """Return a proposal some of whose parameters were measured by themselves: fitted no more."""
+    effect = type(proposal.effect)(**{**proposal.effect.model_dump(), **values})
+    free = tuple(own for own in proposal.free if own not in values)
+    return replace(proposal, effect=effect, free=free, errors={**proposal.errors, **errors})
 
 
 def build(kind: str, **parameters: object) -> Effect | None:

@@ -114,6 +114,8 @@ class Judge:
         return None if worst is None else worst[1:]
 
     def _denial(self, predictor: Predictor, named: Named) -> Verdict | None:
+        if named.measured:
+            return None  # what correlates pixels besides may hide it in numbers, not in frames
         without = self.without(named)
         denial = contradicted(self.state, predictor, named.kind, without)
         if denial is None and named.proposal is not None:
@@ -127,7 +129,7 @@ class Judge:
         share = resolved(predictor, self.state, mean)
         if predictor.worth(mean) < LEAST_GAIN:
             return share, NEEDLESS
-        if share < _RESOLVED:
+        if share < _RESOLVED and not named.measured:
             return share, f"{LITTLE} {max(share, 0):.0%} of what it changes"
         if named.kind not in LINES and not locates(self.state, mean):  # frames show lines
             return 1.0, NOTHING

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from math import inf, isfinite
 
 from analysis.mismatch.candidates import Proposal
-from analysis.mismatch.instance import instance
+from analysis.mismatch.instance import LINES, instance
 from dsis.camera import Camera
 from dsis.effects import Effect
 
@@ -44,6 +44,11 @@ class Named:
     def name(self) -> str:
         """Its kind, and of a line its frequency, of a decay its edge: there may be several."""
         return instance(self.kind, None if self.proposal is None else self.proposal.effect)
+
+    @property
+    def measured(self) -> bool:
+        """Whether it is a line that whole frames show, with an amplitude of their own."""
+        return self.kind in LINES and self.proposal is not None and not self.proposal.free
 
 
 def unclear(named: Named) -> str:

@@ -4,11 +4,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from analysis.mismatch.bank.carryover import sawteeth
+from analysis.mismatch.bank.carryover import Sawtooth, sawteeth
 from analysis.mismatch.candidates.candidate import Candidate, Proposal, proposals
 from analysis.mismatch.clues import Clues, alike
 
 _ALONG_ROWS, _ALONG_COLUMNS = "correlation_0_1", "correlation_1_0"
+_SEEN_STEPS = 100.0  # of chi-squared: ten standard deviations
 _AS_LIKELY = 4.6  # of chi-squared, odds of 10: of few levels, periods may be alike
 _NEAR = (_ALONG_ROWS, _ALONG_COLUMNS, "line_correlation", "pixel_variance")
 
@@ -77,17 +78,23 @@ def _memory(clues: Clues) -> Sequence[Proposal]:
 def _converter(clues: Clues) -> Sequence[Proposal]:
     """Propose the residues, of either direction, that explain most of what samples carry over.
 
-    Beyond what goes in proportion, and with that: where noise covers no step there is nothing else.
+    Beyond what goes in proportion, as other memories do. Where noise covers no step there is
+    nothing else: unless steps are seen for sure, those with it are proposed too.
     """
-    return [*_residues(clues, whole=False), *_residues(clues, whole=True)]
+    steps = _sawteeth(clues, whole=False)
+    sure = max((one.chi2 for _, one in steps), default=0.0) > _SEEN_STEPS
+    return [*_residues(steps), *([] if sure else _residues(_sawteeth(clues, whole=True)))]
 
 
-def _residues(clues: Clues, *, whole: bool) -> list[Proposal]:
-    tried = [
+def _sawteeth(clues: Clues, *, whole: bool) -> list[tuple[str, Sawtooth]]:
+    return [
         (axis, one)
         for axis, own in clues.seen.carried.items()
         for one in sawteeth(own, whole=whole)
     ]
+
+
+def _residues(tried: Sequence[tuple[str, Sawtooth]]) -> list[Proposal]:
     best = max((one.chi2 for _, one in tried), default=0.0)
     found: list[Proposal] = []
     for axis, own in tried:

@@ -8,7 +8,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from analysis.mismatch import judge
 from analysis.mismatch.candidates import Proposal, measured
+from analysis.mismatch.contradicted import Denial
+from analysis.mismatch.named import Named
 from analysis.mismatch.phase import WholeFrames
 from dsis.effects import Effect, registry
 from dsis.effects.periodic_noise import PeriodicNoise
@@ -88,3 +91,21 @@ def test_what_was_measured_is_fitted_no_more() -> None:
     assert found.effect == PeriodicNoise(amplitude_dn=0.3, frequency=(0.1, 0.2))
     assert found.free == ()
     assert found.errors == errors
+
+
+@pytest.mark.parametrize("free", [("amplitude_dn",), ()])
+def test_a_line_that_frames_show_is_not_denied_by_numbers(
+    monkeypatch: pytest.MonkeyPatch, free: tuple[str, ...]
+) -> None:
+    """Correlations that others make hide it in numbers: it is denied only where these fit it."""
+    line = Proposal(PeriodicNoise(amplitude_dn=0.2, frequency=(0.1, 0.2)), free)
+    named = Named("periodic_noise", line, {}, 30.0, ())
+    predictor = SimpleNamespace(
+        replicates=16, ready=list, mean=lambda _: np.zeros(1), worth=lambda _: 30.0
+    )
+    state: Any = SimpleNamespace(predictor=lambda *_: predictor)
+    monkeypatch.setattr(judge, "contradicted", lambda *_: Denial(0.0, "it shows 0%"))
+    monkeypatch.setattr(judge, "resolved", lambda *_: 0.0)
+    asked = judge.Judge(state, lambda _: None, 16)  # type: ignore[arg-type, return-value] # no camera
+    assert (asked.denied([named]) is not None) == bool(free)
+    assert (asked.needless([named]) is not None) == bool(free)

@@ -3,6 +3,7 @@
 from math import floor, isfinite, isnan, log10
 
 DASH = "\u2013"
+_MOST_DECIMALS, _SMALL = 6, 0.01
 
 
 def plain(value: float | None, digits: int = 3) -> str:
@@ -24,7 +25,7 @@ def measured(value: float, standard_error: float) -> str:
     if not (isfinite(value) and isfinite(standard_error)):
         return f"{plain(value, 4)} ± {DASH}"
     decimals = 1 - floor(log10(standard_error))
-    if decimals > 6:  # 0.000012 ± 0.000003 is 1.2e-05
+    if decimals > _MOST_DECIMALS and abs(value) < _SMALL:  # 0.000012 ± 0.000003 is 1.2e-05
         return f"{plain(value, 4)} ± {plain(standard_error, 2)}"
     return f"{_rounded(value, decimals)} ± {_rounded(standard_error, decimals)}"
 

@@ -16,9 +16,11 @@ _NAMES = tuple(
 
 
 def one_thread() -> None:
-    """Let OpenBLAS use one thread in this process and in those it starts, unless a user set more.
+    """Let OpenBLAS use one thread here and in processes started from now on.
 
-    Libraries that are loaded already are told where the system says which these are (Linux).
+       What a user set stays.
+    Libraries that are loaded already are told where the system says which
+       these are (Linux).
     """
     if _SETTING in os.environ:
         return
@@ -34,4 +36,8 @@ def _loaded() -> list[ctypes.CDLL]:
     """Return the loaded libraries that hold OpenBLAS."""
     lines = Path("/proc/self/maps").read_text().splitlines()
     paths = {line.split(maxsplit=5)[-1] for line in lines if "openblas" in line}
-    return [ctypes.CDLL(path) for path in sorted(paths)]
+    found = []
+    for path in sorted(paths):
+        with suppress(OSError):
+            found.append(ctypes.CDLL(path))
+    return found

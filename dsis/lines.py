@@ -14,7 +14,8 @@ def moved(image: Image, offsets: Line) -> Image:
     if image.ndim > 2:
         return image + offsets.reshape(*offsets.shape[:2], *(1,) * (image.ndim - 2))
     flat = offsets.reshape(-1)
-    return _by_row(image, None, flat) if _of_rows(offsets) else _by_column(image, None, flat)
+    by_row = _of_rows(offsets, image)
+    return _by_row(image, None, flat) if by_row else _by_column(image, None, flat)
 
 
 def settled(image: Image, gains: Line, offsets: Line) -> Image:
@@ -22,7 +23,7 @@ def settled(image: Image, gains: Line, offsets: Line) -> Image:
     if image.ndim > 2:
         return image * gains + offsets
     flat = gains.reshape(-1), offsets.reshape(-1)
-    return _by_row(image, *flat) if _of_rows(offsets) else _by_column(image, *flat)
+    return _by_row(image, *flat) if _of_rows(gains, image) else _by_column(image, *flat)
 
 
 def lit(image: Image, down: Line, across: Line) -> Image:
@@ -32,8 +33,9 @@ def lit(image: Image, down: Line, across: Line) -> Image:
     return _lit(image, down.reshape(-1), across.reshape(-1))
 
 
-def _of_rows(lines: Line) -> bool:
-    return bool(lines.shape[1] == 1)
+def _of_rows(lines: Line, image: Image) -> bool:
+    """Return whether lines (row, 1) or (1, column) are an image's rows."""
+    return bool(lines.shape == (image.shape[0], 1))
 
 
 @kernel

@@ -12,9 +12,22 @@ def _some(*shape: int) -> np.ndarray:
     return RNG.normal(100, 30, shape).astype(np.float32)
 
 
-@pytest.mark.parametrize("lines", [(7, 1), (1, 5)])
-def test_lines_are_added_and_scaled_as_numpy_does(lines: tuple[int, int]) -> None:
-    image, gains, offsets = _some(7, 5), _some(*lines), _some(*lines)
+@pytest.mark.parametrize(
+    ("size", "lines"),
+    [
+        ((7, 5), (7, 1)),
+        ((7, 5), (1, 5)),
+        ((7, 1), (1, 1)),
+        ((7, 1), (7, 1)),
+        ((1, 5), (1, 1)),
+        ((1, 5), (1, 5)),
+        ((1, 1), (1, 1)),
+    ],
+)
+def test_lines_are_added_and_scaled_as_numpy_does(
+    size: tuple[int, int], lines: tuple[int, int]
+) -> None:
+    image, gains, offsets = _some(*size), _some(*lines), _some(*lines)
     np.testing.assert_array_equal(moved(image, offsets), image + offsets)
     np.testing.assert_array_equal(settled(image, gains, offsets), image * gains + offsets)
 

@@ -53,7 +53,7 @@ SINGLE = [(0.5, 0.25), (0.5, 0.5), (0.0, 0.5)]  # patterns of single pixels lie 
 @pytest.mark.parametrize(
     ("kind", "at", "off"),  # of a bin, by which the frequency is wrong
     [
-        *((kind, (0.11, -0.23), off) for kind in KINDS for off in (0.0, 0.25)),
+        *((kind, (0.11, -0.23), off) for kind in KINDS for off in (0.0, 1 / 6, 0.25)),
         ("periodic_noise", SINGLE[0], 0.0),
         *(("bistable_pattern", at, 0.0) for at in SINGLE),
     ],

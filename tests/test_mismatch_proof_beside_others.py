@@ -80,6 +80,15 @@ def test_means_without_spikes(cfa: Cfa) -> None:
     assert means_of_most(spiky, cfa) == pytest.approx(np.array(left), abs=1e-9)
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_rare_codes_of_a_quiet_sensor_are_no_spikes(seed: int) -> None:
+    """Noise of a fifth of a code: the rare code beside the others says where the mean lies."""
+    rng = np.random.default_rng(seed)
+    codes = np.rint(rng.normal(100.1, 0.2, (1, 200, 200)))
+    assert (codes != 100).mean() < 1 / 37
+    assert means_of_most(codes, Cfa.MONO, 1.0) == pytest.approx(codes.mean((1, 2))[:, np.newaxis])
+
+
 ROWS, COLUMNS = 96, 128
 LINE = np.linspace(-1, 1, ROWS)[:, np.newaxis]
 STEP = np.where(LINE < 0, -0.5, 0.5)

@@ -193,7 +193,7 @@ def _bent_levels(
     shapes = {BENT: signal**2}
     for low, high in pairwise(levels):
         switch = sqrt(max(low, 1.0) * high)
-        shapes[f"{STEPPED} {switch:.4g} DN"] = np.where(signal > switch, signal, 0.0)
+        shapes[f"{STEPPED} {switch:.7g} DN"] = np.where(signal > switch, signal, 0.0)
     kept: list[Array] = []
     for name, shape in shapes.items():
         own = shape / size

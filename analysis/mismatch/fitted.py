@@ -44,7 +44,7 @@ class Fitted:
     rough
         Whether a strong effect was taken in since.
     whole
-        All frames of a small recording: they say what differs as long as nothing is named.
+        All frames of a small recording: they say whether anything differs.
     """
 
     setting: Setting

@@ -2,6 +2,7 @@
 
 from collections.abc import Container, Sequence
 from dataclasses import dataclass, field, replace
+from math import log
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,6 +66,7 @@ class Search(Fitted):
     lines: WholeFrames | None = None
     memory: Memory = field(default_factory=Memory)
     least: float = SURE_GAIN  # for an effect to be taken in
+    asked: tuple[State, State] | None = None  # with what differs in all frames, and without
 
     def run(self) -> State:
         """Return the final state."""
@@ -111,10 +113,9 @@ class Search(Fitted):
             state = self._of_all_frames(self._pruned(state))
             kept = {one.name for one in self.named}
             dropped = [one for one in taken if one.name not in kept]
-            hidden = bool(dropped) and number == 0
-            if not (hidden or _differ(sought, state.mismatches)) or not state.mismatches:
+            if not (dropped or _differ(sought, state.mismatches)) or not state.mismatches:
                 break
-            forgiven |= self._forgiven(dropped) if hidden else {}
+            forgiven |= self._forgiven(dropped) if number == 0 else {}
         left = forgiven.keys() - {one.name for one in self.named}
         self.refused |= self.doubted | {name: forgiven[name] for name in sorted(left)}
         return state
@@ -129,6 +130,7 @@ class Search(Fitted):
         whole = State.of(self.whole, state.camera, self.step)
         seen = replace(state, mismatches=whole.mismatches)
         self.polished = seen if self.polished is state else self.polished
+        self.asked = (seen, state)
         return seen
 
     def _forgiven(self, dropped: Sequence[Named]) -> dict[str, str]:
@@ -257,16 +259,20 @@ class Search(Fitted):
         return Named(best.kind, proposal, errors, best.gain, rivals), camera
 
     def _least(self, state: State, kind: str) -> float:
-        """Return the gain from which an effect is taken in.
+        """Return the gain from which an effect is taken in: at odds of 20 against none.
 
-        Less where what calls for it is sure: it need only be told from none. And of lines: whole
-        frames show them besides.
+        Of all kinds of the vocabulary; where what calls for it is sure, of those that this calls
+        for. Less for lines: whole frames show them besides.
         """
-        calls = CANDIDATES[kind].calls
-        sure = any(m.statistic in calls and m.p_adjusted < SURE_CHANCE for m in state.mismatches)
         if self.least > SURE_GAIN:
             return self.least
-        return LEAST_GAIN if kind in LINES else TOLD_APART if sure else self.least
+        if kind in LINES:
+            return LEAST_GAIN
+        sure = {m.statistic for m in state.mismatches if m.p_adjusted < SURE_CHANCE}
+        if not sure.intersection(CANDIDATES[kind].calls):
+            return self.least
+        rivals = sum(bool(sure.intersection(own.calls)) for own in CANDIDATES.values())
+        return min(TOLD_APART + log(rivals), self.least)
 
     def _left(self) -> frozenset[str]:
         lines = sum(n.kind in LINES for n in self.named)
@@ -359,6 +365,7 @@ class Search(Fitted):
         Where few pixels make a number, a model with them allows it anything: what would be left
         open without an effect, clearly, needs it whatever the likelihoods say.
         """
+        state = self.asked[1] if self.asked and state is self.asked[0] else state
         needed: set[str] = set()
         while any(n.proposal is not None for n in self.named):
             judge = self._judge(state)

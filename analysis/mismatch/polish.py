@@ -16,6 +16,7 @@ from dsis.effects import Effect
 Array = NDArray[np.float64]
 STEP = 0.12  # of the logarithm, for the derivative
 _OF_NOISE = 0.25  # standard deviations by which a full well moves for its derivative
+_LEAST_STEP = 1e-5  # of single precision
 _LARGEST = 1.2  # step of a logarithm
 _CYCLIC = {"at_code": "period_codes"}
 _SMALL = 0.05  # gain of log-likelihood below which another round is in vain
@@ -165,7 +166,7 @@ def _step(camera: Camera, effect: Effect, name: str) -> float:
         return STEP
     full: float = getattr(effect, name)
     noise = float(camera.segments.variance_dn2(np.array([full], np.float32))[0]) ** 0.5
-    return float(min(STEP, _OF_NOISE * noise / full))
+    return float(np.clip(_OF_NOISE * noise / full, _LEAST_STEP, STEP))
 
 
 def information(predictor: Predictor, mean: Array, j: Array) -> tuple[Array, Array]:

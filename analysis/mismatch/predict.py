@@ -158,7 +158,10 @@ class Predictor:
             return total
         value = self.reference.vector.values[few]
         mean = np.maximum(value - rest[few], _FLOOR)
-        half = (mean / sd[few]) ** 2 / 9  # of the degrees of freedom: var of the root 2 / (9 dof)
-        scale = mean**3 / half
+        # Half of the degrees of freedom, from how roots scatter: within 1 % from one on.
+        half = ((mean / sd[few]) ** 2 + 2) / 9
+        half -= 0.06 / half
+        # The mean of roots is less than the root of the mean: that of a gamma variate is known.
+        scale = (mean * np.exp(gammaln(half) - gammaln(half + 1 / 3))) ** 3
         ratio = np.maximum(value, _LEAST_ROOT) ** 3 / scale  # a gamma variate
         return total + float((half * np.log(ratio) - ratio - gammaln(half)).sum())

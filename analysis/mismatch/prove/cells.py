@@ -6,7 +6,7 @@ tell them, shrunk by the model's own spread of widths.
 """
 
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,13 +54,18 @@ class Cells:
         """Whether every sensor has the same cells."""
         return not self.width_variance
 
+    @cached_property
+    def step_dn(self) -> float:
+        """Width of the median code that occurs."""
+        width = self.upper_dn[1:-1] - self.lower_dn[1:-1]
+        return float(np.median(width[width > 0]))
+
     def centre(self, mean_dn: float, sd_dn: float) -> float:
         """Return the centre of normal noise whose codes have a mean, both in DN above black.
 
         Clipping and coarse codes move the mean; elsewhere it is the centre itself.
         """
-        width = self.upper_dn[1:-1] - self.lower_dn[1:-1]
-        step = float(np.median(width[width > 0]))
+        step = self.step_dn
         ends = min(mean_dn - self.upper_dn[0], self.lower_dn[-1] - mean_dn)
         if ends > _CLEAR * sd_dn and sd_dn > _COARSE * step:
             return mean_dn

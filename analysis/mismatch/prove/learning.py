@@ -33,7 +33,7 @@ from dsis.camera import Camera
 from dsis.effects import Image
 from dsis.measures.spikes import variance_of_most
 
-_OF_SINGLE_SAMPLES = frozenset(
+_UNTIED = frozenset(
     {
         "level",
         "pixel_variance",
@@ -99,10 +99,11 @@ def _learned(
 ) -> Law:
     """Return the law with all that the virtual sensors show.
 
-    Of effects that neither last nor tie samples together there is no pattern, memory or spectrum:
-    those that spikes of a few virtual frames feign would be learned instead.
+    Of effects that tie no samples together but by a frame's mean, and leave no mean pattern, no
+    pattern, memory or spectrum is learned: those that spikes of a few virtual frames feign would
+    be. Beside any other effect all is.
     """
-    single = all(own.measures <= _OF_SINGLE_SAMPLES for own in law.camera.effect)
+    single = all(own.measures <= _UNTIED for own in law.camera.effect)
     if not single:
         law = replace(law, patterns=_patterns(law, held, model, other))
     base = residuals_of(base_law, held, other, seed)

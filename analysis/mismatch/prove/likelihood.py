@@ -132,7 +132,7 @@ def _scored(
     """Return ln P(code) and the normal score of each pixel."""
     law, held, sensed = model.law, model.held, model.sensed
     cells, pattern = law.cells, sensed.patterns[exposure.name]
-    means = means_of_most((codes - pattern)[np.newaxis], held.cfa)
+    means = means_of_most((codes - pattern)[np.newaxis], held.cfa, cells.step_dn)
     level = frame_means(law, held, exposure, means)[0]
     centre = spread_over(level, held.shape, held.cfa) + pattern
     variance = pixel_variance(law, exposure.name, pattern, sensed.groups, held)

@@ -93,10 +93,11 @@ def with_groups(own: Residuals, base: Residuals, held: Held) -> Law:
             groups = virtual.sensed.groups.reshape(-1)
             squares = virtual.standardised(e.name, held) ** 2
             square = np.minimum(squares, _CUT).mean(0).reshape(-1)
+            others = base.standardised(e.name, held) ** 2
             for group in np.unique(groups[groups >= CONSPICUOUS]):
                 which = groups == group
                 of_group = squares.reshape(len(squares), -1)[:, which]
-                square[which] = _scale(of_group, base.standardised(e.name, held) ** 2)
+                square[which] = _scale(of_group, others)
             above = (square - 1) * share.reshape(-1)
             frames = len(virtual.residuals[e.name])
             sums[k, 0] += frames * np.bincount(groups, above, GROUPS)

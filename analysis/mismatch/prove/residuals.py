@@ -63,6 +63,7 @@ def residuals_of(law: Law, held: Held, stacks: Mapping[str, Stack], seed: int) -
     for e in held.exposures:
         fresh = stacks[e.name].fresh
         left = fresh - sensed.patterns[e.name].astype(np.float32)
-        means = spread_over(means_of_most(left, held.cfa), held.shape, held.cfa)
+        most = means_of_most(left, held.cfa, law.cells.step_dn)
+        means = spread_over(most, held.shape, held.cfa)
         residuals[e.name] = (left - means).astype(np.float32)
     return Residuals(law, sensed, residuals)

@@ -38,18 +38,19 @@ def site_means(frames: NDArray[np.generic], cfa: Cfa) -> NDArray[np.float64]:
     )
 
 
-def means_of_most(frames: NDArray[np.generic], cfa: Cfa) -> NDArray[np.float64]:
+def means_of_most(frames: NDArray[np.generic], cfa: Cfa, step: float = 0.0) -> NDArray[np.float64]:
     """Return `site_means` of (frame, row, column) without spikes: (frame, site).
 
-    What lies beyond six standard deviations of the rest is left out, until nothing does.
+    What lies beyond six standard deviations of the rest is left out, until nothing does; and beyond
+    six steps of the codes, of which a rare one beside the others is no spike.
     """
     made = site_means(frames, cfa)
     for site, place in enumerate(site_places(cfa)):
         for number, frame in enumerate(frames):
             own = frame[place].astype(np.float64)
             departure = np.abs(own - made[number, site])
-            while own.size and float(departure.max()) > _FAR * float(own.std()) > 0:
-                own = own[departure <= _FAR * own.std()]
+            while own.size and float(departure.max()) > (far := _FAR * max(own.std(), step)) > 0:
+                own = own[departure <= far]
                 made[number, site] = own.mean()
                 departure = np.abs(own - made[number, site])
     return made

@@ -270,7 +270,7 @@ def test_what_differs_only_beside_what_is_named_is_looked_for(
     monkeypatch.setattr(search, "_best", best)
     if where == "frames":
         whole: Any = Stub(mismatches=[OTHER])
-        monkeypatch.setattr(search, "_of_all_frames", lambda state: found.append(state) or whole)
+        monkeypatch.setattr(search, "_asked_of_all", lambda state: found.append(state) or whole)
     search.run()
     expected = ["first"] if where == "nowhere" else ["first", "second"]
     assert [n.kind for n in search.named] == expected
@@ -281,11 +281,11 @@ def test_all_frames_are_asked_once_something_is_named(monkeypatch: pytest.Monkey
     search = _search(monkeypatch, "", "first")
     state: Any = State.__new__(State)
     state.__dict__.update(mismatches=(), calibrated=Stub(model=Stub(camera=None)))
-    assert search._of_all_frames(state) is state  # nothing is named
+    assert search._asked_of_all(state) is state  # nothing is named
     search.named = [_named("first")]
-    assert search._of_all_frames(state) is state  # of a large recording there are no others
+    assert search._asked_of_all(state) is state  # of a large recording there are no others
     search.whole = Stub()  # type: ignore[assignment] # a stub
     monkeypatch.setattr(
         search_module, "replace", lambda own, **new: Stub(**{**own.__dict__, **new})
     )
-    assert search._of_all_frames(state).mismatches == [SOMETHING]
+    assert search._asked_of_all(state).mismatches == [SOMETHING]

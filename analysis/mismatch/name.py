@@ -96,9 +96,9 @@ class Search(Fitted):
         """Return the final state of a search that goes on from one.
 
         What was dropped had hidden something: it is looked for once more. An effect that explained
-        some of what it changes, while others were missing, may come back. So is what differs only
-        since all was fitted together, or in all frames. `again`: what is named is judged even where
-        nothing is added.
+        some of what it changes, while others were missing, may come back, once. What differs only
+        since all was fitted together, or in all frames, is looked for as well. `again`: what is
+        named is judged even where nothing is added.
         """
         forgiven: dict[str, str] = {}
         for number in range(_ROUNDS):
@@ -110,7 +110,7 @@ class Search(Fitted):
             sought = state.mismatches
             state = self._polished(state)
             taken = list(self.named)
-            state = self._of_all_frames(self._pruned(state))
+            state = self._asked_of_all(self._pruned(state))
             kept = {one.name for one in self.named}
             dropped = [one for one in taken if one.name not in kept]
             if not (dropped or _differ(sought, state.mismatches)) or not state.mismatches:
@@ -120,10 +120,11 @@ class Search(Fitted):
         self.refused |= self.doubted | {name: forgiven[name] for name in sorted(left)}
         return state
 
-    def _of_all_frames(self, state: State) -> State:
+    def _asked_of_all(self, state: State) -> State:
         """Return the state with what differs in all frames of a small recording beside its camera.
 
-        What differs is asked of all frames, what it is of those that are not locked.
+        Whether something differs is asked of all frames, what it is of those that are not locked:
+        effects are judged by the state without, see `_pruned`.
         """
         if not self.named or self.whole is None:
             return state

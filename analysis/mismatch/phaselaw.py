@@ -50,7 +50,8 @@ def strength_of(
 ) -> tuple[float, float]:
     """Return by how much the amplitudes of a kept phase are to be multiplied, and its error.
 
-    The most likely strength, and the curvature there.
+    The most likely strength, and the curvature there. Of strong lines, whose noise tells no more,
+    all strengths are asked at one scale of the noise.
 
     Parameters
     ----------

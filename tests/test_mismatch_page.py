@@ -19,7 +19,7 @@ from analysis.mismatch.finding import Finding, FittedParameter, Gain, Where
 from analysis.mismatch.report.figures import MOST, curves, pictures, series
 from analysis.mismatch.report.figures.spectra import folded
 from analysis.mismatch.report.numbers import measured
-from analysis.mismatch.report.sentences import numbers_in_short
+from analysis.mismatch.report.sentences import numbers_in_short, parameters
 from analysis.mismatch.says import sentence
 from analysis.mismatch.words import effect_says, effect_words
 from dsis.effects import registry
@@ -70,6 +70,20 @@ def test_page_needs_no_network_and_hides_nothing(finding: Finding, tmp_path: Pat
     assert len(page.asked) == drawn + bool(finding.omitted_physics)
     files = sorted(p.suffix for p in (tmp_path / "out" / "figures").iterdir())
     assert files.count(".png") == files.count(".svg") == len(page.asked)
+
+
+def test_terms_that_are_no_part_of_an_effect_are_not_printed() -> None:
+    known = {
+        "offset_dn": FittedParameter(0.0, 0.0),
+        "gain_percent": FittedParameter(0.614, 0.022),
+        "lag_pixels": FittedParameter(7.0, 0.0),
+    }
+    said = parameters(replace(NAMED, parameters=known, choices={"edge": "top"}))
+    assert said.startswith("edge top; gain 0.614")
+    assert "offset" not in said
+    assert "lag 7" in said
+    none_found = {"gain_percent": FittedParameter(0.0, 0.02)}
+    assert "gain" in parameters(replace(NAMED, parameters=none_found))
 
 
 def test_every_kind_of_evidence_has_its_picture() -> None:

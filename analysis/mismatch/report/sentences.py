@@ -109,9 +109,13 @@ def effect_label(effect: OmittedEffect) -> str:
 
 
 def parameters(effect: OmittedEffect) -> str:
-    """Return all parameters of an effect: `edge left; length 6.1 ± 0.2 pixels` say."""
+    """Return the parameters of an effect: `edge left; length 6.1 ± 0.2 pixels` say.
+
+    A term of size 0 that was not fitted is no part of it.
+    """
     words = (f"{name} {value.replace('_', ' ')}" for name, value in effect.choices.items())
-    return "; ".join([*words, *(fitted(name, p) for name, p in effect.parameters.items())])
+    terms = {name: p for name, p in effect.parameters.items() if p.standard_error or np.any(p.value)}
+    return "; ".join([*words, *(fitted(name, p) for name, p in terms.items())])
 
 
 def _in_short(effects: Sequence[OmittedEffect]) -> str:

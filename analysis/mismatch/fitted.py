@@ -185,9 +185,17 @@ class Fitted:
         return self.polished
 
     def _slopes(self, state: State) -> Callable[[Effect], Predictor]:
-        """Return what tells how numbers move with an effect: few simulations, where they do."""
-        least = self.setting.polishing
-        return lambda effect: state.predictor(max(least, replicates_for(self.setting, [effect])))
+        """Return what tells how numbers move with an effect: few simulations, where they do.
+
+        In a large recording, what draws nothing at random moves them alike on every sensor.
+        """
+
+        def asked(effect: Effect) -> Predictor:
+            alike = self.setting.large and not effect.draws
+            least = self.setting.replicates if alike else self.setting.polishing
+            return state.predictor(max(least, replicates_for(self.setting, [effect])))
+
+        return asked
 
     def rebased(self, whole: State) -> State:
         """Return the state before physics was added, its own effects of the sizes recorded.

@@ -1,9 +1,10 @@
 """What mean frames show: fixed patterns, shading, taps, hot pixels, glow."""
 
 from collections.abc import Callable, Mapping, Sequence
-from math import sqrt
+from math import exp, log, sqrt
 
 import numpy as np
+import scipy.optimize
 from numpy.typing import NDArray
 
 from analysis.mismatch.bank.seams import WHOLE
@@ -13,6 +14,7 @@ from analysis.mismatch.clues import Clues, alike
 from analysis.mismatch.layout import Layout, Place
 from dsis.draw import Draw
 from dsis.effects import Effect, Exposure, Image, ReadOut
+from dsis.effects.amp_glow import AmpGlow
 from dsis.grid import PixelGrid
 
 Array = NDArray[np.float64]
@@ -25,6 +27,12 @@ _CLEAR = 3.0  # standard errors from which a tilt is worth a trial
 _JUMP = 0.15  # z of the step where halves meet, of that of their means: some 0.4 of two amplifiers
 _UNEVEN = ("shading", "line_settling", "tap_mismatch")
 _LIGHT_DN = 1000.0  # at which they are looked at: all are in proportion
+_PLACES = (
+    "top_left", "top_right", "bottom_left", "bottom_right", "top", "bottom", "left", "right"
+)  # fmt: skip
+_EXTENTS = (0.05, 0.1, 0.2, 0.35, 0.6)  # of the sensor's longer side, to start from
+_WIDEST_GLOW = 1.0  # of it: what falls off by less is as good as the same everywhere
+_OF_EXTENT = 0.01  # of its logarithm
 _SMOOTH = ("fixed_smooth_variance", "fixed_smooth_tilt", "fixed_smooth_falloff")
 
 
@@ -241,24 +249,40 @@ def _glow(clues: Clues) -> Sequence[Proposal]:
     images = clues.image("time")
     if not images:
         return []
-    best: list[tuple[float, str, float, float]] = []
-    for place in ("top_left", "top_right", "bottom_left", "bottom_right", "top", "bottom", "left",
-                  "right"):  # fmt: skip
-        for extent in (0.05, 0.1, 0.2, 0.35, 0.6):
-            gain = rate = weight = 0.0
-            for channel, (image, noise) in images.items():
-                shape = _glowing(image.shape, place, extent)
-                rest = shape - shape.mean()
-                size = float((rest**2).sum())
-                slope = float((rest * image).sum()) / size
-                gain += max(slope, 0.0) ** 2 * size / noise**2
-                rate += slope / clues.scale("time", channel) / noise**2
-                weight += 1 / noise**2
-            best.append((gain, place, extent, rate / weight))
-    _, place, extent, rate = max(best)
+
+    def fit(place: str, extent: float) -> tuple[float, float]:
+        """Return what the fit gains, and the glow, DN in a second."""
+        gain = rate = weight = 0.0
+        for channel, (image, noise) in images.items():
+            shape = _glowing(image.shape, place, extent)
+            rest = shape - shape.mean()
+            size = float((rest**2).sum())
+            slope = float((rest * image).sum()) / size
+            gain += max(slope, 0.0) ** 2 * size / noise**2
+            rate += slope / clues.scale("time", channel) / noise**2
+            weight += 1 / noise**2
+        return gain, rate / weight
+
+    _, place, start = max(
+        (fit(place, extent)[0], place, extent) for place in _PLACES for extent in _EXTENTS
+    )
+    found = scipy.optimize.minimize_scalar(
+        lambda logarithm: -fit(place, exp(logarithm))[0],
+        bounds=(log(max(start / 2, _EXTENTS[0])), log(min(start * 2, _WIDEST_GLOW))),
+        method="bounded",
+        options={"xatol": _OF_EXTENT},
+    )
+    extent = exp(float(found.x))
+    _, rate = fit(place, extent)
     if rate <= 0:
         return []
-    return proposals("amp_glow", ["dn_per_s"], dn_per_s=rate, place=place, extent=extent)
+    free = ["dn_per_s", "extent"]
+    return proposals("amp_glow", free, dn_per_s=rate, place=place, extent=extent)
+
+
+def _is_glow(_: Layout, effect: Effect) -> bool:
+    """Return whether a glow falls off within the sensor: what does not is current everywhere."""
+    return isinstance(effect, AmpGlow) and effect.extent <= _WIDEST_GLOW
 
 
 def _glowing(shape: tuple[int, ...], place: str, extent: float) -> Array:
@@ -280,5 +304,5 @@ CANDIDATES = (
     Candidate("tap_mismatch", ("half_seam", "parity", "channel_ratio", *_SMOOTH), _taps),
     Candidate("channel_imbalance", ("channel_ratio",), _imbalance),
     Candidate("hot_pixels", ("outlying_pixels", "one_off_outliers", "fixed_pixel_variance"), _hot),
-    Candidate("amp_glow", _SMOOTH, _glow),
+    Candidate("amp_glow", _SMOOTH, _glow, sane=_is_glow),
 )

@@ -22,7 +22,7 @@ COMPARED: dict[str, tuple[str, ...]] = {
     "shading": ("falloff_percent",),
     "dark_current": ("dn_per_s",),
     "hot_pixels": ("pixel_fraction", "mean_dn_per_s"),
-    "amp_glow": ("dn_per_s",),
+    "amp_glow": ("dn_per_s", "extent"),
     "nonlinearity": ("percent_full_scale",),
     "saturation": ("full_well_dn",),
     "quantisation": ("step_dn",),

@@ -7,14 +7,17 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.mismatch.candidates import CANDIDATES
 from analysis.mismatch.contradicted import contradicted
-from analysis.mismatch.feigned import of_another
+from analysis.mismatch.feigned import heated, of_another
 from analysis.mismatch.instance import LINES
 from analysis.mismatch.named import Named
 from analysis.mismatch.predict import Predictor
 from analysis.mismatch.rank import LEAST_GAIN
 from analysis.mismatch.resolved import locates, resolved
 from analysis.mismatch.state import State
+from analysis.mismatch.uneven import uneven
+from analysis.mismatch.unmet import unmet
 from dsis.camera import Camera
 
 Array = NDArray[np.float64]
@@ -89,6 +92,25 @@ class Judge:
         """Return the effect that explains least of what it changes, and why; None: all do."""
         return self._worst(self._needless, some)
 
+    def unmet(self, some: Sequence[Named]) -> tuple[Named, str] | None:
+        """Return the effect that is denied most by what is left, and why; None: none is.
+
+        Lines are seen in whole frames besides.
+        """
+        for one in some:
+            effect = None if one.proposal is None else one.proposal.effect
+            denial = heated(self.state, one.kind) or uneven(self.state, effect)
+            if denial is not None:
+                return one, denial.why
+        left = {m.statistic for m in self.state.mismatches}
+        asked = [
+            one
+            for one in some
+            if one.proposal is not None and one.kind in CANDIDATES and one.kind not in LINES
+            if CANDIDATES[one.kind].hints or left.intersection(CANDIDATES[one.kind].calls)
+        ]
+        return self._worst(self._left_open, asked)
+
     @cached_property
     def _predictor(self) -> Predictor:
         return self.state.predictor()
@@ -120,6 +142,10 @@ class Judge:
         denial = contradicted(self.state, predictor, named.kind, without)
         if denial is None and named.proposal is not None:
             denial = of_another(self.state, named.proposal.effect, predictor.mean(without))
+        return None if denial is None else (denial.share, denial.why)
+
+    def _left_open(self, predictor: Predictor, named: Named) -> Verdict | None:
+        denial = unmet(self.state, named.kind, predictor.mean(self.without(named)))
         return None if denial is None else (denial.share, denial.why)
 
     def _needless(self, predictor: Predictor, named: Named) -> Verdict | None:

@@ -199,7 +199,9 @@ def _unmet(
         return None
     large = whole.setting is final.setting
     state = final if large else State.of(whole.setting, final.camera, step)
-    return Judge(state, partial(search.without, state), search.setting.nulls).unmet(search.named)
+    first = frozenset(m.statistic for m in whole.mismatches)
+    judge = Judge(state, partial(search.without, state), search.setting.nulls)
+    return judge.unmet(search.named, first)
 
 
 def _searched(search: Search, source: Source) -> State:

@@ -2,21 +2,20 @@
 
 from collections.abc import Callable, Container, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.candidates import CANDIDATES
 from analysis.mismatch.contradicted import contradicted
-from analysis.mismatch.feigned import heated, of_another
+from analysis.mismatch.feigned import of_another
 from analysis.mismatch.instance import LINES
 from analysis.mismatch.named import Named
 from analysis.mismatch.predict import Predictor
 from analysis.mismatch.rank import LEAST_GAIN
 from analysis.mismatch.resolved import locates, resolved
 from analysis.mismatch.state import State
-from analysis.mismatch.uneven import uneven
 from analysis.mismatch.unmet import unmet
 from dsis.camera import Camera
 
@@ -25,6 +24,7 @@ LITTLE, NEEDLESS = "it would explain", "the others explain what it would explain
 NOTHING = "it explains nothing that differs for certain"
 INSTEAD = "it takes the place of what"
 _RESOLVED = 0.7  # share of what an effect touches that it must explain
+_OF_TIME = frozenset({"dark_current", "rts"})  # what grows with time denies these, however little
 Verdict = tuple[float, str]
 """The share that an effect explains of what it changes, and why that is too little."""
 
@@ -92,24 +92,20 @@ class Judge:
         """Return the effect that explains least of what it changes, and why; None: all do."""
         return self._worst(self._needless, some)
 
-    def unmet(self, some: Sequence[Named]) -> tuple[Named, str] | None:
+    def unmet(self, some: Sequence[Named], first: frozenset[str]) -> tuple[Named, str] | None:
         """Return the effect that is denied most by what is left, and why; None: none is.
 
+        By what looks like it, by what calls for it, and where nothing did that differed at `first`.
         Lines are seen in whole frames besides.
         """
-        for one in some:
-            effect = None if one.proposal is None else one.proposal.effect
-            denial = heated(self.state, one.kind) or uneven(self.state, effect)
-            if denial is not None:
-                return one, denial.why
         left = {m.statistic for m in self.state.mismatches}
         asked = [
             one
             for one in some
             if one.proposal is not None and one.kind in CANDIDATES and one.kind not in LINES
-            if CANDIDATES[one.kind].hints or left.intersection(CANDIDATES[one.kind].calls)
+            if left or CANDIDATES[one.kind].hints or one.kind in _OF_TIME or not _called(one, first)
         ]
-        return self._worst(self._left_open, asked)
+        return self._worst(partial(self._left_open, first), asked)
 
     @cached_property
     def _predictor(self) -> Predictor:
@@ -144,8 +140,16 @@ class Judge:
             denial = of_another(self.state, named.proposal.effect, predictor.mean(without))
         return None if denial is None else (denial.share, denial.why)
 
-    def _left_open(self, predictor: Predictor, named: Named) -> Verdict | None:
-        denial = unmet(self.state, named.kind, predictor.mean(self.without(named)))
+    def _left_open(
+        self, first: frozenset[str], predictor: Predictor, named: Named
+    ) -> Verdict | None:
+        if named.proposal is None:
+            return None
+        mean = predictor.mean(self.without(named))
+        denial = of_another(self.state, named.proposal.effect, mean)
+        denial = denial or unmet(self.state, named.kind, mean)
+        if denial is None and not (_called(named, first) or locates(self.state, mean)):
+            return 1.0, NOTHING
         return None if denial is None else (denial.share, denial.why)
 
     def _needless(self, predictor: Predictor, named: Named) -> Verdict | None:
@@ -160,3 +164,9 @@ class Judge:
         if named.kind not in LINES and not locates(self.state, mean):  # frames show lines
             return 1.0, NOTHING
         return None
+
+
+def _called(named: Named, first: frozenset[str]) -> bool:
+    """Return whether any of some statistics calls for an effect, or hints at it."""
+    own = CANDIDATES[named.kind]
+    return not first.isdisjoint({*own.calls, *own.hints})

@@ -8,6 +8,7 @@ import pytest
 
 from analysis.mismatch.edged import single
 from analysis.mismatch.prove import Loglik, gain_of, heldout_gain
+from analysis.mismatch.prove.learning import law_of
 from analysis.mismatch.prove.proof import loglik_of
 from analysis.mismatch.prove.sites import means_of_most
 from dsis.cfa import Cfa
@@ -33,6 +34,24 @@ def test_spikes_hide_no_bent_response(seed: int) -> None:
     assert heldout_gain(without, with_, seed=seed).nats_per_frame * frames > np.log(100)
     for dark in ("dark-0", "dark-1"):
         assert np.abs(with_.frames[dark] - without.frames[dark]).max() < 1.0
+
+
+def test_rare_spikes_drown_no_fixed_pattern() -> None:
+    """Of hundreds of standard deviations, a few pixels in ten thousand.
+
+    All others' pattern is known as well as without, and the spikes gain: odds of 100.
+    """
+    spikes = registry()["impulse"](per_megapixel_frame=60.0, mean_dn=1500.0)
+    dsnu = registry()["dsnu"](sigma_dn=1.0)
+    held = held_of(recorded(camera(dsnu, spikes), 60))
+    hit, calm = (law_of(camera(dsnu, *own), held, signals(), 1) for own in ((spikes,), ()))
+    pairs = list(zip(hit.patterns, calm.patterns, strict=True))
+    assert pairs
+    for own, other in pairs:
+        assert np.array_equal(own.gains, other.gains)
+        assert other.gains.max() > 0.1
+    gain = gain_of(held, camera(dsnu, spikes), camera(dsnu), signals(), seed=1)
+    assert gain.nats_per_frame * sum(e.codes.shape[0] for e in held.locked) > np.log(100)
 
 
 def test_row_gains_are_seen_beside_a_full_well() -> None:

@@ -18,7 +18,9 @@ RATE = 4.0  # DN / s
 DARK_CURRENT = registry()["dark_current"](dn_per_s=RATE)
 
 
-def _state(growth_dn: Any, scope: str = "time", *others: Any) -> Any:
+def _state(
+    growth_dn: Any, scope: str = "time", *others: Any, left: tuple[float, float] = (20.0, 0.0)
+) -> Any:
     """Return a state with a map of what grows with time, as it is measured: its mean is zero."""
     images = {}
     for channel in ("R", "B"):
@@ -30,8 +32,11 @@ def _state(growth_dn: Any, scope: str = "time", *others: Any) -> Any:
             seen=SimpleNamespace(images=images),
             layout=SimpleNamespace(regressors=lambda _: regressors),
         ),
-        vector=SimpleNamespace(keys=(Key("fixed_smooth_variance", scope, "", "R"),)),
-        null=SimpleNamespace(departures=lambda _: np.array([20.0])),
+        vector=SimpleNamespace(),
+        null=SimpleNamespace(
+            keys=(Key("fixed_smooth_variance", scope, "", "R"), Key("fixed_smooth_tilt", scope)),
+            departures=lambda _: np.array(left),
+        ),
         camera=SimpleNamespace(effect=(DARK_CURRENT, *others)),
     )
 
@@ -65,9 +70,17 @@ def test_what_is_explained_or_another_effect_denies_nothing() -> None:
 
 
 def test_the_least_of_sixteen_parts_is_low_by_chance() -> None:
-    """Weak and even: chance alone puts a part below half of it in nearly every recording."""
-    state = _state(0.02 * TIME_S)
-    assert uneven(state, registry()["dark_current"](dn_per_s=0.02)) is None
+    """Even, ten errors of a part high: the lowest of them denies nothing."""
+    growth = 10 * NOISE_DN / (64 * 96 / 16 * 2) ** 0.5
+    assert uneven(_state(growth), registry()["dark_current"](dn_per_s=growth / TIME_S)) is None
+
+
+@pytest.mark.parametrize(("left", "denied"), [((0.0, 5.0), True), ((3.0, 3.0), False)])
+def test_beside_a_surface_a_weak_dark_current_is_not_told(left: Any, denied: bool) -> None:
+    """Channels together show the surface; that every part grows, nothing does."""
+    growth = NOISE_DN / (64 * 96 / 16 * 2) ** 0.5
+    weak = registry()["dark_current"](dn_per_s=growth / TIME_S)
+    assert (uneven(_state(growth, left=left), weak) is not None) == denied
 
 
 def test_a_glow_that_has_no_word_stays_unexplained() -> None:

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from analysis.mismatch.candidates import CANDIDATES
 from analysis.mismatch.evidence import Evidence
 from analysis.mismatch.explain import because, changes, explained
-from analysis.mismatch.feigned import heated
 from analysis.mismatch.finding import (
     Alternative,
     Change,
@@ -22,6 +21,7 @@ from analysis.mismatch.finding import (
     Verdict,
 )
 from analysis.mismatch.instance import kind_of
+from analysis.mismatch.judge import Judge
 from analysis.mismatch.model import processes
 from analysis.mismatch.name import Search
 from analysis.mismatch.named import Named, unclear
@@ -139,8 +139,9 @@ def _found(
         final = _undenied(search, final)  # all frames may deny what some showed
         known = changes(whole, final, search.named, partial(search.without, final))
     final, gains = _proven(search, search.settle(final), trial, judged=large)
-    if not large and (denied := _heated(search, final, whole, step)) is not None:
-        final = search.further(search.drop(final, *denied))
+    while (denied := _unmet(search, final, whole, step)) is not None:
+        final = search.drop(final, *denied)
+        final = final if large else search.further(final)
         final, gains = _proven(search, search.settle(final), trial, judged=large)
     scale, users, whole = whole.null.sd, whole.mismatches, search.rebased(whole)
     if users and not whole.mismatches:  # all that differed
@@ -190,15 +191,17 @@ def _proof_without(
     return replace(proof, discrepancies=left, gap_closed=0.0 if whole.mismatches else None)
 
 
-def _heated(
+def _unmet(
     search: Search, final: State, whole: State, step: Callable[[], None]
 ) -> tuple[Named, str] | None:
-    """Return jumping pixels that others deny, which stand out in all frames together; None: not."""
-    jumping = next((one for one in search.named if one.kind == "rts"), None)
-    if jumping is None:
+    """Return the effect that all frames together deny, by what they leave; None: they deny none."""
+    if not search.named:
         return None
-    denial = heated(State.of(whole.setting, final.camera, step), jumping.kind)
-    return None if denial is None else (jumping, denial.why)
+    large = whole.setting is final.setting
+    state = final if large else State.of(whole.setting, final.camera, step)
+    first = frozenset(m.statistic for m in whole.mismatches)
+    judge = Judge(state, partial(search.without, state), search.setting.nulls)
+    return judge.unmet(search.named, first)
 
 
 def _searched(search: Search, source: Source) -> State:

@@ -2,11 +2,12 @@
 
 from collections.abc import Callable, Container, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.mismatch.candidates import CANDIDATES
 from analysis.mismatch.contradicted import contradicted
 from analysis.mismatch.feigned import of_another
 from analysis.mismatch.instance import LINES
@@ -15,6 +16,7 @@ from analysis.mismatch.predict import Predictor
 from analysis.mismatch.rank import LEAST_GAIN
 from analysis.mismatch.resolved import locates, resolved
 from analysis.mismatch.state import State
+from analysis.mismatch.unmet import unmet
 from dsis.camera import Camera
 
 Array = NDArray[np.float64]
@@ -22,6 +24,7 @@ LITTLE, NEEDLESS = "it would explain", "the others explain what it would explain
 NOTHING = "it explains nothing that differs for certain"
 INSTEAD = "it takes the place of what"
 _RESOLVED = 0.7  # share of what an effect touches that it must explain
+_OF_TIME = frozenset({"dark_current", "rts"})  # what grows with time denies these, however little
 Verdict = tuple[float, str]
 """The share that an effect explains of what it changes, and why that is too little."""
 
@@ -89,6 +92,21 @@ class Judge:
         """Return the effect that explains least of what it changes, and why; None: all do."""
         return self._worst(self._needless, some)
 
+    def unmet(self, some: Sequence[Named], first: frozenset[str]) -> tuple[Named, str] | None:
+        """Return the effect that is denied most by what is left, and why; None: none is.
+
+        By what looks like it, by what calls for it, and where nothing did that differed at `first`.
+        Lines are seen in whole frames besides.
+        """
+        left = {m.statistic for m in self.state.mismatches}
+        asked = [
+            one
+            for one in some
+            if one.proposal is not None and one.kind in CANDIDATES and one.kind not in LINES
+            if left or CANDIDATES[one.kind].hints or one.kind in _OF_TIME or not _called(one, first)
+        ]
+        return self._worst(partial(self._left_open, first), asked)
+
     @cached_property
     def _predictor(self) -> Predictor:
         return self.state.predictor()
@@ -122,6 +140,18 @@ class Judge:
             denial = of_another(self.state, named.proposal.effect, predictor.mean(without))
         return None if denial is None else (denial.share, denial.why)
 
+    def _left_open(
+        self, first: frozenset[str], predictor: Predictor, named: Named
+    ) -> Verdict | None:
+        if named.proposal is None:
+            return None
+        mean = predictor.mean(self.without(named))
+        denial = of_another(self.state, named.proposal.effect, mean)
+        denial = denial or unmet(self.state, named.kind, mean)
+        if denial is None and not (_called(named, first) or locates(self.state, mean)):
+            return 1.0, NOTHING
+        return None if denial is None else (denial.share, denial.why)
+
     def _needless(self, predictor: Predictor, named: Named) -> Verdict | None:
         if named.proposal is None:
             return None
@@ -134,3 +164,9 @@ class Judge:
         if named.kind not in LINES and not locates(self.state, mean):  # frames show lines
             return 1.0, NOTHING
         return None
+
+
+def _called(named: Named, first: frozenset[str]) -> bool:
+    """Return whether any of some statistics calls for an effect, or hints at it."""
+    own = CANDIDATES[named.kind]
+    return not first.isdisjoint({*own.calls, *own.hints})

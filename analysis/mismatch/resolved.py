@@ -49,14 +49,22 @@ def resolved(predictor: Predictor, state: State, without: Array) -> float:
 def locates(state: State, without: Array) -> bool:
     """Return whether something differs for certain without an effect, half of which it explains.
 
-    `without` are the numbers predicted without it; they scatter as with it.
+    `without` are the numbers predicted without it.
+    """
+    z, off = off_without(state, without)
+    return bool((np.abs(state.departures[off]) < _LEFT * np.abs(z[off])).any())
+
+
+def off_without(state: State, without: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Return departures from numbers predicted without an effect, and which are certain.
+
+    They scatter as with it.
     """
     null = state.null
     known = null.known & np.isfinite(without)
     bare = replace(null, mean=np.where(known, without, null.mean))
     z, chances = tested(state.setting.layout, bare, state.vector)
-    off = chances < FAMILY
-    return bool((np.abs(state.departures[off]) < _LEFT * np.abs(z[off])).any())
+    return z, chances < FAMILY
 
 
 def explains(state: State, bare: State, base: State, calls: Container[str]) -> bool:

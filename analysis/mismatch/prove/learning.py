@@ -31,6 +31,7 @@ from analysis.mismatch.prove.virtual import (
 )
 from dsis.camera import Camera
 from dsis.effects import Image
+from dsis.effects.impulse import Impulse
 from dsis.measures.spikes import variance_of_most
 
 _UNTIED = frozenset(
@@ -66,9 +67,14 @@ def law_of(camera: Camera, held: Held, signals: Signals, seed: int) -> Law:
     plain = {e.name: _base_law(base, held, e, signals) for e in held.exposures}
     law = Law(camera, cells, plain, (), Conspicuous())
     if camera.effect or camera.saturation_dn or camera.noise.shot != "gaussian":
-        model = virtual_sensor(camera, held, signals, seed)
         other = virtual_sensor(base, held, signals, seed)
-        law = _learned(law, Law(base, cells, plain, (), Conspicuous()), held, model, other, seed)
+        base_law = Law(base, cells, plain, (), Conspicuous())
+        model = virtual_sensor(camera, held, signals, seed)
+        calm, ties = without_spikes(camera), None
+        if calm != camera and not _untied(calm):
+            still = virtual_sensor(calm, held, signals, seed)
+            ties = _learned(replace(law, camera=calm), base_law, held, still, other, seed)
+        law = _learned(law, base_law, held, model, other, seed, ties)
     return law if cells.plain else _with_widths(law, held)
 
 
@@ -96,15 +102,20 @@ def _learned(
     model: Mapping[str, Stack],
     other: Mapping[str, Stack],
     seed: int,
+    ties: Law | None = None,
 ) -> Law:
     """Return the law with all that the virtual sensors show.
 
     Of effects that tie no samples together but by a frame's mean, and leave no mean pattern, no
-    pattern, memory or spectrum is learned: those that spikes of a few virtual frames feign would
-    be. Beside any other effect all is.
+    pattern, memory or spectrum is learned: chance would be, of tails above all. Beside any other
+    effect all is. `ties`: the law of the camera without its spikes, which has those three: spikes
+    of a few virtual frames feign them, or drown a pattern that the training frames tell well but
+    for the few pixels that were hit.
     """
-    single = all(own.measures <= _UNTIED for own in law.camera.effect)
-    if not single:
+    single = ties is not None or _untied(law.camera)
+    if ties is not None:
+        law = replace(law, patterns=ties.patterns)
+    elif not single:
         law = replace(law, patterns=_patterns(law, held, model, other))
     base = residuals_of(base_law, held, other, seed)
     own = residuals_of(law, held, model, seed)
@@ -113,7 +124,31 @@ def _learned(
     own = replace(own, law=with_shapes(own, base, held))
     if not single:
         own = replace(own, law=with_dependence(own, base, held))
-    return with_levels(own.law, held, model, other)
+    law = own.law if ties is None else _tied(own.law, ties)
+    return with_levels(law, held, model, other)
+
+
+def without_spikes(camera: Camera) -> Camera:
+    """Return a camera that nothing hits."""
+    calm = tuple(own for own in camera.effect if not isinstance(own, Impulse))
+    return camera.model_copy(update={"effect": calm})
+
+
+def _untied(camera: Camera) -> bool:
+    """Return whether no effect of a camera ties samples, or leaves a mean pattern."""
+    return all(own.measures <= _UNTIED for own in camera.effect)
+
+
+def _tied(law: Law, ties: Law) -> Law:
+    """Return a law with the memory and the spectra of another."""
+    exposures = {
+        name: replace(
+            own, memory=ties.exposures[name].memory, spectrum=ties.exposures[name].spectrum
+        )
+        for name, own in law.exposures.items()
+    }
+    pixels = replace(law.pixels, memory=ties.pixels.memory)
+    return replace(law, exposures=exposures, pixels=pixels)
 
 
 def _patterns(

@@ -1,0 +1,95 @@
+"""Effects that do not meet what calls for them: it stays, or was never there."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.mismatch.candidates import CANDIDATES
+from analysis.mismatch.contradicted import Denial
+from analysis.mismatch.locate import FAMILY
+from analysis.mismatch.resolved import off_without
+from analysis.mismatch.state import State
+from analysis.mismatch.words import statistic_words
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+_CLEAR = 3.0  # standard deviations: a predicted change that can be seen at all
+_MOST_OF = 0.7  # of the largest change: by that is judged what changes nothing clearly
+_POOLED = "all"
+_LEFT = 0.5  # of what calls for an effect, that may stay where it is explained
+
+
+def unmet(state: State, kind: str, without: Array) -> Denial | None:
+    """Return how an effect is denied by what calls for it; None: it is not.
+
+    `without` are the numbers predicted without the effect.
+    """
+    if kind not in CANDIDATES:
+        return None
+    calls = np.array([key.statistic in CANDIDATES[kind].calls for key in state.null.keys])
+    change = _change(state, without)
+    departures, off = off_without(state, without)
+    if not (off & calls).any() and CANDIDATES[kind].hints:
+        return _unseen(state, calls, change)
+    return _stays(state, calls, change, departures, off)
+
+
+def _stays(state: State, calls: Mask, change: Array, departures: Array, off: Mask) -> Denial | None:
+    """Return how an effect is denied where most of what calls for it stays; None: it is not.
+
+    Of the exposures that it clearly changes, each statistic that calls for it counts with what
+    departs most for certain, without it and with it. Where more than half of them all is left,
+    something else is there that calls for the same, and may be all there is: memory along rows
+    explains no correlation along columns, a smooth bend no noise that leans.
+    """
+    still = calls & (state.chances < FAMILY)
+    own = calls & _beside(state, calls, change)
+    if not (still & own).any():
+        return None
+    before: dict[str, float] = {}
+    after: dict[str, float] = {}
+    for i in np.flatnonzero(own & (still | off)):
+        name = state.null.keys[i].statistic
+        before[name] = max(before.get(name, 0.0), abs(float(departures[i])))
+        after[name] = max(after.get(name, 0.0), abs(float(state.departures[i])))
+    share = 1 - sum(after.values()) / max(sum(before.values()), 1e-9)
+    if share >= 1 - _LEFT:
+        return None
+    most = max(after, key=lambda name: after[name])
+    why = f"it explains {max(share, 0):.0%} of what calls for it: {statistic_words(most)} stays"
+    return Denial(share, why)
+
+
+def _unseen(state: State, calls: Mask, change: Array) -> Denial | None:
+    """Return how an effect that only a hint led to is denied: what calls for it must show it."""
+    count = len(state.vector.keys)  # sums of numbers would count them twice
+    own = np.where(calls, change, 0.0)[:count]
+    left = state.null.departures(state.vector)[:count]
+    size = float(np.linalg.norm(own))
+    seen = float(own @ (left + own)) / size if size else 0.0
+    if seen >= _CLEAR:
+        return None
+    return Denial(0.0, f"what it is known by shows it by {seen:.1f} standard deviations only")
+
+
+def _change(state: State, without: Array) -> Array:
+    """Return what an effect changes in numbers and contrasts, in standard deviations."""
+    null = state.null
+    known = null.known & np.isfinite(without)
+    single = np.where(known, (null.mean - np.where(known, without, 0.0)) / null.sd, 0.0)
+    return np.concatenate([single, null.contrasts.matrix @ single / null.contrast_sd])
+
+
+def _beside(state: State, calls: Mask, change: Array) -> Mask:
+    """Return which numbers change clearly, or are of exposures in which others do.
+
+    A contrast is of the exposures that it sums, what is pooled of all.
+    """
+    size = np.abs(np.where(calls, change, 0.0))
+    touched = size > min(_CLEAR, _MOST_OF * float(size.max(initial=0.0)))
+    keys, members = state.vector.keys, np.abs(state.null.contrasts.matrix) > 0
+    reached = touched[: len(keys)] | members[touched[len(keys) :]].any(0)
+    exposures = {key.exposure for key, own in zip(keys, reached, strict=True) if own}
+    inside = np.array(
+        [key.scope == _POOLED or (key.exposure and key.exposure in exposures) for key in keys], bool
+    )
+    return np.asarray(touched | np.concatenate([inside, (members & inside).any(1)]))

@@ -1,0 +1,83 @@
+"""An effect is not named where what calls for it stays, or was never seen."""
+
+import numpy as np
+import pytest
+
+from analysis.mismatch.candidates import Proposal
+from analysis.mismatch.contradicted import Denial
+from analysis.mismatch.judge import Judge
+from analysis.mismatch.named import Named
+from analysis.mismatch.state import State
+from analysis.mismatch.unmet import unmet
+from dsis.effects import Effect, registry
+from mismatch_recordings import camera, recorded
+from test_mismatch_contradicted import state_of
+
+SHARE = 0.06  # of the noise before, that noise has
+LEVELS = (250.0, 900.0, 1600.0)
+MEMORY = registry()["readout_memory"](fraction=SHARE, lag_pixels=1, along="rows")
+
+
+def _of(
+    effect: Effect, *, rows: float = 0.0, columns: float = 0.0, steps: float = 0.0
+) -> Denial | None:
+    """Return what is said of an effect beside noise made here, DN, with shares of the noise before.
+
+    Along `rows` and `columns`; levels move by `steps`, up and down by turns.
+    """
+    state = _state(effect, rows=rows, columns=columns, steps=steps)
+    without = state.camera.model_copy(update={"effect": ()})
+    return unmet(state, effect.kind, state.predictor(8).mean(without))
+
+
+def _state(effect: Effect, *, rows: float = 0.0, columns: float = 0.0, steps: float = 0.0) -> State:
+    recording = recorded(camera(), 5, rows=96, columns=128, levels=LEVELS)
+    assert recording.stacks is not None
+    rng = np.random.default_rng(9)
+    for i, (name, frames) in enumerate(recording.stacks.items()):
+        level = frames.mean() + steps * (-1) ** i
+        white = rng.normal(0, (0.5 * (level - 64) + 20) ** 0.5, frames.shape)
+        noise = white + rows * np.roll(white, 1, 2) + columns * np.roll(white, 1, 1)
+        recording.stacks[name] = np.rint(level + noise).astype(np.uint16)
+    return state_of(recording, camera(effect))
+
+
+def test_memory_along_rows_explains_no_correlation_along_columns() -> None:
+    said = _of(MEMORY, rows=SHARE, columns=SHARE)
+    assert said is not None
+    assert "stays" in said.why
+
+
+@pytest.mark.parametrize("columns", [0.0, 0.2 * SHARE])
+def test_an_effect_that_explains_most_of_what_calls_for_it_is_not_denied(columns: float) -> None:
+    assert _of(MEMORY, rows=SHARE, columns=columns) is None
+
+
+@pytest.mark.parametrize("there", [False, True])
+def test_what_only_levels_hint_at_must_be_seen_by_what_it_carries_over(there: bool) -> None:
+    """A converter's residue, or levels that something else moves by as much."""
+    residue = registry()["adc_memory"](step_dn=1.0, period_codes=64, at_code=20.0)
+    if not there:
+        assert _of(residue, steps=0.5) is not None
+        return
+    state = state_of(recorded(camera(residue), 5, levels=LEVELS), camera(residue))
+    without = state.camera.model_copy(update={"effect": ()})
+    assert unmet(state, residue.kind, state.predictor(8).mean(without)) is None
+
+
+def _judged(effect: Effect, state: State, first: str) -> tuple[Named, str] | None:
+    named = Named(effect.kind, Proposal(effect, ("fraction",)), {}, 9.0, ())
+    without = state.camera.model_copy(update={"effect": ()})
+    return Judge(state, lambda _: without, 8).unmet([named], frozenset({first}))
+
+
+def test_what_neither_differed_at_first_nor_is_seen_now_names_nothing() -> None:
+    """Too little to be seen: but for what called for it at first, beside what else was there."""
+    little = registry()["readout_memory"](fraction=0.001, lag_pixels=1, along="rows")
+    state = _state(little)
+    assert _judged(little, state, "level") is not None
+    assert _judged(little, state, "correlation_0_1") is None
+
+
+def test_what_shows_for_certain_was_called_for_whatever_differed_at_first() -> None:
+    assert _judged(MEMORY, _state(MEMORY, rows=SHARE), "level") is None

@@ -29,7 +29,7 @@ from analysis.mismatch.rank import (
     ties,
     twin,
 )
-from analysis.mismatch.resolved import explains, opened
+from analysis.mismatch.resolved import calls_alone, explains, gained, opened
 from analysis.mismatch.segments import second_path
 from analysis.mismatch.state import State
 from dsis.camera import Camera
@@ -364,7 +364,8 @@ class Search(Fitted):
         """Drop effects that the others make needless, and those that leave what they touch.
 
         Where few pixels make a number, a model with them allows it anything: what would be left
-        open without an effect, clearly, needs it whatever the likelihoods say.
+        open without an effect, clearly, needs it whatever the likelihoods say. So does a state
+        without it that would take it in at once.
         """
         state = self.asked[1] if self.asked and state is self.asked[0] else state
         needed: set[str] = set()
@@ -386,12 +387,14 @@ class Search(Fitted):
         """Return whether a state without an effect shows that it is no needless one after all."""
         if why == NOTHING:
             kinds = {n.kind for n in self.named if n is not named and n.proposal is not None}
-            kinds |= {one.effect.kind for one in self.own}
-            others = {call for kind in kinds for call in CANDIDATES[kind].calls}
-            own = CANDIDATES[named.kind]
-            calls = frozenset({*own.calls, *own.hints}) - others
+            calls = calls_alone(named.kind, kinds | {one.effect.kind for one in self.own})
             return explains(state, bare, self.base, calls)
-        return why.startswith((NEEDLESS, INSTEAD)) and opened(state, bare)
+        if why.startswith((NEEDLESS, INSTEAD)) and opened(state, bare):
+            return True
+        if why != NEEDLESS or named.proposal is None:
+            return False
+        gain = gained(bare, state.camera, replicates_for(self.setting, [named.proposal.effect]))
+        return gain - len(named.proposal.free) >= self._least(bare, named.kind)
 
     def _judge(self, state: State) -> Judge:
         return Judge(state, lambda named: self.without(state, named), self.setting.nulls)

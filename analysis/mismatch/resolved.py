@@ -1,14 +1,16 @@
 """How much an effect explains of what it changes."""
 
-from collections.abc import Container
+from collections.abc import Container, Iterable
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.mismatch.candidates import CANDIDATES
 from analysis.mismatch.locate import FAMILY, tested
 from analysis.mismatch.predict import Predictor
 from analysis.mismatch.state import State
+from dsis.camera import Camera
 
 Array = NDArray[np.float64]
 _CLEAR = 3.0  # departures below are chance
@@ -75,6 +77,19 @@ def explains(state: State, bare: State, base: State, calls: Container[str]) -> b
     left = {m.statistic: abs(m.z) for m in state.mismatches}
     beside = any(left.get(m.statistic, 0.0) < _LEFT * abs(m.z) for m in bare.mismatches)
     return beside or any(m.statistic in calls and m.statistic not in left for m in base.mismatches)
+
+
+def calls_alone(kind: str, others: Iterable[str]) -> frozenset[str]:
+    """Return the statistics that call for a kind of effect, if only as a hint, and for no other."""
+    own = CANDIDATES[kind]
+    beside = {call for other in others for call in CANDIDATES[other].calls}
+    return frozenset({*own.calls, *own.hints} - beside)
+
+
+def gained(bare: State, camera: Camera, replicates: int) -> float:
+    """Return what a camera gains over that of a state without one of its effects, nats."""
+    predictor = bare.predictor(replicates)
+    return predictor.loglik(predictor.mean(camera)) - predictor.loglik(bare.null.mean)
 
 
 def opened(state: State, bare: State) -> bool:

@@ -364,8 +364,8 @@ class Search(Fitted):
         """Drop effects that the others make needless, and those that leave what they touch.
 
         Where few pixels make a number, a model with them allows it anything: what would be left
-        open without an effect, clearly, needs it whatever the likelihoods say. So does a state
-        without it that would take it in at once.
+        open without an effect, clearly, needs it whatever the likelihoods say. So does what a
+        state without it would take in at once, and half explains.
         """
         state = self.asked[1] if self.asked and state is self.asked[0] else state
         needed: set[str] = set()

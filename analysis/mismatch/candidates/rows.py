@@ -78,5 +78,6 @@ CANDIDATES = (
         ("row_correlation", "slow_row_variance", "row_variance"),
         _row_banding,
         sane=_sane,
+        credited=frozenset({"row_noise"}),
     ),
 )

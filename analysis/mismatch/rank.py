@@ -35,7 +35,12 @@ _BY_FRAME = frozenset({"frame_variance"})
 # in few patches.
 _BY_DRAW = frozenset({"bistable_pattern", "line_flicker", "pink_noise", "smooth_prnu"})
 _BY_BIN = frozenset({"periodic_noise"})  # of few frames: the noise of one bin comes on top
-_TWINS = {"channel_imbalance": "tap_mismatch", "tap_mismatch": "channel_imbalance"}
+_TWINS = {
+    "channel_imbalance": "tap_mismatch",
+    "tap_mismatch": "channel_imbalance",
+    "pink_noise": "row_banding",
+    "row_banding": "pink_noise",
+}
 _FAR_OFF, _LITTLE = 8.0, 0.3  # departures, and the share of one that is little
 _STRONG = 30.0  # gain of log-likelihood beside which what gained little before needs no new trial
 _WORTH_IT = 0.3  # share of it
@@ -303,7 +308,8 @@ def twin(
     """Return the effect that the best cannot be told from, though it must not be named itself.
 
     Amplifiers of even and odd rows, and greens that differ, do nearly the same to a mosaic whose
-    light is of unknown colour: only the noise of each channel tells.
+    light is of unknown colour: only the noise of each channel tells. Over the rows of few small
+    frames 1/f noise and a black level that lags behind are as near.
     """
     other = _TWINS.get(best.kind)
     if other is None or other in vocabulary:

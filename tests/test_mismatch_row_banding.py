@@ -17,6 +17,7 @@ from analysis.mismatch.bank.bands import Bands
 from analysis.mismatch.bank.coherent import SpectrumSums
 from analysis.mismatch.bank.rowlags import ROW_LAGS, row_lags
 from analysis.mismatch.candidates.rows import CANDIDATES
+from analysis.mismatch.feigned import wandering
 from analysis.mismatch.layout import sites
 from analysis.mismatch.settle import would_settle
 from dsis.cfa import Cfa
@@ -236,3 +237,37 @@ def test_without_its_word_its_correlation_stays_unexplained() -> None:
     found = _named(true, camera(), 9, WORDS - {"row_banding"})
     assert {one.effect for one in found.omitted_physics} <= {"row_noise"}
     assert any(m.statistic in ("row_correlation", "slow_row_variance") for m in found.unexplained)
+
+
+def _wander(length: float, drift_dn: float, *, located: bool = True) -> Any:
+    """Return a state with a drift, and slow waves of rows that no effect of it explains.
+
+    Row means of variance 1 / 4 DN^2 whose neighbours are alike, beside white pixels of 20 DN^2:
+    their spectrum by its cosine series.
+    """
+    rows, columns = 96, 128
+    lags, cycles = np.arange(-400, 401), np.arange(1, rows // 2)
+    waves = np.cos(2 * np.pi * np.outer(cycles / rows, lags)) @ np.exp(-np.abs(lags) / length) / 4
+    ratio = 1 + (waves / cycles).sum() / (1 / cycles).sum() / (20 / columns)
+    key = Stub(statistic="slow_row_variance", scope="all")
+    state = Stub(
+        mismatches=[Stub(statistic="row_correlation")] if located else [],
+        setting=Stub(
+            layout=Stub(rows=rows, columns=columns),
+            seen=Stub(levels={"dark": Stub(variance_dn2=20.0), "flat": Stub(variance_dn2=90.0)}),
+        ),
+        vector=Stub(keys=[key], values=np.array([np.cbrt(ratio)])),
+        null=Stub(mean=np.ones(1), known=np.ones(1, bool)),
+    )
+    return state, effect("black_level_drift", sigma_dn=drift_dn)
+
+
+@pytest.mark.parametrize("length", [1.0, 4.0, 12.0])
+def test_frames_do_not_wander_by_what_their_rows_share(length: float) -> None:
+    """The mean of a frame's rows has the mean of their covariances."""
+    own = float(np.sqrt(toeplitz(np.exp(-np.arange(96) / length)).mean() / 4))
+    assert wandering(*_wander(length, own)) is not None
+    assert wandering(*_wander(length, 4 * own)) is None
+    assert wandering(*_wander(length, own, located=False)) is None
+    state, _ = _wander(length, own)
+    assert wandering(state, effect("flicker", sigma_percent=0.1)) is None

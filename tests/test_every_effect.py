@@ -50,6 +50,7 @@ STRONG: dict[str, tuple[dict[str, object], ...]] = {
     "pink_noise": ({"sigma_dn": 20.0},),
     "quantisation": ({"step_dn": 2.5}, {"step_dn": 30.0}, {"step_dn": 100.0}),
     "readout_memory": ({"fraction": 0.8}, {"fraction": 0.8, "lag_pixels": 1, "along": "columns"}),
+    "row_banding": ({"sigma_dn": 20.0}, {"sigma_dn": 20.0, "length_rows": 20.0}),
     "rts": (
         {"amplitude_dn": 60.0, "pixel_fraction": 0.5, "switch_probability": 0.02},
         {"amplitude_dn": 110.0, "pixel_fraction": 0.5, "switch_probability": 0.02},

@@ -161,6 +161,7 @@ PLANTED = {
     "column_prnu": {"sigma_percent": 0.06},
     "adc_memory": {"step_dn": 2.0, "period_codes": 64, "at_code": 20.0},
     "row_noise": {"sigma_dn": 0.4},
+    "row_banding": {"sigma_dn": 0.4, "length_rows": 2.5},
     "rts": {"pixel_fraction": 0.01, "amplitude_dn": 8.0},
     "saturation": {"full_well_dn": 2690.0},
     "shading": {"falloff_percent": 0.4},

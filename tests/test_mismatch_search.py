@@ -276,7 +276,7 @@ def test_beside_what_gains_much_only_what_gained_enough_is_tried_anew(
 
     monkeypatch.setattr(rank, "CANDIDATES", {kind: propose(kind) for kind in gains})
     monkeypatch.setattr(
-        rank, "_means", lambda _s, effects, *_: [np.array([e.sigma_dn]) for e in effects]
+        rank, "_means", lambda _s, some, *_: [np.array([p.effect.sigma_dn]) for p in some]
     )
     monkeypatch.setattr(rank, "alike", lambda *_: False)
     state: Any = SimpleNamespace(

@@ -12,6 +12,7 @@ from analysis.mismatch.recalibrate import code_step
 from analysis.mismatch.state import State
 from analysis.mismatch.uneven import uneven
 from dsis.effects import Effect
+from dsis.effects.black_level_drift import BlackLevelDrift
 from dsis.measures.spikes import variance_of_quartiles
 
 Array = NDArray[np.float64]
@@ -24,6 +25,7 @@ _MOST = 0.5  # of a pattern's variance, or of tails, that something else may fei
 _SCATTER = 1.84  # see `coded`
 _FAR_OFF = 8.0  # standard deviations that no chance has
 _FEW_ELECTRONS = 1.0  # skewness of shot noise of one electron: read noise beside it lessens it
+_SLOW_SHARE = 0.2  # of the power of row means at no frequency, that their slow waves have at least
 _LIKELY = 2.0  # standard deviations that chance may well have
 
 
@@ -41,6 +43,7 @@ def of_another(state: State, effect: Effect, without: Array) -> Denial | None:
         or single(state, effect)
         or fielded(state, effect)
         or heated(state, kind)
+        or wandering(state, effect)
         or uneven(state, effect)
         or coded(state, kind, without)
         or lopsided(state, kind)
@@ -139,6 +142,32 @@ def heated(state: State, kind: str) -> Denial | None:
     )
     why = "pixels that stand out with exposure time are left, whose dark current is noisy too"
     return Denial(0.0, why) if hot else None
+
+
+def wandering(state: State, effect: Effect) -> Denial | None:
+    """Return how a wander of whole frames is denied by rows that are alike; None: it is not.
+
+    A row's offset that lasts over some rows moves the mean of few rows too: by the power of row
+    means at no frequency, over their number. Their slow waves have a fifth of that power or more,
+    for lengths up to an eighth of a hundred rows. Where these are left unexplained, and would do
+    so, no frame may wander by itself.
+    """
+    called = {m.statistic for m in state.mismatches}
+    if not isinstance(effect, BlackLevelDrift) or "row_correlation" not in called:
+        return None
+    seen, layout = state.setting.seen, state.setting.layout
+    waves = [
+        state.vector.values[i] ** 3 - state.null.mean[i] ** 3
+        for i, key in enumerate(state.vector.keys)
+        if key.statistic == "slow_row_variance" and state.null.known[i]
+    ]
+    white = min(level.variance_dn2 for level in seen.levels.values())
+    white /= layout.rows * layout.columns
+    feigned_dn2 = max(waves, default=0.0) * white / _SLOW_SHARE
+    if effect.sigma_dn == 0 or feigned_dn2 < _MOST * effect.sigma_dn**2:
+        return None
+    share = 1 - feigned_dn2 / effect.sigma_dn**2
+    return Denial(share, "rows that are alike for another reason move the frames' means")
 
 
 def coded(state: State, kind: str, without: Array) -> Denial | None:

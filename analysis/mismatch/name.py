@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from analysis.mismatch.candidates import CANDIDATES, measured
 from analysis.mismatch.contradicted import refuted
+from analysis.mismatch.credited import joined, kept_up
 from analysis.mismatch.finding import Mismatch
 from analysis.mismatch.fitted import Fitted
 from analysis.mismatch.instance import LINES, Frequency, frequency_of, instance
@@ -176,6 +177,7 @@ class Search(Fitted):
                 if state is not before:
                     continue
             self._take(added[0])
+            self.named = kept_up(self.named, added[1])
             self.rough |= added[0].gain >= _WEAK
             state = State.of(self.setting, added[1], self.step, draft=True, near=state)
         if not state.mismatches:
@@ -239,7 +241,7 @@ class Search(Fitted):
                 Named("dual_gain", None, error, path.gain, rivals, path.switch_dn),
                 path.camera,
             )
-        camera = with_effects(state.camera, fitted[0].polished.effects) if fitted else None
+        camera = joined(state.camera, fitted[0].polished.effects) if fitted else None
         if camera is None or most < self._least(state, fitted[0].kind):
             return None
         best = fitted[0]

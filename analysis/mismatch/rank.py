@@ -8,9 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.candidates import CANDIDATES, Proposal
+from analysis.mismatch.credited import together
 from analysis.mismatch.instance import Frequency, frequency_of, instance, same_line
 from analysis.mismatch.polish import Polished, needed, polish, stepped, with_effects
 from analysis.mismatch.state import Setting, State
+from dsis.camera import Camera
 from dsis.effects import Effect
 
 Array = NDArray[np.float64]
@@ -33,7 +35,12 @@ _BY_FRAME = frozenset({"frame_variance"})
 # in few patches.
 _BY_DRAW = frozenset({"bistable_pattern", "line_flicker", "pink_noise", "smooth_prnu"})
 _BY_BIN = frozenset({"periodic_noise"})  # of few frames: the noise of one bin comes on top
-_TWINS = {"channel_imbalance": "tap_mismatch", "tap_mismatch": "channel_imbalance"}
+_TWINS = {
+    "channel_imbalance": "tap_mismatch",
+    "tap_mismatch": "channel_imbalance",
+    "pink_noise": "row_banding",
+    "row_banding": "pink_noise",
+}
 _FAR_OFF, _LITTLE = 8.0, 0.3  # departures, and the share of one that is little
 _STRONG = 30.0  # gain of log-likelihood beside which what gained little before needs no new trial
 _WORTH_IT = 0.3  # share of it
@@ -140,9 +147,10 @@ def ranked(
         by_count.setdefault(replicates_for(state.setting, [start.effect]), []).append(start)
     for count, starts in by_count.items():
         asked = state.predictor(count)
-        asked.ready(camera for start in starts for camera in needed(state.camera, [start]))
+        fits = [together(state.camera, start) for start in starts]
+        asked.ready(camera for fit in fits for camera in needed(*fit))
         if state.setting.jobs > 1 and len(starts) > 1:
-            asked.ready(stepped(asked, state.camera, [start]) for start in starts)
+            asked.ready(stepped(asked, *fit) for fit in fits)
     found: list[tuple[str, Proposal, Polished]] = []
     for value, kind, proposal in tried:
         kinds_so_far = {one[0] for one in found}
@@ -152,7 +160,7 @@ def ranked(
         rounds = 1 + len(proposal.free)
         if state.setting.large:  # of a large recording steps are long and sure
             rounds = min(rounds, _ROUNDS)
-        polished = polish(own, state.camera, [proposal], rounds=rounds)
+        polished = polish(own, *together(state.camera, proposal), rounds=rounds)
         step()
         if polished is None or not CANDIDATES[kind].sane(state.setting.layout, polished.effects[0]):
             continue
@@ -222,7 +230,7 @@ def _tried(
             for proposal in CANDIDATES[kind].propose(clues)
             if possible(proposal.effect)
         ]
-        means = _means(state, [proposal.effect for _, proposal in proposed], memory, step)
+        means = _means(state, [proposal for _, proposal in proposed], memory, step)
         for kind in chosen:
             memory.gains.pop(kind, None)
         for (kind, proposal), mean in zip(proposed, means, strict=True):
@@ -242,9 +250,10 @@ def _tried(
 
 
 def _means(
-    state: State, effects: Sequence[Effect], memory: Memory, step: Callable[[], None]
+    state: State, some: Sequence[Proposal], memory: Memory, step: Callable[[], None]
 ) -> list[Array | None]:
     """Return the numbers with each effect added, remembered or simulated; None: it is no camera."""
+    effects = [proposal.effect for proposal in some]
     predictor = state.predictor(state.setting.screening)
     by_frame = state.predictor(replicates_for(state.setting, effects))
     found = [memory.recalled(effect, state) for effect in effects]
@@ -252,7 +261,7 @@ def _means(
         (
             i,
             effect,
-            with_effects(state.camera, [effect]),
+            _with(state.camera, some[i]),
             by_frame if _sparse(state.setting, effect) else predictor,
         )
         for i, effect in enumerate(effects)
@@ -267,6 +276,11 @@ def _means(
             memory.keep(effect, state, mean)
             found[i] = mean
     return found
+
+
+def _with(camera: Camera, proposal: Proposal) -> Camera | None:
+    bare, starts = together(camera, proposal)
+    return with_effects(bare, [start.effect for start in starts])
 
 
 def alike(state: State, one: Array, other: Array) -> bool:
@@ -294,7 +308,8 @@ def twin(
     """Return the effect that the best cannot be told from, though it must not be named itself.
 
     Amplifiers of even and odd rows, and greens that differ, do nearly the same to a mosaic whose
-    light is of unknown colour: only the noise of each channel tells.
+    light is of unknown colour: only the noise of each channel tells. Over the rows of few small
+    frames 1/f noise and a black level that lags behind are as near.
     """
     other = _TWINS.get(best.kind)
     if other is None or other in vocabulary:

@@ -30,6 +30,7 @@ _WORDS = {
     "spectral_peak": "the noise has a periodic component",
     "row_spectrum_peak": "row means have a periodic component",
     "slow_row_variance": "row means have slow waves",
+    "row_correlation": "the means of rows that lie near each other are alike",
     "column_spectrum_peak": "column means have a periodic component",
     "frame_correlation": "the noise of a frame is correlated with that of the next",
     "code_spacing": "not every code occurs: codes come in steps",

@@ -36,6 +36,7 @@ _FOLLOWS = {
     "column_spectrum_peak": frozenset({"column_variance"}),
     "row_spectrum_peak": frozenset({"row_spectrum_peak", "row_variance"}),
     "slow_row_variance": frozenset({"row_spectrum_peak", "row_variance"}),
+    "row_correlation": frozenset({"row_spectrum_peak", "row_variance"}) | _CORRELATIONS,
     "half_seam": _FIXED | _LINES,
     "fixed_edge": _FIXED | _LINES,
     "fixed_smooth_tilt": _FIXED | _LINES,

@@ -27,6 +27,7 @@ STATISTICS = {
     "spectral_peak": "strongest line of the noise spectrum",
     "row_spectrum_peak": "strongest line of the spectrum of row means",
     "slow_row_variance": "slow waves of row means",
+    "row_correlation": "correlation of row means",
     "column_spectrum_peak": "strongest line of the spectrum of column means",
     "phase": "phase of the pattern from frame to frame",
     "frame_correlation": "correlation with the next frame",

@@ -25,6 +25,7 @@ STATISTICS: dict[str, tuple[str, ...]] = {
     "read_noise_spread": ("variance_spread", "variance_persistence", "persistence"),
     "rts": (*_POPULATION, "frame_correlation", "blink", "pixel_lag"),
     "row_noise": ("row_variance", "row_spectrum", "line_correlation"),
+    "row_banding": ("row_correlation", "slow_row", "row_variance", "row_spectrum", "line_corr"),
     "column_noise": ("column_variance", "column_spectrum", "line_correlation"),
     "row_fpn": ("fixed_row", "row_pattern"),
     "column_fpn": ("fixed_column", "column_pattern"),

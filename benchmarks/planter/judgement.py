@@ -17,6 +17,7 @@ COMPARED: dict[str, tuple[str, ...]] = {
     "rts": ("pixel_fraction", "amplitude_dn"),
     "prnu": ("sigma_percent",),
     "smooth_prnu": ("sigma_percent", "length_pixels"),
+    "row_banding": ("sigma_dn", "length_rows"),
     "row_prnu": ("sigma_percent",),
     "column_prnu": ("sigma_percent",),
     "shading": ("falloff_percent",),

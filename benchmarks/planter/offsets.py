@@ -1,6 +1,7 @@
 """Mechanisms that add an offset: fixed or fresh, of lines, frames, pixels, waves."""
 
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -82,11 +83,26 @@ def bistable_pattern(signal: Image, p: Mapping[str, Any], view: View) -> Image:
     return signal + (sign * p["amplitude_dn"] * pattern).astype(np.float32)
 
 
+def row_banding(signal: Image, p: Mapping[str, Any], view: View) -> Image:
+    """Add offsets that rows share: normal deviates under the root of their covariance."""
+    root = _root_of_rows(view.case.rows, p["length_rows"])
+    offsets = root @ view.fresh("banding").standard_normal(view.case.rows)
+    return signal + (p["sigma_dn"] * offsets[:, None]).astype(np.float32)
+
+
+@lru_cache(maxsize=8)
+def _root_of_rows(rows: int, length: float) -> np.ndarray:
+    """Return the triangular root of exp(-distance / length) of all pairs of rows."""
+    y = np.arange(rows)
+    return np.linalg.cholesky(np.exp(-np.abs(y[:, None] - y) / length))
+
+
 OFFSETS: dict[str, Mechanism] = {
     "dsnu": dsnu,
     "row_fpn": row_fpn,
     "column_fpn": column_fpn,
     "row_noise": row_noise,
+    "row_banding": row_banding,
     "column_noise": column_noise,
     "black_level_drift": black_level_drift,
     "pink_noise": pink_noise,

@@ -29,6 +29,7 @@ PLANTABLE = frozenset(
         "readout_memory",
         "rts",
         "row_noise",
+        "row_banding",
         "column_noise",
         "black_level_drift",
         "pink_noise",

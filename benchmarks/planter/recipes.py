@@ -220,6 +220,12 @@ def _blots(rng: np.random.Generator, case: Case) -> dict[str, Any]:
     return {"length_pixels": round(pitch * float(np.exp(rng.uniform(np.log(1.5), np.log(5)))), 2)}
 
 
+def _bands(rng: np.random.Generator, case: Case) -> dict[str, Any]:
+    """Draw over how many rows offsets are alike."""
+    del case
+    return {"length_rows": round(float(np.exp(rng.uniform(np.log(1.5), np.log(8)))), 2)}
+
+
 def _well(case: Case, drawn: Drawn, x: float) -> dict[str, Any]:
     """Return a full well that comes nearer to the brightest flat's mean as x grows."""
     del drawn
@@ -270,6 +276,7 @@ RECIPES: dict[str, Recipe] = {
     "read_noise_spread": Recipe(_none, _plain("log_sigma", 0.3), most=4, fits=_noisy),
     "rts": Recipe(_rts, _reads("amplitude_dn", 4)),
     "row_noise": Recipe(_none, _sigma(0.2)),
+    "row_banding": Recipe(_bands, _sigma(0.2)),
     "column_noise": Recipe(_none, _sigma(0.2)),
     "row_fpn": Recipe(_none, _sigma(0.1)),
     "column_fpn": Recipe(_none, _sigma(0.1)),

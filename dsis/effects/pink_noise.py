@@ -49,8 +49,8 @@ class PinkNoise(Effect):
         }
     )
     confounders: ClassVar[str] = (
-        "row_noise is white from row to row and constant along it; crosstalk falls off after one "
-        "pixel, pink noise as the logarithm of the lag."
+        "row_noise is white from row to row and constant along it, row_banding is constant along "
+        "it; crosstalk falls off after one pixel, pink noise as the logarithm of the lag."
     )
 
     def apply(self, image: Image, exposure: Exposure) -> Image:

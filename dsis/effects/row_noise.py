@@ -24,8 +24,8 @@ class RowNoise(Effect):
     reference: ClassVar[str] = "Wei et al., A physics-based noise formation model (ELD), CVPR 2020"
     measures: ClassVar[frozenset[str]] = frozenset({"row_variance"})
     confounders: ClassVar[str] = (
-        "line_flicker grows with the signal and has one frequency; pink_noise correlates "
-        "neighbouring rows."
+        "line_flicker grows with the signal and has one frequency; pink_noise and row_banding "
+        "correlate neighbouring rows."
     )
 
     def apply(self, image: Image, exposure: Exposure) -> Image:

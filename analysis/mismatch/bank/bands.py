@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.bank.coherent import Peak, largest_line, line_top, slow_lines
+from analysis.mismatch.bank.rowlags import row_lags
 from analysis.mismatch.bank.scalars import Number
 from dsis.measures import Channel
 
@@ -66,7 +67,7 @@ class Bands:
                 self.weight[key][1] += told**2 * seen
 
     def numbers(self) -> dict[str, Number]:
-        """Return the largest of each weighting, and the slow waves of one amplitude in DN."""
+        """Return the largest of each weighting, and what rows share of one amplitude in DN."""
         found = {
             _LABELS[key]: largest_line(self.power[key] / total, total**2 / squares)
             for key, (total, squares) in self.weight.items()
@@ -74,7 +75,9 @@ class Bands:
         }
         total, squares = self.weight[""]
         if total:
-            found["slow_row_variance"] = slow_lines(self.power[""] / total, total**2 / squares)
+            power, degrees = self.power[""] / total, total**2 / squares
+            found["slow_row_variance"] = slow_lines(power, degrees)
+            found |= row_lags(power, degrees)
         return found
 
     def peaks(self) -> dict[str, Peak]:

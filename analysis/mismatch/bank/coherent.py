@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.special import gammaincinv
 
 from analysis.mismatch.bank.lines import log_chance, separate, without_lines
+from analysis.mismatch.bank.rowlags import row_lags
 from analysis.mismatch.bank.scalars import UNKNOWN, Number, ratio_root, score_of_log
 from dsis.measures import Channel
 from dsis.measures.median import median
@@ -169,11 +170,12 @@ class SpectrumSums:
         return white_level(self.power[1:, 1:], max(round(self.degrees("")), 1))
 
     def slow_rows(self) -> dict[str, Number]:
-        """Return the slow waves of row means."""
+        """Return the slow waves of row means, and how alike neighbours are."""
         total = self.weight[""][0]
         if not total:
             return {}
-        return {"slow_row_variance": slow_lines(self.fine[""] / total, self.degrees(""))}
+        power, degrees = self.fine[""] / total, self.degrees("")
+        return {"slow_row_variance": slow_lines(power, degrees), **row_lags(power, degrees)}
 
     def row_peak(self, key: str) -> Peak | None:
         """Return where the spectrum of row means is largest."""

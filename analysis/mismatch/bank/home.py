@@ -74,10 +74,11 @@ _POOLED = frozenset(
         ("row_spectrum_peak", "all", "light"),
         ("column_spectrum_peak", "all", ""),
         ("slow_row_variance", "all", ""),
+        ("row_correlation", "all", "lag 1"),
     }
 )
 _SPECTRA = frozenset({"spectral_peak", "row_spectrum_peak", "column_spectrum_peak",
-                      "slow_row_variance"})  # fmt: skip
+                      "slow_row_variance", "row_correlation"})  # fmt: skip
 _SHARED = frozenset({"fixed_row_variance", "fixed_column_variance", "fixed_smooth_variance",
                      "fixed_smooth_tilt", "fixed_smooth_falloff", "fixed_edge",
                      "fixed_patch_variance", "half_seam"})  # fmt: skip

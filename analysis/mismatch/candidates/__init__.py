@@ -7,13 +7,14 @@ from analysis.mismatch.candidates import (
     patterns,
     pixels,
     response,
+    rows,
     temporal,
 )
 from analysis.mismatch.candidates.candidate import Candidate, Proposal, measured
 
 CANDIDATES: dict[str, Candidate] = {
     candidate.kind: candidate
-    for module in (temporal, pixels, neighbours, patterns, fields, edges, response)
+    for module in (temporal, rows, pixels, neighbours, patterns, fields, edges, response)
     for candidate in module.CANDIDATES
 }
 

@@ -48,6 +48,8 @@ class Candidate:
         Further statistics that suffice for a trial, but need not show the effect.
     sane
         Whether a fitted effect is still one of its kind, and no stand-in for another.
+    credited
+        Effects that may have been credited with what this one explains: fitted with it.
     """
 
     kind: str
@@ -55,6 +57,7 @@ class Candidate:
     propose: Callable[[Clues], Sequence[Proposal]]
     hints: tuple[str, ...] = ()
     sane: Callable[[Layout, Effect], bool] = lambda _layout, _effect: True
+    credited: frozenset[str] = frozenset()
 
 
 def measured(

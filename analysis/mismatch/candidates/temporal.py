@@ -17,8 +17,8 @@ _BY_PLANE = {  # of a mosaic: what alternates in each of its planes
     "columns": ((0.25, 0.0), (0.25, 0.5)),
 }
 # Most of pink noise is in the slowest waves down the frame: one of them may stand out.
-_SLOW = ("row_variance", "slow_row_variance", "line_correlation", "frame_variance",
-         "row_spectrum_peak")  # fmt: skip
+_SLOW = ("row_variance", "slow_row_variance", "row_correlation", "line_correlation",
+         "frame_variance", "row_spectrum_peak")  # fmt: skip
 _BANDS = {"rows of light": "row_spectrum_peak of light", "rows": "row_spectrum_peak"}
 _TINY = 1e-300
 _PARABOLA = 1.3  # scatter of a parabola's top on half bins, over the bound (Rife & Boorstyn, 1974)

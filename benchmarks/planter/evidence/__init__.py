@@ -45,6 +45,7 @@ EVIDENCE: dict[str, Callable[[Look, Parameters], Evidence]] = {
     "read_noise_spread": lambda look, _: maps.noise_spread(look),
     "rts": lambda look, _: maps.noise_outliers(look),
     "row_noise": lambda look, _: temporal.rows(look),
+    "row_banding": lambda look, _: temporal.neighbouring_rows(look),
     "column_noise": lambda look, _: temporal.columns(look),
     "row_fpn": lambda look, _: maps.lines(look, 1),
     "column_fpn": lambda look, _: maps.lines(look, 0),

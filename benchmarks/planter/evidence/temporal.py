@@ -30,6 +30,18 @@ def _lines(z: np.ndarray, axis: int) -> float:
     return float(np.var(lines - lines.mean(1, keepdims=True)))
 
 
+def neighbouring_rows(look: Look) -> Evidence:
+    """Return the covariance of row means one, two and four rows apart, by exposure."""
+
+    def value(z: np.ndarray, apart: int) -> float:
+        lines = z.mean(2)
+        lines = lines - lines.mean(1, keepdims=True)
+        return float(np.mean(lines[:, apart:] * lines[:, :-apart]))
+
+    own = [value(look.residuals[e], apart) for e in look.exposures() for apart in (1, 2, 4)]
+    return Evidence(np.array(own))
+
+
 def frames(look: Look) -> Evidence:
     """Return the variance of frame means, by exposure."""
     return _by_exposure(look, lambda z: float(np.var(z.mean((1, 2), dtype=float))))

@@ -1,0 +1,64 @@
+"""Effects that were credited with what another explains: both are fitted together.
+
+Offsets that rows share are row noise too. Where white row noise was taken in first it has all of
+their variance: beside it nothing that adds to that fits, until it gives some back.
+"""
+
+from collections.abc import Sequence
+from math import sqrt
+
+from analysis.mismatch.candidates import CANDIDATES, Proposal
+from analysis.mismatch.named import Named, renewed
+from analysis.mismatch.polish import with_effects
+from dsis.camera import Camera
+from dsis.effects import Effect
+
+_SIZE = "sigma_dn"
+_KEPT = 0.1  # of its size, that the credited effect keeps at least where a fit starts
+
+
+def together(camera: Camera, proposal: Proposal) -> tuple[Camera, list[Proposal]]:
+    """Return a camera, and what is fitted in it: a proposal, and what was credited with its part.
+
+    The credited effect leaves the camera, and is proposed again with the variance that the other
+    leaves it. Where there is none the camera stays as it is.
+    """
+    place = _credited(camera, proposal.effect)
+    if place is None:
+        return camera, [proposal]
+    credited = camera.effect[place]
+    size, other = (float(getattr(own, _SIZE)) for own in (credited, proposal.effect))
+    left = sqrt(max(size**2 - other**2, (_KEPT * size) ** 2))
+    again = Proposal(type(credited)(**{**credited.model_dump(), _SIZE: left}), (_SIZE,))
+    return _without(camera, place), [proposal, again]
+
+
+def joined(camera: Camera, effects: Sequence[Effect]) -> Camera | None:
+    """Return a camera with what was fitted together; None where it cannot have it."""
+    place = _credited(camera, effects[0]) if len(effects) > 1 else None
+    return with_effects(camera if place is None else _without(camera, place), effects)
+
+
+def kept_up(named: Sequence[Named], camera: Camera) -> list[Named]:
+    """Return the effects named as a camera has them, in which one may have given some back."""
+    found = []
+    for one in named:
+        effect = None if one.proposal is None else one.proposal.effect
+        same = [own for own in camera.effect if effect is not None and own.kind == effect.kind]
+        if one.proposal is None or effect in same or len(same) != 1:
+            found.append(one)
+        else:
+            found.append(renewed(one, one.proposal, same[0], one.errors))
+    return found
+
+
+def _credited(camera: Camera, effect: Effect) -> int | None:
+    """Return which of a camera's effects, the last one, may have an effect's part."""
+    kinds = CANDIDATES[effect.kind].credited
+    places = [i for i, own in enumerate(camera.effect) if own.kind in kinds]
+    return places[-1] if places else None
+
+
+def _without(camera: Camera, place: int) -> Camera:
+    left = (*camera.effect[:place], *camera.effect[place + 1 :])
+    return camera.model_copy(update={"effect": left})

@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 
 from analysis.mismatch.candidates import CANDIDATES, Proposal
+from analysis.mismatch.finding import Mismatch, Where
 from analysis.mismatch.judge import LITTLE, NEEDLESS
 from analysis.mismatch.name import Search
 from analysis.mismatch.named import Named
 from analysis.mismatch.rank import SURE_GAIN
 from analysis.mismatch.resolved import calls_alone, gained
+from analysis.mismatch.state import State
 from dsis.effects import registry
 from mismatch_recordings import camera, recorded
 from test_mismatch_contradicted import state_of
@@ -24,21 +26,24 @@ ROW_NOISE = registry()["row_noise"](sigma_dn=0.8)
 def test_what_a_state_without_an_effect_would_take_in_is_needed(there: bool) -> None:
     recording = recorded(camera(*[ROW_NOISE] * there), 5)
     state, bare = state_of(recording, camera(ROW_NOISE)), state_of(recording, camera())
-    gain = gained(bare, state.camera, 2)
+    gain = gained(state, bare, ROW_NOISE, 2)
     assert gain > 50 if there else gain == 0
     search: Any = SimpleNamespace(setting=state.setting, _least=lambda *_: SURE_GAIN)
     named = Named("row_noise", Proposal(ROW_NOISE, ("sigma_dn",)), {}, gain, ())
-    for why, needed in ((NEEDLESS, there), (f"{LITTLE} 3%", False)):
-        # Nothing differs so clearly that this alone would decide.
-        calm = replace(bare, mismatches=())
-        assert Search._needed(search, state, calm, named, why) is needed
+    for why, left, needed in (
+        (NEEDLESS, (), there),
+        (NEEDLESS, ("row_variance",), False),  # what calls for it stays
+        (NEEDLESS, ("level",), there),  # it says nothing of that
+        (f"{LITTLE} 3%", (), False),
+    ):
+        one, other = _with(state, *left), _with(bare, "row_variance")
+        assert Search._needed(search, one, other, named, why) is needed
 
 
-def test_what_only_scatters_more_explains_nothing() -> None:
-    """Row noise is there; a mean that does not move leaves it, however wide its scatter."""
-    bare = state_of(recorded(camera(ROW_NOISE), 5), camera())
-    weak = registry()["row_noise"](sigma_dn=0.05)
-    assert gained(bare, camera(weak), 2) == 0
+def _with(state: State, *departures: str) -> State:
+    """Return a state in which something differs, not so clearly that this alone would decide."""
+    off = tuple(Mismatch(name, 5.0, 1e-6, Where(), "") for name in departures)
+    return replace(state, mismatches=off)
 
 
 @pytest.mark.parametrize("kind", sorted(CANDIDATES))

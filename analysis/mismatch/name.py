@@ -366,8 +366,7 @@ class Search(Fitted):
         """Drop effects that the others make needless, and those that leave what they touch.
 
         Where few pixels make a number, a model with them allows it anything: what would be left
-        open without an effect, clearly, needs it whatever the likelihoods say. So does what a
-        state without it would take in at once, and half explains.
+        open without an effect, clearly, needs it whatever the likelihoods say.
         """
         state = self.asked[1] if self.asked and state is self.asked[0] else state
         needed: set[str] = set()
@@ -393,10 +392,10 @@ class Search(Fitted):
             return explains(state, bare, self.base, calls)
         if why.startswith((NEEDLESS, INSTEAD)) and opened(state, bare):
             return True
-        if why != NEEDLESS or named.proposal is None:
+        if why != NEEDLESS or (own := named.proposal) is None:
             return False
-        gain = gained(bare, state.camera, replicates_for(self.setting, [named.proposal.effect]))
-        return gain - len(named.proposal.free) >= self._least(bare, named.kind)
+        gain = gained(state, bare, own.effect, replicates_for(self.setting, [own.effect]))
+        return gain - len(own.free) >= self._least(bare, named.kind)
 
     def _judge(self, state: State) -> Judge:
         return Judge(state, lambda named: self.without(state, named), self.setting.nulls)

@@ -10,7 +10,7 @@ from analysis.mismatch.candidates import CANDIDATES
 from analysis.mismatch.locate import FAMILY, tested
 from analysis.mismatch.predict import Predictor
 from analysis.mismatch.state import State
-from dsis.camera import Camera
+from dsis.effects import Effect
 
 Array = NDArray[np.float64]
 _CLEAR = 3.0  # departures below are chance
@@ -86,19 +86,17 @@ def calls_alone(kind: str, others: Iterable[str]) -> frozenset[str]:
     return frozenset({*own.calls, *own.hints} - beside)
 
 
-def gained(bare: State, camera: Camera, replicates: int) -> float:
-    """Return what a camera gains over that of a state without one of its effects, nats.
+def gained(state: State, bare: State, effect: Effect, replicates: int) -> float:
+    """Return what a state gains over one without an effect, as that one predicts it, nats.
 
-    Nothing unless its means, not only that they scatter more, explain half of something that
-    differs there.
+    Nothing unless what calls for the effect differs without it, and does not with it.
     """
-    predictor = bare.predictor(replicates)
-    mean = predictor.mean(camera)
-    z, _ = off_without(bare, mean)
-    off = bare.chances < FAMILY
-    if not (np.abs(z[off]) < _LEFT * np.abs(bare.departures[off])).any():
+    calls = set(CANDIDATES[effect.kind].calls)
+    left, called = (calls & {m.statistic for m in own.mismatches} for own in (state, bare))
+    if left or not called:
         return 0.0
-    return predictor.loglik(mean) - predictor.loglik(bare.null.mean)
+    predictor = bare.predictor(replicates)
+    return predictor.loglik(predictor.mean(state.camera)) - predictor.loglik(bare.null.mean)
 
 
 def opened(state: State, bare: State) -> bool:

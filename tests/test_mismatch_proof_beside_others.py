@@ -54,6 +54,15 @@ def test_rare_spikes_drown_no_fixed_pattern() -> None:
     assert gain.nats_per_frame * sum(e.codes.shape[0] for e in held.locked) > np.log(100)
 
 
+def test_spikes_gain_beside_pixels_that_jump() -> None:
+    """Their far noise is where training frames had it: a spike's is not."""
+    spikes = registry()["impulse"](per_megapixel_frame=60.0, mean_dn=1500.0)
+    rts = registry()["rts"](pixel_fraction=0.01, amplitude_dn=8.0)
+    held = held_of(recorded(camera(rts, spikes), 61))
+    gain = gain_of(held, camera(rts, spikes), camera(rts), signals(), seed=1)
+    assert gain.nats_per_frame * sum(e.codes.shape[0] for e in held.locked) > np.log(100)
+
+
 def test_row_gains_are_seen_beside_a_full_well() -> None:
     rows = registry()["row_prnu"](sigma_percent=0.06)
     held = held_of(recorded(camera(FULL, rows), 7))

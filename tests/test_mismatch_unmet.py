@@ -81,3 +81,23 @@ def test_what_neither_differed_at_first_nor_is_seen_now_names_nothing() -> None:
 
 def test_what_shows_for_certain_was_called_for_whatever_differed_at_first() -> None:
     assert _judged(MEMORY, _state(MEMORY, rows=SHARE), "level") is None
+
+
+def _beside(effect: Effect, other: Effect) -> Denial | None:
+    """Return what is said of an effect that is there, beside another that has no name."""
+    state = state_of(recorded(camera(effect, other), 5, levels=LEVELS), camera(effect))
+    assert state.mismatches
+    without = state.camera.model_copy(update={"effect": ()})
+    return unmet(state, effect.kind, state.predictor(8).mean(without))
+
+
+def test_what_adds_little_to_what_another_makes_is_not_denied() -> None:
+    """An offset of each pixel is all that darks show, and little of what gains do in flats."""
+    dsnu, prnu = registry()["dsnu"](sigma_dn=0.6), registry()["prnu"](sigma_percent=0.5)
+    assert _beside(dsnu, prnu) is None
+
+
+def test_levels_are_not_what_flicker_explains() -> None:
+    """It scatters them; that they are bent besides is another's."""
+    flicker = registry()["flicker"](sigma_percent=0.3)
+    assert _beside(flicker, registry()["nonlinearity"](percent_full_scale=2.0)) is None

@@ -9,11 +9,13 @@ from analysis.mismatch.locate import FAMILY
 from analysis.mismatch.resolved import off_without
 from analysis.mismatch.state import State
 from analysis.mismatch.words import statistic_words
+from dsis.effects import registry
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 _CLEAR = 3.0  # standard deviations: a predicted change that can be seen at all
 _MOST_OF = 0.7  # of the largest change: by that is judged what changes nothing clearly
+_MINOR = 0.3  # share of a departure
 _POOLED = "all"
 _LEFT = 0.5  # of what calls for an effect, that may stay where it is explained
 
@@ -25,7 +27,10 @@ def unmet(state: State, kind: str, without: Array) -> Denial | None:
     """
     if kind not in CANDIDATES:
         return None
-    calls = np.array([key.statistic in CANDIDATES[kind].calls for key in state.null.keys])
+    known = set(CANDIDATES[kind].calls)
+    if "level" not in registry()[kind].measures:
+        known.discard("level")  # which only scatters with it: what stays is another's
+    calls = np.array([key.statistic in known for key in state.null.keys])
     change = _change(state, without)
     departures, off = off_without(state, without)
     if not (off & calls).any() and CANDIDATES[kind].hints:
@@ -42,7 +47,9 @@ def _stays(state: State, calls: Mask, change: Array, departures: Array, off: Mas
     explains no correlation along columns, a smooth bend no noise that leans.
     """
     still = calls & (state.chances < FAMILY)
-    own = calls & _beside(state, calls, change)
+    # Where an effect adds little to a large departure, the rest is another's.
+    main = np.abs(change) >= _MINOR * np.abs(departures)
+    own = calls & _beside(state, np.where(calls & main, change, 0.0))
     if not (still & own).any():
         return None
     before: dict[str, float] = {}
@@ -79,17 +86,21 @@ def _change(state: State, without: Array) -> Array:
     return np.concatenate([single, null.contrasts.matrix @ single / null.contrast_sd])
 
 
-def _beside(state: State, calls: Mask, change: Array) -> Mask:
+def _beside(state: State, change: Array) -> Mask:
     """Return which numbers change clearly, or are of exposures in which others do.
 
-    A contrast is of the exposures that it sums, what is pooled of all.
+    A contrast is of the exposures that have half of its weight, what is pooled of all.
     """
-    size = np.abs(np.where(calls, change, 0.0))
-    touched = size > min(_CLEAR, _MOST_OF * float(size.max(initial=0.0)))
-    keys, members = state.vector.keys, np.abs(state.null.contrasts.matrix) > 0
-    reached = touched[: len(keys)] | members[touched[len(keys) :]].any(0)
-    exposures = {key.exposure for key, own in zip(keys, reached, strict=True) if own}
-    inside = np.array(
-        [key.scope == _POOLED or (key.exposure and key.exposure in exposures) for key in keys], bool
-    )
-    return np.asarray(touched | np.concatenate([inside, (members & inside).any(1)]))
+    keys, matrix = state.vector.keys, state.null.contrasts.matrix
+    touched = _clear(change)
+    single = _clear(np.where([bool(key.exposure) for key in keys], change[: len(keys)], 0.0))
+    exposures = {key.exposure for key, own in zip(keys, single, strict=True) if own}
+    pooled = {_POOLED} if exposures else set()
+    inside = np.array([key.scope in pooled or key.exposure in exposures for key in keys], bool)
+    summed = (matrix**2 * inside).sum(1) >= 0.5 * (matrix**2).sum(1)
+    return np.asarray(touched | np.concatenate([inside, summed]))
+
+
+def _clear(change: Array) -> Mask:
+    size = np.abs(change)
+    return np.asarray(size > min(_CLEAR, _MOST_OF * float(size.max(initial=0.0))))

@@ -34,6 +34,7 @@ from dsis.effects import Image
 from dsis.effects.impulse import Impulse
 from dsis.measures.spikes import variance_of_most
 
+_NOISY = 0.1  # relative excess of variance: chance leaves a group of the virtual sensor 1 % or less
 _UNTIED = frozenset(
     {
         "level",
@@ -74,6 +75,7 @@ def law_of(camera: Camera, held: Held, signals: Signals, seed: int) -> Law:
         if calm != camera and not _untied(calm):
             still = virtual_sensor(calm, held, signals, seed)
             ties = _learned(replace(law, camera=calm), base_law, held, still, other, seed)
+            ties = None if _odd(ties) else ties
         law = _learned(law, base_law, held, model, other, seed, ties)
     return law if cells.plain else _with_widths(law, held)
 
@@ -137,6 +139,15 @@ def without_spikes(camera: Camera) -> Camera:
 def _untied(camera: Camera) -> bool:
     """Return whether no effect of a camera ties samples, or leaves a mean pattern."""
     return all(own.measures <= _UNTIED for own in camera.effect)
+
+
+def _odd(law: Law) -> bool:
+    """Return whether a law has pixels that stand out or are noisy: a hit one is not told from them.
+
+    Then spikes are what training frames make of such pixels: all must be learned with them.
+    """
+    far = any(pattern.outliers is not None for pattern in law.patterns)
+    return far or bool((np.abs(law.pixels.excess) > _NOISY).any())
 
 
 def _tied(law: Law, ties: Law) -> Law:

@@ -388,12 +388,11 @@ class Search(Fitted):
         """Return whether a state without an effect shows that it is no needless one after all."""
         if why == NOTHING:
             kinds = {n.kind for n in self.named if n is not named and n.proposal is not None}
-            calls = calls_alone(named.kind, kinds | {one.effect.kind for one in self.own})
-            return explains(state, bare, self.base, calls)
-        if why.startswith((NEEDLESS, INSTEAD)) and opened(state, bare):
-            return True
-        if why != NEEDLESS or (own := named.proposal) is None:
-            return False
+            kinds |= {one.effect.kind for one in self.own}
+            return explains(state, bare, self.base, calls_alone(named.kind, kinds))
+        own = named.proposal if why == NEEDLESS else None
+        if own is None or opened(state, bare):
+            return why.startswith((NEEDLESS, INSTEAD)) and opened(state, bare)
         gain = gained(state, bare, own.effect, replicates_for(self.setting, [own.effect]))
         return gain - len(own.free) >= self._least(bare, named.kind)
 

@@ -137,11 +137,12 @@ def _found(
     if large:  # simulations of large recordings tell more, and cost more
         search.setting = replace(setting, nulls=setting.drafts)
         final = _undenied(search, final)  # all frames may deny what some showed
+        while (denied := _unmet(search, final, whole, step)) is not None:
+            final = search.drop(final, *denied)
         known = changes(whole, final, search.named, partial(search.without, final))
     final, gains = _proven(search, search.settle(final), trial, judged=large)
-    while (denied := _unmet(search, final, whole, step)) is not None:
-        final = search.drop(final, *denied)
-        final = final if large else search.further(final)
+    while not large and (denied := _unmet(search, final, whole, step)) is not None:
+        final = search.further(search.drop(final, *denied))
         final, gains = _proven(search, search.settle(final), trial, judged=large)
     scale, users, whole = whole.null.sd, whole.mismatches, search.rebased(whole)
     if users and not whole.mismatches:  # all that differed

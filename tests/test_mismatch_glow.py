@@ -47,6 +47,7 @@ def test_a_proposal_has_the_extent_that_the_map_shows(place: str, extent: float)
 
 def test_what_is_darkest_at_an_edge_glows_from_elsewhere() -> None:
     found = GLOW.propose(_clues(-20.0 * TIME_S * _shape("top", 0.2)))
+    assert found
     assert all("top" not in one.effect.model_dump()["place"] for one in found)
 
 

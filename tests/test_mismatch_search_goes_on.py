@@ -7,7 +7,7 @@ import pytest
 
 import analysis.mismatch.name as search_module
 from analysis.mismatch.candidates import Proposal
-from analysis.mismatch.diagnose import _proven
+from analysis.mismatch.confirmed import proven
 from analysis.mismatch.name import Search
 from analysis.mismatch.named import Named, unclear
 from analysis.mismatch.state import State
@@ -131,7 +131,7 @@ def test_numbers_are_settled_where_the_search_has_touched_them(
         }
     )
     trial: Any = gains
-    _proven(search, OPEN, trial, judged=False)
+    proven(search, OPEN, trial, judged=False)
     assert search.calls == calls
 
 
@@ -161,7 +161,7 @@ def test_an_effect_within_its_errors_is_dropped_and_what_it_hid_is_looked_for() 
             name: Stub(certain=True, gain=Stub(nats_per_frame=1.0)) for name in without
         }
     )
-    _, found = _proven(search, OPEN, trial, judged=False)
+    _, found = proven(search, OPEN, trial, judged=False)
     assert sorted(found) == ["found", "kept"]
     assert search.calls == ["further", "settle"]
 
@@ -179,7 +179,7 @@ def test_what_gained_little_is_asked_first_and_the_rest_only_where_all_of_it_sta
     search: Any = Proving([strong])
     search.named = [strong, *search.named]
     trial: Any = Stub(gains=gains)
-    _, found = _proven(search, OPEN, trial, judged=True)
+    _, found = proven(search, OPEN, trial, judged=True)
     assert asked == [["kept", "weak"], ["kept"], ["strong"]]
     assert sorted(found) == ["kept", "strong"]
 

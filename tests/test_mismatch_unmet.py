@@ -45,7 +45,7 @@ def _state(effect: Effect, *, rows: float = 0.0, columns: float = 0.0, steps: fl
 def test_memory_along_rows_explains_no_correlation_along_columns() -> None:
     said = _of(MEMORY, rows=SHARE, columns=SHARE)
     assert said is not None
-    assert "stays" in said.why
+    assert "leaves correlation with the next pixel of the column" in said.why
 
 
 @pytest.mark.parametrize("columns", [0.0, 0.2 * SHARE])
@@ -68,7 +68,7 @@ def test_what_only_levels_hint_at_must_be_seen_by_what_it_carries_over(there: bo
 def _judged(effect: Effect, state: State, first: str) -> tuple[Named, str] | None:
     named = Named(effect.kind, Proposal(effect, ("fraction",)), {}, 9.0, ())
     without = state.camera.model_copy(update={"effect": ()})
-    return Judge(state, lambda _: without, 8).unmet([named], frozenset({first}))
+    return Judge(state, lambda _: without, 8).denied_by_rest([named], frozenset({first}))
 
 
 def test_what_neither_differed_at_first_nor_is_seen_now_names_nothing() -> None:

@@ -55,7 +55,7 @@ def refuted(state: State, predictor: Predictor, kind: str, fitted: Polished) -> 
     What the effect itself draws makes numbers scatter too: of a few spikes in a recording most
     exposures have none, and that denies none elsewhere.
     """
-    camera, mean = joined(state.camera, fitted.effects), fitted.mean
+    camera, mean = joined(state.camera, fitted.effects, state.setting.given), fitted.mean
     _, sd, known = predictor.weights(mean)
     change = np.where(known, predictor.forms * (mean - state.null.mean), 0.0)
     drawn = 0.0 * sd if camera is None else np.where(known, predictor.spread(camera), 0.0)

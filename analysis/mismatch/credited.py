@@ -5,7 +5,7 @@ their variance: beside it nothing that adds to that fits, until it gives some ba
 """
 
 from collections.abc import Sequence
-from math import sqrt
+from math import hypot, sqrt
 
 from analysis.mismatch.candidates import CANDIDATES, Proposal
 from analysis.mismatch.named import Named, renewed
@@ -17,13 +17,14 @@ _SIZE = "sigma_dn"
 _KEPT = 0.1  # of its size, that the credited effect keeps at least where a fit starts
 
 
-def together(camera: Camera, proposal: Proposal) -> tuple[Camera, list[Proposal]]:
+def together(camera: Camera, proposal: Proposal, given: int) -> tuple[Camera, list[Proposal]]:
     """Return a camera, and what is fitted in it: a proposal, and what was credited with its part.
 
     The credited effect leaves the camera, and is proposed again with the variance that the other
-    leaves it. Where there is none the camera stays as it is.
+    leaves it. Where there is none the camera stays as it is, and so do its first effects, as many
+    as are `given`: they are the user's.
     """
-    place = _credited(camera, proposal.effect)
+    place = _credited(camera, proposal.effect, given)
     if place is None:
         return camera, [proposal]
     credited = camera.effect[place]
@@ -33,18 +34,34 @@ def together(camera: Camera, proposal: Proposal) -> tuple[Camera, list[Proposal]
     return _without(camera, place), [proposal, again]
 
 
-def joined(camera: Camera, effects: Sequence[Effect]) -> Camera | None:
+def joined(camera: Camera, effects: Sequence[Effect], given: int) -> Camera | None:
     """Return a camera with what was fitted together; None where it cannot have it."""
-    place = _credited(camera, effects[0]) if len(effects) > 1 else None
+    place = _credited(camera, effects[0], given) if len(effects) > 1 else None
     return with_effects(camera if place is None else _without(camera, place), effects)
 
 
-def kept_up(named: Sequence[Named], camera: Camera) -> list[Named]:
+def given_back(camera: Camera, effect: Effect, given: int) -> Camera:
+    """Return a camera without an effect in which what was credited has its part again.
+
+    Variances add: no effect is to gain what another would explain without it.
+    """
+    place = _credited(camera, effect, given)
+    if place is None:
+        return camera
+    credited = camera.effect[place]
+    size = hypot(float(getattr(credited, _SIZE)), float(getattr(effect, _SIZE)))
+    again = type(credited)(**{**credited.model_dump(), _SIZE: size})
+    effects = (*camera.effect[:place], again, *camera.effect[place + 1 :])
+    return camera.model_copy(update={"effect": effects})
+
+
+def kept_up(named: Sequence[Named], camera: Camera, given: int) -> list[Named]:
     """Return the effects named as a camera has them, in which one may have given some back."""
     found = []
     for one in named:
         effect = None if one.proposal is None else one.proposal.effect
-        same = [own for own in camera.effect if effect is not None and own.kind == effect.kind]
+        own = camera.effect[given:]
+        same = [e for e in own if effect is not None and e.kind == effect.kind]
         if one.proposal is None or effect in same or len(same) != 1:
             found.append(one)
         else:
@@ -52,10 +69,10 @@ def kept_up(named: Sequence[Named], camera: Camera) -> list[Named]:
     return found
 
 
-def _credited(camera: Camera, effect: Effect) -> int | None:
-    """Return which of a camera's effects, the last one, may have an effect's part."""
+def _credited(camera: Camera, effect: Effect, given: int) -> int | None:
+    """Return which of the effects after the user's, the last one, may have an effect's part."""
     kinds = CANDIDATES[effect.kind].credited
-    places = [i for i, own in enumerate(camera.effect) if own.kind in kinds]
+    places = [i for i, own in enumerate(camera.effect) if i >= given and own.kind in kinds]
     return places[-1] if places else None
 
 

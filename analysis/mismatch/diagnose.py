@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.candidates import CANDIDATES
+from analysis.mismatch.confirmed import denied_by_rest, proven, undenied, undenied_by_all
 from analysis.mismatch.evidence import Evidence
 from analysis.mismatch.explain import because, changes, explained
 from analysis.mismatch.finding import (
@@ -21,10 +22,9 @@ from analysis.mismatch.finding import (
     Verdict,
 )
 from analysis.mismatch.instance import kind_of
-from analysis.mismatch.judge import Judge
 from analysis.mismatch.model import processes
 from analysis.mismatch.name import Search
-from analysis.mismatch.named import Named, unclear
+from analysis.mismatch.named import Named
 from analysis.mismatch.observe import observe
 from analysis.mismatch.own import wrong_sizes
 from analysis.mismatch.parameters import parameter_errors
@@ -39,7 +39,7 @@ from analysis.mismatch.split import Split
 from analysis.mismatch.state import Setting, State
 from analysis.mismatch.taking import layout_of
 from analysis.mismatch.thinned import stages
-from analysis.mismatch.trial import Gained, Trial
+from analysis.mismatch.trial import Trial
 from analysis.mismatch.wholecells import whole_cells
 from dsis.blas import one_thread
 from dsis.camera import Camera
@@ -52,7 +52,6 @@ VOCABULARY = frozenset({*CANDIDATES, "dual_gain"})
 _NEAR = 8.0  # of log-likelihood: a rival worth naming a recording that would decide
 _LOCATED = "No physics was looked for: it is only said where recording and model differ."
 _SMALL = 1e6  # samples
-_DOUBTFUL = 30.0  # gain of log-likelihood below which locked frames may not confirm an effect
 
 
 def find_mismatch(
@@ -112,6 +111,7 @@ def _found(
     seen = observe(layout, frames_of, album, keep=True)
     large = layout.large
     setting = Setting.of(layout, seen, split.interpolated, *how)
+    setting = replace(setting, given=len(camera.effect))
     remarks = remarks if words else (*remarks, _LOCATED)
 
     trial = Trial.of(recording, split, source, setting)
@@ -136,14 +136,13 @@ def _found(
     known: dict[str, Array] = {}
     if large:  # simulations of large recordings tell more, and cost more
         search.setting = replace(setting, nulls=setting.drafts)
-        final = _undenied(search, final)  # all frames may deny what some showed
-        while (denied := _unmet(search, final, whole, step)) is not None:
+        final = undenied(search, final)  # all frames may deny what some showed
+        while (denied := denied_by_rest(search, final, whole)) is not None:
             final = search.drop(final, *denied)
         known = changes(whole, final, search.named, partial(search.without, final))
-    final, gains = _proven(search, search.settle(final), trial, judged=large)
-    while not large and (denied := _unmet(search, final, whole, step)) is not None:
-        final = search.further(search.drop(final, *denied))
-        final, gains = _proven(search, search.settle(final), trial, judged=large)
+    final, gains = proven(search, search.settle(final), trial, judged=large)
+    if not large:
+        final, gains = undenied_by_all(search, final, gains, trial, whole)
     scale, users, whole = whole.null.sd, whole.mismatches, search.rebased(whole)
     if users and not whole.mismatches:  # all that differed
         remarks = (*remarks, remark_on_sizes(users))
@@ -192,19 +191,6 @@ def _proof_without(
     return replace(proof, discrepancies=left, gap_closed=0.0 if whole.mismatches else None)
 
 
-def _unmet(
-    search: Search, final: State, whole: State, step: Callable[[], None]
-) -> tuple[Named, str] | None:
-    """Return the effect that all frames together deny, by what they leave; None: they deny none."""
-    if not search.named:
-        return None
-    large = whole.setting is final.setting
-    state = final if large else State.of(whole.setting, final.camera, step)
-    first = frozenset(m.statistic for m in whole.mismatches)
-    judge = Judge(state, partial(search.without, state), search.setting.nulls)
-    return judge.unmet(search.named, first)
-
-
 def _searched(search: Search, source: Source) -> State:
     """Return the final state of a large recording: sought on some of its frames, judged on all.
 
@@ -248,70 +234,6 @@ def _frames_of(
     source: Source, numbers: Mapping[str, Sequence[int]], name: str
 ) -> Iterator[NDArray[np.uint16]]:
     return source.frames(name, numbers[name])
-
-
-def _undenied(search: Search, final: State) -> State:
-    """Drop, one by one, effects that are denied."""
-    while (denied := search.denied(final)) is not None:
-        final = search.drop(final, *denied)
-    return final
-
-
-def _proven(
-    search: Search, final: State, trial: Trial, *, judged: bool
-) -> tuple[State, dict[str, Gain]]:
-    """Drop, one by one, effects that are denied, or whose gain is within its uncertainty.
-
-    `judged`: all frames were asked already which are denied.
-    """
-    while True:
-        final = final if judged else _undenied(search, final)
-        small = next(((one, why) for one in search.named if (why := unclear(one))), None)
-        if small is not None:
-            final = _without(search, final, small, judged=judged)
-            continue
-        gained = _gained(search, final, trial)
-        weak = [
-            named
-            for named in search.named
-            if named.name in gained and not gained[named.name].certain
-        ]
-        if not weak:
-            return final, {name: one.gain for name, one in gained.items()}
-        worst = min(weak, key=lambda named: gained[named.name].gain.nats_per_frame)
-        nats = gained[worst.name].gain.nats_per_frame
-        why = f"gains {nats:.3g} nats per locked frame, no more than chance"
-        final = _without(search, final, (worst, why), judged=judged)
-
-
-def _without(search: Search, final: State, which: tuple[Named, str], *, judged: bool) -> State:
-    """Return the state without an effect; unless all is `judged`, what it hid is looked for."""
-    final = search.drop(final, *which)
-    if judged or not final.mismatches:
-        return final
-    known = [*search.named, *search.own]
-    final = search.further(final)
-    return search.settle(final) if known != [*search.named, *search.own] else final
-
-
-def _gained(search: Search, final: State, trial: Trial) -> dict[str, Gained]:
-    """Return the gains of all effects; of those that chance could feign, where one of them fails.
-
-    What gained little when it was taken in is asked first: the others change with it.
-    """
-    found: dict[str, Gained] = {}
-    little = [named for named in search.named if named.gain < _DOUBTFUL]
-    for some in (little, [named for named in search.named if named not in little]):
-        cameras = _fitted_without(search, final, some)
-        found |= trial.gains(final, cameras)
-        if not all(one.certain for one in found.values()):
-            break
-    return found
-
-
-def _fitted_without(search: Search, final: State, some: Sequence[Named]) -> dict[str, Camera]:
-    """Return the cameras without each of some effects."""
-    return {named.name: search.fitted_without(final, named) for named in some}
 
 
 def _finding(

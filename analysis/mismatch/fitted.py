@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 from analysis.mismatch.candidates import Proposal
+from analysis.mismatch.credited import given_back
 from analysis.mismatch.named import Named, camera_without, renewed
 from analysis.mismatch.own import Own, called, explained, refitted, resized, sizes, without_own
 from analysis.mismatch.polish import polish, with_effects
@@ -103,7 +104,13 @@ class Fitted:
         """Return a state's camera without one of the effects named."""
         if named.proposal is None:
             return state.camera.model_copy(update={"noise": self.base.camera.noise})
-        return camera_without(state.camera, [named.proposal.effect], self.camera)
+        left = camera_without(state.camera, [named.proposal.effect], self.camera)
+        return given_back(left, named.proposal.effect, self.setting.given)
+
+    def _beside(self, named: Named) -> set[str]:
+        """Return the kinds of the other effects named, and of the camera's own of other sizes."""
+        others = {n.kind for n in self.named if n is not named and n.proposal is not None}
+        return others | {one.effect.kind for one in self.own}
 
     def fitted_without(self, state: State, named: Named) -> Camera:
         """Return the camera without one of the effects named, its base numbers fitted once more.

@@ -92,7 +92,9 @@ class Judge:
         """Return the effect that explains least of what it changes, and why; None: all do."""
         return self._worst(self._needless, some)
 
-    def unmet(self, some: Sequence[Named], first: frozenset[str]) -> tuple[Named, str] | None:
+    def denied_by_rest(
+        self, some: Sequence[Named], first: frozenset[str]
+    ) -> tuple[Named, str] | None:
         """Return the effect that is denied most by what is left, and why; None: none is.
 
         By what looks like it, by what calls for it, and where nothing did that differed at `first`.

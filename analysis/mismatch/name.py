@@ -177,7 +177,7 @@ class Search(Fitted):
                 if state is not before:
                     continue
             self._take(added[0])
-            self.named = kept_up(self.named, added[1])
+            self.named = kept_up(self.named, added[1], self.setting.given)
             self.rough |= added[0].gain >= _WEAK
             state = State.of(self.setting, added[1], self.step, draft=True, near=state)
         if not state.mismatches:
@@ -206,6 +206,7 @@ class Search(Fitted):
     def _dropped(self, bare: State, named: Named, why: str) -> State:
         self._refuse(named.kind, None if named.proposal is None else named.proposal.effect, why)
         self.named.remove(named)
+        self.named = kept_up(self.named, bare.camera, self.setting.given)
         self.memory.gains.clear()  # what it hid may gain more than before
         self.sized = set()
         return bare
@@ -241,10 +242,10 @@ class Search(Fitted):
                 Named("dual_gain", None, error, path.gain, rivals, path.switch_dn),
                 path.camera,
             )
-        camera = joined(state.camera, fitted[0].polished.effects) if fitted else None
-        if camera is None or most < self._least(state, fitted[0].kind):
+        if not fitted or most < self._least(state, fitted[0].kind):
             return None
         best = fitted[0]
+        camera = joined(state.camera, best.polished.effects, self.setting.given)
         rivals = tuple((one.kind, best.gain - one.gain) for one in fitted[1:4])
         if path is not None:
             rivals = (*rivals, ("dual_gain", best.gain - path.gain))
@@ -387,12 +388,11 @@ class Search(Fitted):
     def _needed(self, state: State, bare: State, named: Named, why: str) -> bool:
         """Return whether a state without an effect shows that it is no needless one after all."""
         if why == NOTHING:
-            kinds = {n.kind for n in self.named if n is not named and n.proposal is not None}
-            kinds |= {one.effect.kind for one in self.own}
-            return explains(state, bare, self.base, calls_alone(named.kind, kinds))
-        own = named.proposal if why == NEEDLESS else None
-        if own is None or opened(state, bare):
-            return why.startswith((NEEDLESS, INSTEAD)) and opened(state, bare)
+            return explains(state, bare, self.base, calls_alone(named.kind, self._beside(named)))
+        if why.startswith((NEEDLESS, INSTEAD)) and opened(state, bare):
+            return True
+        if why != NEEDLESS or (own := named.proposal) is None:
+            return False
         gain = gained(state, bare, own.effect, replicates_for(self.setting, [own.effect]))
         return gain - len(own.free) >= self._least(bare, named.kind)
 

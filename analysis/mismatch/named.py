@@ -11,7 +11,15 @@ from dsis.effects import Effect
 
 _CLEAR = 3.0  # standard errors of an effect's size that is no chance
 SHAPES = frozenset(
-    {"length_pixels", "gain_length_pixels", "at_code", "period_codes", "full_well_dn", "extent"}
+    {
+        "length_pixels",
+        "gain_length_pixels",
+        "length_rows",
+        "at_code",
+        "period_codes",
+        "full_well_dn",
+        "extent",
+    }
 )
 
 

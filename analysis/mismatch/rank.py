@@ -12,7 +12,6 @@ from analysis.mismatch.credited import together
 from analysis.mismatch.instance import Frequency, frequency_of, instance, same_line
 from analysis.mismatch.polish import Polished, needed, polish, stepped, with_effects
 from analysis.mismatch.state import Setting, State
-from dsis.camera import Camera
 from dsis.effects import Effect
 
 Array = NDArray[np.float64]
@@ -31,9 +30,11 @@ _ALIKE = 0.05  # relative difference of parameters up to which a proposal is an 
 _SPARSE = 4  # times as many simulations
 _BY_FRAME = frozenset({"frame_variance"})
 # A sign: half of the pairs of frames show nothing, half show it twice. A band: one bin's phase.
-# Pink noise: most of it in a frame's mean and in the first few bins. Gains that neighbours share:
-# in few patches.
-_BY_DRAW = frozenset({"bistable_pattern", "line_flicker", "pink_noise", "smooth_prnu"})
+# Pink noise and bands of rows: most of it in a frame's mean and in the first few bins. Gains that
+# neighbours share: in few patches.
+_BY_DRAW = frozenset(
+    {"bistable_pattern", "line_flicker", "pink_noise", "row_banding", "smooth_prnu"}
+)
 _BY_BIN = frozenset({"periodic_noise"})  # of few frames: the noise of one bin comes on top
 _TWINS = {
     "channel_imbalance": "tap_mismatch",
@@ -147,11 +148,12 @@ def ranked(
         by_count.setdefault(replicates_for(state.setting, [start.effect]), []).append(start)
     for count, starts in by_count.items():
         asked = state.predictor(count)
-        fits = [together(state.camera, start) for start in starts]
+        fits = [together(state.camera, start, state.setting.given) for start in starts]
         asked.ready(camera for fit in fits for camera in needed(*fit))
         if state.setting.jobs > 1 and len(starts) > 1:
             asked.ready(stepped(asked, *fit) for fit in fits)
     found: list[tuple[str, Proposal, Polished]] = []
+    given = state.setting.given
     for value, kind, proposal in tried:
         kinds_so_far = {one[0] for one in found}
         if value < best - far or (len(kinds_so_far) >= _MOST and kind not in kinds_so_far):
@@ -160,7 +162,7 @@ def ranked(
         rounds = 1 + len(proposal.free)
         if state.setting.large:  # of a large recording steps are long and sure
             rounds = min(rounds, _ROUNDS)
-        polished = polish(own, *together(state.camera, proposal), rounds=rounds)
+        polished = polish(own, *together(state.camera, proposal, given), rounds=rounds)
         step()
         if polished is None or not CANDIDATES[kind].sane(state.setting.layout, polished.effects[0]):
             continue
@@ -256,12 +258,17 @@ def _means(
     effects = [proposal.effect for proposal in some]
     predictor = state.predictor(state.setting.screening)
     by_frame = state.predictor(replicates_for(state.setting, effects))
-    found = [memory.recalled(effect, state) for effect in effects]
+    fits = [together(state.camera, proposal, state.setting.given) for proposal in some]
+    alone = [len(starts) == 1 for _, starts in fits]  # else the change is another's too
+    found = [
+        memory.recalled(effect, state) if own else None
+        for effect, own in zip(effects, alone, strict=True)
+    ]
     fresh = [
         (
             i,
             effect,
-            _with(state.camera, some[i]),
+            with_effects(fits[i][0], [start.effect for start in fits[i][1]]),
             by_frame if _sparse(state.setting, effect) else predictor,
         )
         for i, effect in enumerate(effects)
@@ -273,14 +280,10 @@ def _means(
         step()
         if camera is not None:
             mean = asked.mean(camera)
-            memory.keep(effect, state, mean)
+            if alone[i]:
+                memory.keep(effect, state, mean)
             found[i] = mean
     return found
-
-
-def _with(camera: Camera, proposal: Proposal) -> Camera | None:
-    bare, starts = together(camera, proposal)
-    return with_effects(bare, [start.effect for start in starts])
 
 
 def alike(state: State, one: Array, other: Array) -> bool:

@@ -6,6 +6,9 @@ _PAIRS = {
     frozenset({"row_noise", "pink_noise"}): "more frames: pink noise correlates successive rows",
     frozenset({"row_noise", "row_banding"}): "more frames: only bands are alike in successive rows",
     frozenset({"pink_noise", "row_banding"}): "more frames: pink noise is alike along rows too",
+    frozenset(
+        {"black_level_drift", "row_banding"}
+    ): "frames of more rows: their means average bands",
     frozenset({"line_flicker", "row_banding"}): "darks: only bands of offsets are there then",
     frozenset({"crosstalk", "brighter_fatter"}): "more signal levels: only one grows with them",
     frozenset({"crosstalk", "spatial_filtering"}): "darks: only a filter correlates read noise",

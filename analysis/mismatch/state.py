@@ -42,6 +42,8 @@ class Setting:
         their comparison and for the parameters of all effects together.
     large
         Whether the recording, of which this may be a part, is large: simulations take long.
+    given
+        How many effects the user's camera has: they come first, those taken in after them.
     """
 
     layout: Layout
@@ -55,6 +57,7 @@ class Setting:
     replicates: int
     polishing: int
     large: bool = False
+    given: int = 0
 
     @classmethod
     def of(

@@ -15,6 +15,7 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 _CLEAR = 3.0  # standard deviations: a predicted change that can be seen at all
 _MOST_OF = 0.7  # of the largest change: by that is judged what changes nothing clearly
+_LEAST_CHANGE = 1.0  # standard deviations: what few simulations show of none
 _MINOR = 0.3  # share of a departure
 _POOLED = "all"
 _LEFT = 0.5  # of what calls for an effect, that may stay where it is explained
@@ -49,7 +50,8 @@ def _stays(state: State, calls: Mask, change: Array, departures: Array, off: Mas
     still = calls & (state.chances < FAMILY)
     # Where an effect adds little to a large departure, the rest is another's.
     main = np.abs(change) >= _MINOR * np.abs(departures)
-    own = calls & _beside(state, np.where(calls & main, change, 0.0))
+    minor = ~main & (np.abs(change) >= _LEAST_CHANGE)
+    own = calls & _beside(state, np.where(calls & main, change, 0.0)) & ~minor
     if not (still & own).any():
         return None
     before: dict[str, float] = {}
@@ -58,11 +60,12 @@ def _stays(state: State, calls: Mask, change: Array, departures: Array, off: Mas
         name = state.null.keys[i].statistic
         before[name] = max(before.get(name, 0.0), abs(float(departures[i])))
         after[name] = max(after.get(name, 0.0), abs(float(state.departures[i])))
-    share = 1 - sum(after.values()) / max(sum(before.values()), 1e-9)
+    left = sum(min(size, before[name]) for name, size in after.items())
+    share = 1 - left / max(sum(before.values()), 1e-9)
     if share >= 1 - _LEFT:
         return None
     most = max(after, key=lambda name: after[name])
-    why = f"it explains {max(share, 0):.0%} of what calls for it: {statistic_words(most)} stays"
+    why = f"it explains {share:.0%} of what calls for it, and leaves {statistic_words(most)}"
     return Denial(share, why)
 
 
@@ -75,7 +78,7 @@ def _unseen(state: State, calls: Mask, change: Array) -> Denial | None:
     seen = float(own @ (left + own)) / size if size else 0.0
     if seen >= _CLEAR:
         return None
-    return Denial(0.0, f"what it is known by shows it by {seen:.1f} standard deviations only")
+    return Denial(0.0, f"its own statistics show it by only {seen:.1f} standard deviations")
 
 
 def _change(state: State, without: Array) -> Array:
@@ -103,4 +106,5 @@ def _beside(state: State, change: Array) -> Mask:
 
 def _clear(change: Array) -> Mask:
     size = np.abs(change)
-    return np.asarray(size > min(_CLEAR, _MOST_OF * float(size.max(initial=0.0))))
+    limit = min(_CLEAR, _MOST_OF * float(size.max(initial=0.0)))
+    return np.asarray(size > max(limit, _LEAST_CHANGE))

@@ -263,7 +263,7 @@ def _glow(clues: Clues) -> Sequence[Proposal]:
             weight += 1 / noise**2
         return gain, rate / weight
 
-    _, place, start = max(
+    most, place, start = max(
         (fit(place, extent)[0], place, extent) for place in _PLACES for extent in _EXTENTS
     )
     found = scipy.optimize.minimize_scalar(
@@ -272,7 +272,7 @@ def _glow(clues: Clues) -> Sequence[Proposal]:
         method="bounded",
         options={"xatol": _OF_EXTENT},
     )
-    extent = exp(float(found.x))
+    extent = exp(float(found.x)) if -found.fun > most else start
     _, rate = fit(place, extent)
     if rate <= 0:
         return []
@@ -281,8 +281,11 @@ def _glow(clues: Clues) -> Sequence[Proposal]:
 
 
 def _is_glow(_: Layout, effect: Effect) -> bool:
-    """Return whether a glow falls off within the sensor: what does not is current everywhere."""
-    return isinstance(effect, AmpGlow) and effect.extent <= _WIDEST_GLOW
+    """Return whether a glow falls off within the sensor, and over more than a few pixels.
+
+    What does not fall off is current everywhere; what reaches few pixels is hot pixels.
+    """
+    return isinstance(effect, AmpGlow) and _EXTENTS[0] / 2 <= effect.extent <= _WIDEST_GLOW
 
 
 def _glowing(shape: tuple[int, ...], place: str, extent: float) -> Array:

@@ -1,0 +1,102 @@
+"""What a search found, confirmed or dropped: by all frames together, and by the locked ones."""
+
+from collections.abc import Sequence
+from functools import partial
+
+from analysis.mismatch.finding import Gain
+from analysis.mismatch.judge import Judge
+from analysis.mismatch.name import Search
+from analysis.mismatch.named import Named, unclear
+from analysis.mismatch.state import State
+from analysis.mismatch.trial import Gained, Trial
+from dsis.camera import Camera
+
+_DOUBTFUL = 30.0  # gain of log-likelihood below which locked frames may not confirm an effect
+
+
+def undenied(search: Search, final: State) -> State:
+    """Drop, one by one, effects that are denied."""
+    while (denied := search.denied(final)) is not None:
+        final = search.drop(final, *denied)
+    return final
+
+
+def denied_by_rest(search: Search, state: State, base: State) -> tuple[Named, str] | None:
+    """Return the effect that all frames together deny, by what they leave; None: they deny none.
+
+    `base` is the state without any.
+    """
+    first = frozenset(m.statistic for m in base.mismatches)
+    judge = Judge(state, partial(search.without, state), search.setting.nulls)
+    return judge.denied_by_rest(search.named, first)
+
+
+def undenied_by_all(
+    search: Search, final: State, gains: dict[str, Gain], trial: Trial, whole: State
+) -> tuple[State, dict[str, Gain]]:
+    """Drop, one by one, what all frames of a small recording deny; see `denied_by_rest`."""
+    while search.named:
+        everything = State.of(whole.setting, final.camera, search.step)
+        denied = denied_by_rest(search, everything, whole)
+        if denied is None:
+            break
+        final = search.further(search.drop(final, *denied))
+        final, gains = proven(search, search.settle(final), trial, judged=False)
+    return final, gains
+
+
+def proven(
+    search: Search, final: State, trial: Trial, *, judged: bool
+) -> tuple[State, dict[str, Gain]]:
+    """Drop, one by one, effects that are denied, or whose gain is within its uncertainty.
+
+    `judged`: all frames were asked already which are denied.
+    """
+    while True:
+        final = final if judged else undenied(search, final)
+        small = next(((one, why) for one in search.named if (why := unclear(one))), None)
+        if small is not None:
+            final = _without(search, final, small, judged=judged)
+            continue
+        gained = _gained(search, final, trial)
+        weak = [
+            named
+            for named in search.named
+            if named.name in gained and not gained[named.name].certain
+        ]
+        if not weak:
+            return final, {name: one.gain for name, one in gained.items()}
+        worst = min(weak, key=lambda named: gained[named.name].gain.nats_per_frame)
+        nats = gained[worst.name].gain.nats_per_frame
+        why = f"gains {nats:.3g} nats per locked frame, no more than chance"
+        final = _without(search, final, (worst, why), judged=judged)
+
+
+def _without(search: Search, final: State, which: tuple[Named, str], *, judged: bool) -> State:
+    """Return the state without an effect; unless all is `judged`, what it hid is looked for."""
+    final = search.drop(final, *which)
+    if judged or not final.mismatches:
+        return final
+    known = [*search.named, *search.own]
+    final = search.further(final)
+    return search.settle(final) if known != [*search.named, *search.own] else final
+
+
+def _gained(search: Search, final: State, trial: Trial) -> dict[str, Gained]:
+    """Return the gains of all effects; of those that chance could feign, where one of them fails.
+
+    What gained little when it was taken in is asked first: the others change with it.
+    """
+    found: dict[str, Gained] = {}
+    little = [named for named in search.named if named.gain < _DOUBTFUL]
+    for some in (little, [named for named in search.named if named not in little]):
+        cameras = _fitted_without(search, final, some)
+        found |= trial.gains(final, cameras)
+        if not all(one.certain for one in found.values()):
+            break
+    return found
+
+
+def _fitted_without(search: Search, final: State, some: Sequence[Named]) -> dict[str, Camera]:
+    """Return the cameras without each of some effects."""
+    return {named.name: search.fitted_without(final, named) for named in some}

@@ -48,7 +48,7 @@ def _search(**values: Any) -> Search:
         {"crosstalk", "spatial_filtering", "readout_memory", "row_noise", "adc_dnl"}
     )
     bare: dict[str, Any] = {
-        "setting": SimpleNamespace(nulls=16, drafts=16, layout=None, large=False),
+        "setting": SimpleNamespace(nulls=16, drafts=16, layout=None, large=False, given=0),
         "camera": SimpleNamespace(effect=()),
         "base": None,
         "vocabulary": vocabulary,
@@ -361,7 +361,7 @@ def test_a_denied_decay_waits_as_others_do_and_leaves_other_edges(
     monkeypatch.setattr(name, "replicates_for", lambda *_: 2)
     layout = SimpleNamespace(channels=("MONO",))
     search = _search(
-        setting=SimpleNamespace(nulls=16, drafts=16, layout=layout, large=False),
+        setting=SimpleNamespace(nulls=16, drafts=16, layout=layout, large=False, given=0),
         vocabulary=frozenset({"line_settling", "row_noise"}),
     )
     assert [one.name for one in search._decided(STATE)] == ["line_settling (top)"]

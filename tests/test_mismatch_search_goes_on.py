@@ -51,7 +51,7 @@ class Scripted(Search):
 
 def _search(monkeypatch: pytest.MonkeyPatch, why: str, *script: str, **more: Any) -> Scripted:
     monkeypatch.setattr(search_module, "State", Stub(of=lambda *_, **__: OPEN))
-    setting: Any = Stub(nulls=16, drafts=16, layout=None, large=False)
+    setting: Any = Stub(nulls=16, drafts=16, layout=None, large=False, given=0)
     base: Any = OPEN
     camera: Any = Stub(effect=())
     made = Scripted(setting, camera, base, frozenset(script), step=lambda: None)
@@ -229,7 +229,7 @@ def test_all_is_fitted_again_once_before_what_is_weak_is_taken_in(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(search_module, "State", Stub(of=lambda *_, **__: FITTED))
-    setting: Any = Stub(nulls=16, drafts=16, layout=None, large=False)
+    setting: Any = Stub(nulls=16, drafts=16, layout=None, large=False, given=0)
     words = frozenset({"strong", "weak", "weaker"})
     nothing: Any = OPEN
     camera: Any = Stub(effect=())

@@ -14,6 +14,7 @@ from dsis.camera import Camera
 from dsis.effects import Effect
 
 _SIZE = "sigma_dn"
+_MAY = frozenset(kind for own in CANDIDATES.values() for kind in own.credited)
 _KEPT = 0.1  # of its size, that the credited effect keeps at least where a fit starts
 
 
@@ -57,16 +58,14 @@ def given_back(camera: Camera, effect: Effect, given: int) -> Camera:
 
 def kept_up(named: Sequence[Named], camera: Camera, given: int) -> list[Named]:
     """Return the effects named as a camera has them, in which one may have given some back."""
-    found = []
-    for one in named:
-        effect = None if one.proposal is None else one.proposal.effect
-        own = camera.effect[given:]
-        same = [e for e in own if effect is not None and e.kind == effect.kind]
-        if one.proposal is None or effect in same or len(same) != 1:
-            found.append(one)
-        else:
-            found.append(renewed(one, one.proposal, same[0], one.errors))
-    return found
+    return [_kept_up(one, camera.effect[given:]) if one.kind in _MAY else one for one in named]
+
+
+def _kept_up(named: Named, effects: Sequence[Effect]) -> Named:
+    same = [own for own in effects if own.kind == named.kind]
+    if named.proposal is None or named.proposal.effect in same or len(same) != 1:
+        return named
+    return renewed(named, named.proposal, same[0], named.errors)
 
 
 def _credited(camera: Camera, effect: Effect, given: int) -> int | None:

@@ -25,7 +25,7 @@ _MOST = 0.5  # of a pattern's variance, or of tails, that something else may fei
 _SCATTER = 1.84  # see `coded`
 _FAR_OFF = 8.0  # standard deviations that no chance has
 _FEW_ELECTRONS = 1.0  # skewness of shot noise of one electron: read noise beside it lessens it
-_SLOW_SHARE = 0.2  # of the power of row means at no frequency, that their slow waves have at least
+_LONGEST = 1 / 8  # of a frame's rows, over which bands are taken to last
 _LIKELY = 2.0  # standard deviations that chance may well have
 
 
@@ -148,9 +148,8 @@ def wandering(state: State, effect: Effect) -> Denial | None:
     """Return how a wander of whole frames is denied by rows that are alike; None: it is not.
 
     A row's offset that lasts over some rows moves the mean of few rows too: by the power of row
-    means at no frequency, over their number. Their slow waves have a fifth of that power or more,
-    for lengths up to an eighth of a hundred rows. Where these are left unexplained, and would do
-    so, no frame may wander by itself.
+    means at no frequency, over their number. Their slow waves have a share of that power. Where
+    these are left unexplained, and would do so, no frame may wander by itself.
     """
     called = {m.statistic for m in state.mismatches}
     if not isinstance(effect, BlackLevelDrift) or "row_correlation" not in called:
@@ -163,11 +162,24 @@ def wandering(state: State, effect: Effect) -> Denial | None:
     ]
     white = min(level.variance_dn2 for level in seen.levels.values())
     white /= layout.rows * layout.columns
-    feigned_dn2 = max(waves, default=0.0) * white / _SLOW_SHARE
+    feigned_dn2 = max(waves, default=0.0) * white / _slow_share(layout.rows)
     if effect.sigma_dn == 0 or feigned_dn2 < _MOST * effect.sigma_dn**2:
         return None
     share = 1 - feigned_dn2 / effect.sigma_dn**2
     return Denial(share, "rows that are alike for another reason move the frames' means")
+
+
+def _slow_share(rows: int) -> float:
+    """Return the share of the power at no frequency that slow waves of a Markov series have.
+
+    With waves of k cycles counted by 1 / k, as the bank counts them; of the longest bands, those
+    of shorter ones have more.
+    """
+    cycles = np.arange(1, max(rows // 2, 1) + 1)
+    alike = float(np.exp(-1 / (_LONGEST * rows)))
+    turn = 2 * np.pi * cycles / rows
+    power = (1 - alike) ** 2 / (1 - 2 * alike * np.cos(turn) + alike**2)
+    return float((power / cycles).sum() / (1 / cycles).sum())
 
 
 def coded(state: State, kind: str, without: Array) -> Denial | None:

@@ -13,10 +13,10 @@ from analysis.mismatch.state import State
 from dsis.effects import Effect
 
 Array = NDArray[np.float64]
-_CLEAR = 3.0  # departures below are chance
-_MOST_OF, _LEAST_CHANGE = 0.7, 1.0
+CLEAR = 3.0  # departures below are chance
+_MOST_OF, LEAST_CHANGE = 0.7, 1.0  # few simulations show of none as much as the second
 _OPEN = 8.0  # standard errors
-_MINOR = 0.3  # share of a departure
+MINOR = 0.3  # share of a departure
 _LEFT = 0.5  # of a departure may be left where it is explained
 
 
@@ -27,25 +27,42 @@ def resolved(predictor: Predictor, state: State, without: Array) -> float:
     within the likelihood's allowance for the effect's form, is explained.
     """
     null = state.null
-    known = null.known & np.isfinite(without)
-    single = np.where(known, (null.mean - without) / null.sd, 0.0)
-    sums = null.contrasts.matrix
-    change = np.concatenate([single, sums @ single / null.contrast_sd])
-    forms = np.concatenate([predictor.forms, np.full(len(sums), float(np.median(predictor.forms)))])
+    change = changed(state, without)
+    sums = change.size - predictor.forms.size
+    forms = np.concatenate([predictor.forms, np.full(sums, float(np.median(predictor.forms)))])
     after = null.departures(state.vector)
-    # What changes nothing clearly is judged by what it changes most.
-    limit = min(_CLEAR, _MOST_OF * float(np.abs(change).max(initial=0.0)))
-    clear = np.abs(change) > max(limit, _LEAST_CHANGE)
+    limit, clear = clearly(change)
     # Where an effect adds little, and rightly, to a large departure, the rest is another's.
     departure = after + change
-    clear &= ~((change * departure > 0) & (np.abs(change) < _MINOR * np.abs(departure)))
+    clear &= ~((change * departure > 0) & (np.abs(change) < MINOR * np.abs(departure)))
     if not clear.any():
         return 0.0
     before = np.abs(departure)[clear]
-    allowed = _CLEAR + 2 * forms[clear] * np.abs(change[clear])
+    allowed = CLEAR + 2 * forms[clear] * np.abs(change[clear])
     left = np.maximum(np.abs(after[clear]) - allowed, 0.0).sum()
     total = np.maximum(np.maximum(before, np.abs(change[clear])) - limit, 0.0).sum()
     return float(1 - left / total) if total > 0 else 0.0
+
+
+def changed(state: State, without: Array) -> Array:
+    """Return what an effect changes in numbers and contrasts, in standard deviations.
+
+    `without` are the numbers predicted without it; where one is unknown nothing changes.
+    """
+    null = state.null
+    known = null.known & np.isfinite(without)
+    single = np.where(known, (null.mean - np.where(known, without, 0.0)) / null.sd, 0.0)
+    return np.concatenate([single, null.contrasts.matrix @ single / null.contrast_sd])
+
+
+def clearly(change: Array) -> tuple[float, NDArray[np.bool_]]:
+    """Return from which size on a change is clear, and which are.
+
+    What changes nothing clearly is judged by what it changes most.
+    """
+    size = np.abs(change)
+    limit = min(CLEAR, _MOST_OF * float(size.max(initial=0.0)))
+    return limit, size > max(limit, LEAST_CHANGE)
 
 
 def locates(state: State, without: Array) -> bool:

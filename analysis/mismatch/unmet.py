@@ -6,17 +6,13 @@ from numpy.typing import NDArray
 from analysis.mismatch.candidates import CANDIDATES
 from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.locate import FAMILY
-from analysis.mismatch.resolved import off_without
+from analysis.mismatch.resolved import CLEAR, LEAST_CHANGE, MINOR, changed, clearly, off_without
 from analysis.mismatch.state import State
 from analysis.mismatch.words import statistic_words
 from dsis.effects import registry
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-_CLEAR = 3.0  # standard deviations: a predicted change that can be seen at all
-_MOST_OF = 0.7  # of the largest change: by that is judged what changes nothing clearly
-_LEAST_CHANGE = 1.0  # standard deviations: what few simulations show of none
-_MINOR = 0.3  # share of a departure
 _POOLED = "all"
 _LEFT = 0.5  # of what calls for an effect, that may stay where it is explained
 
@@ -32,7 +28,7 @@ def unmet(state: State, kind: str, without: Array) -> Denial | None:
     if "level" not in registry()[kind].measures:
         known.discard("level")  # which only scatters with it: what stays is another's
     calls = np.array([key.statistic in known for key in state.null.keys])
-    change = _change(state, without)
+    change = changed(state, without)
     departures, off = off_without(state, without)
     if not (off & calls).any() and CANDIDATES[kind].hints:
         return _unseen(state, calls, change)
@@ -49,8 +45,8 @@ def _stays(state: State, calls: Mask, change: Array, departures: Array, off: Mas
     """
     still = calls & (state.chances < FAMILY)
     # Where an effect adds little to a large departure, the rest is another's.
-    main = np.abs(change) >= _MINOR * np.abs(departures)
-    minor = ~main & (np.abs(change) >= _LEAST_CHANGE)
+    main = np.abs(change) >= MINOR * np.abs(departures)
+    minor = ~main & (np.abs(change) >= LEAST_CHANGE)
     own = calls & _beside(state, np.where(calls & main, change, 0.0)) & ~minor
     if not (still & own).any():
         return None
@@ -76,17 +72,9 @@ def _unseen(state: State, calls: Mask, change: Array) -> Denial | None:
     left = state.null.departures(state.vector)[:count]
     size = float(np.linalg.norm(own))
     seen = float(own @ (left + own)) / size if size else 0.0
-    if seen >= _CLEAR:
+    if seen >= CLEAR:
         return None
     return Denial(0.0, f"its own statistics show it by only {seen:.1f} standard deviations")
-
-
-def _change(state: State, without: Array) -> Array:
-    """Return what an effect changes in numbers and contrasts, in standard deviations."""
-    null = state.null
-    known = null.known & np.isfinite(without)
-    single = np.where(known, (null.mean - np.where(known, without, 0.0)) / null.sd, 0.0)
-    return np.concatenate([single, null.contrasts.matrix @ single / null.contrast_sd])
 
 
 def _beside(state: State, change: Array) -> Mask:
@@ -95,16 +83,10 @@ def _beside(state: State, change: Array) -> Mask:
     A contrast is of the exposures that have half of its weight, what is pooled of all.
     """
     keys, matrix = state.vector.keys, state.null.contrasts.matrix
-    touched = _clear(change)
-    single = _clear(np.where([bool(key.exposure) for key in keys], change[: len(keys)], 0.0))
+    _, touched = clearly(change)
+    _, single = clearly(np.where([bool(key.exposure) for key in keys], change[: len(keys)], 0.0))
     exposures = {key.exposure for key, own in zip(keys, single, strict=True) if own}
     pooled = {_POOLED} if exposures else set()
     inside = np.array([key.scope in pooled or key.exposure in exposures for key in keys], bool)
     summed = (matrix**2 * inside).sum(1) >= 0.5 * (matrix**2).sum(1)
     return np.asarray(touched | np.concatenate([inside, summed]))
-
-
-def _clear(change: Array) -> Mask:
-    size = np.abs(change)
-    limit = min(_CLEAR, _MOST_OF * float(size.max(initial=0.0)))
-    return np.asarray(size > max(limit, _LEAST_CHANGE))

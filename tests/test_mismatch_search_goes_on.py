@@ -90,8 +90,9 @@ class Proving:
 
     def __init__(self, after: list[Named]) -> None:
         self.named, self.after = [_named("kept", x=1.0), _named("weak")], after
-        self.setting, self.own = Stub(jobs=1), []
+        self.setting, self.own, self.least = Stub(jobs=1), [], 2.0
         self.calls: list[str] = []
+        self.bars: list[float] = []
 
     def fitted_without(self, *_: Any) -> None:
         return None
@@ -104,6 +105,7 @@ class Proving:
         return OPEN
 
     def further(self, state: Any) -> Any:
+        self.bars.append(self.least)
         self.named = self.after
         self.calls.append("further")
         return state
@@ -133,6 +135,20 @@ def test_numbers_are_settled_where_the_search_has_touched_them(
     trial: Any = gains
     proven(search, OPEN, trial, judged=False)
     assert search.calls == calls
+
+
+def test_what_is_found_only_without_an_effect_must_gain_more_than_that() -> None:
+    """It stands in its place: what explained the same frames better is not believed either."""
+    search: Any = Proving([_named("kept", x=1.0)])
+    search.named[1] = Named("weak", None, {}, 64.0, ())
+    trial: Any = Stub(
+        gains=lambda _state, without: {
+            name: Stub(certain=name != "weak", gain=Stub(nats_per_frame=-14.0)) for name in without
+        }
+    )
+    proven(search, OPEN, trial, judged=False)
+    assert search.bars == [64.0]
+    assert search.least == 2.0
 
 
 def _decay(gain: float, error: float) -> Named:

@@ -8,7 +8,7 @@ from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.judge import Judge
 from analysis.mismatch.named import Named
 from analysis.mismatch.state import State
-from analysis.mismatch.unmet import unmet
+from analysis.mismatch.unmet import mirrored, unmet
 from dsis.effects import Effect, registry
 from mismatch_recordings import camera, recorded
 from test_mismatch_contradicted import state_of
@@ -46,6 +46,18 @@ def test_memory_along_rows_explains_no_correlation_along_columns() -> None:
     said = _of(MEMORY, rows=SHARE, columns=SHARE)
     assert said is not None
     assert "leaves correlation with the next pixel of the column" in said.why
+
+
+@pytest.mark.parametrize(
+    ("columns", "denied"), [(SHARE, True), (0.2 * SHARE, False), (0.0, False), (-SHARE, False)]
+)
+def test_memory_along_rows_is_denied_by_as_much_along_columns(columns: float, denied: bool) -> None:
+    """What is alike in both directions has one cause; of the other sign it has another."""
+    state = _state(MEMORY, rows=SHARE, columns=columns)
+    without = state.camera.model_copy(update={"effect": ()})
+    said = mirrored(state, MEMORY, state.predictor(8).mean(without))
+    assert (said is not None) == denied
+    assert said is None or "the next pixel of the column" in said.why
 
 
 @pytest.mark.parametrize("columns", [0.0, 0.2 * SHARE])

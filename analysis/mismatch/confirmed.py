@@ -73,12 +73,19 @@ def proven(
 
 
 def _without(search: Search, final: State, which: tuple[Named, str], *, judged: bool) -> State:
-    """Return the state without an effect; unless all is `judged`, what it hid is looked for."""
+    """Return the state without an effect; unless all is `judged`, what it hid is looked for.
+
+    What is found only once that is gone stands in its place: of two that explain the same frames
+    the worse is no better, whatever others say of the first.
+    """
     final = search.drop(final, *which)
     if judged or not final.mismatches:
         return final
     known = [*search.named, *search.own]
+    least = search.least
+    search.least = max(least, which[0].gain)
     final = search.further(final)
+    search.least = least
     return search.settle(final) if known != [*search.named, *search.own] else final
 
 

@@ -16,7 +16,7 @@ from analysis.mismatch.predict import Predictor
 from analysis.mismatch.rank import LEAST_GAIN
 from analysis.mismatch.resolved import locates, resolved
 from analysis.mismatch.state import State
-from analysis.mismatch.unmet import unmet
+from analysis.mismatch.unmet import mirrored, unmet
 from dsis.camera import Camera
 
 Array = NDArray[np.float64]
@@ -149,6 +149,7 @@ class Judge:
             return None
         mean = predictor.mean(self.without(named))
         denial = of_another(self.state, named.proposal.effect, mean)
+        denial = denial or mirrored(self.state, named.proposal.effect, mean)
         denial = denial or unmet(self.state, named.kind, mean)
         if denial is None and not (_called(named, first) or locates(self.state, mean)):
             return 1.0, NOTHING

@@ -9,7 +9,8 @@ from analysis.mismatch.locate import FAMILY
 from analysis.mismatch.resolved import CLEAR, LEAST_CHANGE, MINOR, changed, clearly, off_without
 from analysis.mismatch.state import State
 from analysis.mismatch.words import statistic_words
-from dsis.effects import registry
+from dsis.effects import Effect, registry
+from dsis.effects.readout_memory import ReadoutMemory
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -63,6 +64,33 @@ def _stays(state: State, calls: Mask, change: Array, departures: Array, off: Mas
     most = max(after, key=lambda name: after[name])
     why = f"it explains {share:.0%} of what calls for it, and leaves {statistic_words(most)}"
     return Denial(share, why)
+
+
+def mirrored(state: State, effect: Effect, without: Array) -> Denial | None:
+    """Return how memory along one axis is denied by what is left along the other; None: it is not.
+
+    What makes neighbours alike in both directions, a filter or charge that is shared, would explain
+    both in one word. `without` are the numbers predicted without the memory.
+    """
+    if not isinstance(effect, ReadoutMemory):
+        return None
+    lag = effect.lag_pixels
+    names = [f"correlation_0_{lag}", f"correlation_{lag}_0"]
+    own, across = names if effect.along == "rows" else names[::-1]
+    departures, _ = off_without(state, without)
+    explained = _largest(state, own, departures)
+    left = _largest(state, across, np.where(state.chances < FAMILY, state.departures, 0.0))
+    if left * explained <= 0 or abs(left) < _LEFT * abs(explained):
+        return None
+    share = 1 - min(abs(left / explained), 1.0)
+    return Denial(share, f"as much stays the other way: {statistic_words(across)}")
+
+
+def _largest(state: State, statistic: str, departures: Array) -> float:
+    """Return the largest departure of a statistic, with its sign; 0 where it has none."""
+    own = [z for key, z in zip(state.null.keys, departures, strict=True)
+           if key.statistic == statistic]  # fmt: skip
+    return float(max(own, key=abs, default=0.0))
 
 
 def _unseen(state: State, calls: Mask, change: Array) -> Denial | None:

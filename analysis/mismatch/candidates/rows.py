@@ -36,8 +36,12 @@ def _row_banding(clues: Clues) -> Sequence[Proposal]:
         return []
     share = along[best] / sqrt(squares[best])
     sigma = sqrt(share * _row_mean_variance(clues))
-    free = ["sigma_dn", "length_rows"]
-    return proposals("row_banding", free, sigma_dn=sigma, length_rows=float(lengths[best]))
+    free, length = ["sigma_dn", "length_rows"], float(lengths[best])
+    return [
+        one
+        for size in (sigma, sigma / 2)  # of few frames twice too large is no rare start
+        for one in proposals("row_banding", free, sigma_dn=size, length_rows=length)
+    ]
 
 
 def _left(clues: Clues, lag: int) -> tuple[float, float]:
@@ -51,11 +55,16 @@ def _left(clues: Clues, lag: int) -> tuple[float, float]:
 
 
 def _row_mean_variance(clues: Clues) -> float:
-    """Return the temporal variance of row means where pixels are quietest, DN^2."""
+    """Return the temporal variance of row means where pixels are quietest, DN^2.
+
+    Of whole rows: two channels of a mosaic share one, and what they have in common.
+    """
     place = min(clues.places, key=lambda p: clues.seen.levels[p].variance_dn2)
     ratio, _ = clues.seen.scalars[place]["row_variance"]
-    white = clues.seen.levels[place].variance_dn2 / clues.shape(place[1])[1]
-    return white * max(ratio**3, 1.0) if np.isfinite(ratio) else white
+    variance = clues.seen.levels[place].variance_dn2
+    common = variance / clues.shape(place[1])[1] * max(ratio**3 - 1, 0.0)
+    white = variance / clues.layout.columns
+    return white + common if np.isfinite(ratio) else white
 
 
 def _shortest() -> float:

@@ -77,11 +77,12 @@ def test_terms_that_are_no_part_of_an_effect_are_not_printed() -> None:
         "offset_dn": FittedParameter(0.0, 0.0),
         "gain_percent": FittedParameter(0.614, 0.022),
         "lag_pixels": FittedParameter(7.0, 0.0),
+        "length_rows": FittedParameter(2.33, 0.2),
     }
     said = parameters(replace(NAMED, parameters=known, choices={"edge": "top"}))
     assert said.startswith("edge top; gain 0.614")
     assert "offset" not in said
-    assert "lag 7" in said
+    assert "lag 7 pixels; length 2.33 ± 0.20 rows" in said
     none_found = {"gain_percent": FittedParameter(0.0, 0.02)}
     assert "gain" in parameters(replace(NAMED, parameters=none_found))
 

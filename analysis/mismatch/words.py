@@ -78,6 +78,7 @@ UNITS = {  # ends of parameter names; the longest that fits
     "percent_full_scale": "% of full scale",
     "lsb": "LSB",
     "pixels": "pixels",
+    "rows": "rows",
     "cycles_per_frame": "cycles per frame",
     "frequency": "cycles/pixel",
     "frequency_x": "cycles/pixel",

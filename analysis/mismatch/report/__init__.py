@@ -105,6 +105,7 @@ def render(
         "origin": [line for line in origin.splitlines() if line],
         "effects": [(e, parameters(e)) for e in finding.omitted_physics],
         "differences": differences[:_FIRST_PAGE],
+        "several": any(one.count > 1 for one in differences[:_FIRST_PAGE]),
         "more": len(differences) - _FIRST_PAGE,
         "mismatches": strongest(finding.mismatches),
         "unexplained": strongest(finding.unexplained),

@@ -82,7 +82,7 @@ def parameter_words(name: str) -> str:
     alone = ("dn_per_s", "per_dn", "percent_full_scale", "cycles_per_frame", "per_megapixel_frame")
     if name in alone:
         return ""
-    for end in ("_dn_per_s", "_percent_full_scale", "_dn", "_percent", "_lsb", "_pixels"):
+    for end in ("_dn_per_s", "_percent_full_scale", "_dn", "_percent", "_lsb", "_pixels", "_rows"):
         if name.endswith(end):
             return name.removesuffix(end).replace("_", " ")
     return name.replace("_", " ")

@@ -21,8 +21,8 @@ def test_temporal_effects_change_from_frame_to_frame_and_fixed_ones_do_not() -> 
     read_out = camera_with().model_copy(update={"cfa": Cfa.RGGB}).read_out
     temporal = {
         "bistable_pattern", "black_level_drift", "column_noise", "flicker", "impulse",
-        "line_flicker", "periodic_noise", "pink_noise", "row_noise", "rts",
-    }  # fmt: skip
+        "line_flicker", "periodic_noise", "pink_noise", "row_banding", "row_noise",
+    "rts", }  # fmt: skip
 
     def made(effect: Effect, frame: int, sensor: int) -> np.ndarray:
         exposure = Exposure(

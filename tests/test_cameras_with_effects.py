@@ -22,7 +22,8 @@ def test_temporal_effects_change_from_frame_to_frame_and_fixed_ones_do_not() -> 
     temporal = {
         "bistable_pattern", "black_level_drift", "column_noise", "flicker", "impulse",
         "line_flicker", "periodic_noise", "pink_noise", "row_banding", "row_noise",
-    "rts", }  # fmt: skip
+        "rts",
+    }  # fmt: skip
 
     def made(effect: Effect, frame: int, sensor: int) -> np.ndarray:
         exposure = Exposure(

@@ -6,8 +6,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.mismatch.observe import observe
 from analysis.mismatch.prove import hold
 from analysis.mismatch.prove.held import Held
+from analysis.mismatch.source import Source
+from analysis.mismatch.split import Split
+from analysis.mismatch.state import Setting, State
+from analysis.mismatch.taking import layout_of
 from dsis.camera import BaseNoise, Camera, Segment
 from dsis.cfa import Cfa
 from dsis.effects import Effect
@@ -116,3 +121,13 @@ def held_of(recording: Recording, locked: tuple[int, ...] = LOCKED) -> Held:
 def signals(levels: tuple[float, ...] = LEVELS) -> dict[str, Array]:
     made = {f"flat-{i}": np.full((2, 2), level) for i, level in enumerate(levels)}
     return made | {"dark-0": np.zeros((2, 2)), "dark-1": np.zeros((2, 2))}
+
+
+def state_of(recording: InMemory, model: Camera) -> State:
+    """Return the state of a camera beside a recording."""
+    split, source = Split.of(recording), Source(recording)
+    layout = layout_of(recording, split.development, source.frames)
+    numbers = {e.name: e.numbers for e in layout.exposures}
+    seen = observe(layout, lambda name: source.frames(name, numbers[name]))
+    setting = Setting(layout, seen, None, 1, 1, 8, 8, 2, 2, 2)
+    return State.of(setting, model, lambda: None)

@@ -8,16 +8,12 @@ import pytest
 
 from analysis.mismatch.bank.key import Key
 from analysis.mismatch.contradicted import Denial, contradicted, refuted
-from analysis.mismatch.observe import observe
 from analysis.mismatch.polish import Polished
 from analysis.mismatch.predict import Predictor
-from analysis.mismatch.source import Source
-from analysis.mismatch.split import Split
-from analysis.mismatch.state import Setting, State
-from analysis.mismatch.taking import layout_of
+from analysis.mismatch.state import State
 from dsis.camera import Camera
 from dsis.effects import Effect, registry
-from mismatch_recordings import Array, InMemory, camera, recorded
+from mismatch_recordings import Array, camera, recorded, state_of
 
 GAIN_PERCENT = 1.0
 LEVELS = (250.0, 900.0, 1600.0)
@@ -33,16 +29,6 @@ def with_taps(gains: Array, model: Camera = camera(TAPS)) -> State:  # noqa: B00
         added = np.rint(level * (gains - 1))[:, np.newaxis]
         recording.stacks[f"flat-{i}"] = (recording.stacks[f"flat-{i}"] + added).astype(np.uint16)
     return state_of(recording, model)
-
-
-def state_of(recording: InMemory, model: Camera) -> State:
-    """Return the state of a camera beside a recording."""
-    split, source = Split.of(recording), Source(recording)
-    layout = layout_of(recording, split.development, source.frames)
-    numbers = {e.name: e.numbers for e in layout.exposures}
-    seen = observe(layout, lambda name: source.frames(name, numbers[name]))
-    setting = Setting(layout, seen, None, 1, 1, 8, 8, 2, 2, 2)
-    return State.of(setting, model, lambda: None)
 
 
 def as_fitted(state: State, predictor: Predictor, effect: Effect) -> Polished:

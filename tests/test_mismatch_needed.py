@@ -15,8 +15,7 @@ from analysis.mismatch.rank import SURE_GAIN
 from analysis.mismatch.resolved import calls_alone, gained
 from analysis.mismatch.state import State
 from dsis.effects import registry
-from mismatch_recordings import camera, recorded
-from test_mismatch_contradicted import state_of
+from mismatch_recordings import camera, recorded, state_of
 
 ROW_NOISE = registry()["row_noise"](sigma_dn=0.8)
 

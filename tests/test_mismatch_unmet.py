@@ -10,8 +10,7 @@ from analysis.mismatch.named import Named
 from analysis.mismatch.state import State
 from analysis.mismatch.unmet import mirrored, unmet
 from dsis.effects import Effect, registry
-from mismatch_recordings import camera, recorded
-from test_mismatch_contradicted import state_of
+from mismatch_recordings import camera, recorded, state_of
 
 SHARE = 0.06  # of the noise before, that noise has
 LEVELS = (250.0, 900.0, 1600.0)

@@ -33,16 +33,19 @@ def denied_by_rest(search: Search, state: State, base: State) -> tuple[Named, st
 
 def undenied_by_all(
     search: Search, final: State, gains: dict[str, Gain], trial: Trial, whole: State
-) -> tuple[State, dict[str, Gain]]:
-    """Drop, one by one, what all frames of a small recording deny; see `denied_by_rest`."""
+) -> tuple[State, dict[str, Gain], State | None]:
+    """Drop, one by one, what all frames of a small recording deny; see `denied_by_rest`.
+
+    The last is the final state of all frames; None where nothing is named.
+    """
     while search.named:
         everything = State.of(whole.setting, final.camera, search.step)
         denied = denied_by_rest(search, everything, whole)
         if denied is None:
-            break
+            return final, gains, everything
         final = search.further(search.drop(final, *denied))
         final, gains = proven(search, search.settle(final), trial, judged=False)
-    return final, gains
+    return final, gains, None
 
 
 def proven(

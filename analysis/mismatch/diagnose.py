@@ -141,8 +141,9 @@ def _found(
             final = search.drop(final, *denied)
         known = changes(whole, final, search.named, partial(search.without, final))
     final, gains = proven(search, search.settle(final), trial, judged=large)
+    everything: State | None = None
     if not large:
-        final, gains = undenied_by_all(search, final, gains, trial, whole)
+        final, gains, everything = undenied_by_all(search, final, gains, trial, whole)
     scale, users, whole = whole.null.sd, whole.mismatches, search.rebased(whole)
     if users and not whole.mismatches:  # all that differed
         remarks = (*remarks, remark_on_sizes(users))
@@ -150,7 +151,7 @@ def _found(
     proof = trial.proof(search.base, final, step, source)
     evidence = evidence_of(search.base, final, album, split)
     if not large:
-        final = State.of(whole.setting, final.camera, step) if search.named else whole
+        final = whole if everything is None else everything
         departures = Change(len(whole.mismatches), len(final.mismatches))
         proof = replace(proof, discrepancies=departures)
     found = _finding(camera, whole, final, search, gains, proof, known)

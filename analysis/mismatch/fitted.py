@@ -192,14 +192,11 @@ class Fitted:
         return self.polished
 
     def _slopes(self, state: State) -> Callable[[Effect], Predictor]:
-        """Return what tells how numbers move with an effect: few simulations, where they do.
-
-        In a large recording, what draws nothing at random moves them alike on every sensor.
-        """
+        """Return what tells how numbers move with an effect: few simulations, where they do."""
 
         def asked(effect: Effect) -> Predictor:
-            alike = self.setting.large and not effect.draws
-            least = self.setting.replicates if alike else self.setting.polishing
+            setting = self.setting
+            least = setting.replicates if setting.alike(effect) else setting.polishing
             return state.predictor(max(least, replicates_for(self.setting, [effect])))
 
         return asked

@@ -20,6 +20,7 @@ from analysis.mismatch.recalibrate import Calibrated, calibrate
 from analysis.mismatch.simulations import Simulations
 from analysis.mismatch.vector import Vector, vector
 from dsis.camera import Camera
+from dsis.effects import Effect
 
 Array = NDArray[np.float64]
 _MEDIUM = 2e6  # samples from which one simulation tells what two of fewer do
@@ -68,6 +69,13 @@ class Setting:
             return cls(layout, seen, interpolated, seed, jobs, 8, 4, 1, 1, 2, large=True)
         few = (1, 1, 2) if layout.samples > _MEDIUM else (2, 2, 4)
         return cls(layout, seen, interpolated, seed, jobs, 16, 8, *few)
+
+    def alike(self, effect: Effect) -> bool:
+        """Return whether one sensor tells how numbers move with the parameters of an effect.
+
+        In a large recording, what draws nothing at random moves them alike on every sensor.
+        """
+        return self.large and not effect.draws
 
     def calibrated(self, camera: Camera, near: Calibrated | None = None) -> Calibrated:
         """Return the model with base numbers fitted to what was observed; see `calibrate`."""

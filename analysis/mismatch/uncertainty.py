@@ -109,11 +109,8 @@ def _information(
 def _slopes(
     state: State, replicates: int, bare: Camera, effects: tuple[Effect, ...], free: Sequence[Free]
 ) -> Array:
-    """Return how numbers move with each parameter: (replicate, number, parameter).
-
-    In a large recording, what draws nothing at random moves them alike on every sensor.
-    """
-    alike = [state.setting.large and not effects[i].draws for i, _, _ in free]
+    """Return how numbers move with each parameter: (replicate, number, parameter)."""
+    alike = [state.setting.alike(effects[i]) for i, _, _ in free]
     beside = list(shifted(bare, effects, free))
     asked = {same: state.predictor(1 if same else replicates) for same in set(alike)}
     for same, predictor in asked.items():

@@ -11,7 +11,7 @@ from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, Stage
 
 
 class ReadoutMemory(Effect):
-    """The noise of the sample read `lag_pixels` earlier along a line is seen once more.
+    """The noise of the sample read some pixels earlier along a line is seen once more.
 
     v'(i) = v(i) + f n(i - lag), n = v - S the deviation from the expected signal, which the clamp,
     the correlated double sampling or the converter bank has in common. A negative fraction takes

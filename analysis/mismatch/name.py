@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from analysis.mismatch.candidates import CANDIDATES, measured
 from analysis.mismatch.contradicted import refuted
 from analysis.mismatch.credited import joined, kept_up
-from analysis.mismatch.finding import Mismatch
 from analysis.mismatch.fitted import Fitted
 from analysis.mismatch.instance import LINES, Frequency, frequency_of, instance
 from analysis.mismatch.judge import INSTEAD, LITTLE, NEEDLESS, NOTHING, Judge
@@ -25,6 +24,8 @@ from analysis.mismatch.rank import (
     TOLD_APART,
     Memory,
     Ranked,
+    newly_off,
+    plainest,
     ranked,
     replicates_for,
     ties,
@@ -44,15 +45,6 @@ _MOST_LINES = 5  # further ones stay unexplained, located
 _ROUNDS = 3  # of a search that goes on
 _SPIKY = 10.0  # standard errors from which tails bend the variances
 _TAILS = frozenset({"kurtosis", "kurtosis_within_pixels", "one_off_outliers"})
-
-
-def _differ(before: Sequence[Mismatch], now: Sequence[Mismatch]) -> bool:
-    """Return whether something differs now that did not before, or not surely."""
-    sure = {m.statistic: m.p_adjusted < SURE_CHANCE for m in before}
-    return any(
-        m.statistic not in sure or (m.p_adjusted < SURE_CHANCE and not sure[m.statistic])
-        for m in now
-    )
 
 
 @dataclass
@@ -114,7 +106,7 @@ class Search(Fitted):
             state = self._asked_of_all(self._pruned(state))
             kept = {one.name for one in self.named}
             dropped = [one for one in taken if one.name not in kept]
-            if not (dropped or _differ(sought, state.mismatches)) or not state.mismatches:
+            if not (dropped or newly_off(sought, state.mismatches)) or not state.mismatches:
                 break
             forgiven |= self._forgiven(dropped) if number == 0 else {}
         left = forgiven.keys() - {one.name for one in self.named}
@@ -302,7 +294,7 @@ class Search(Fitted):
             if len(self.settled) > len(settled):
                 continue  # a line was refused: behind it another may be
             before = len(self.doubted)
-            fitted = self._undoubted(state, as_maps_show(state, fitted))
+            fitted = self._undoubted(state, as_maps_show(state, plainest(state, fitted)))
             if len(self.doubted) > before:
                 continue  # all that was fitted of a kind is denied: others were too far behind it
             if not fitted or fitted[0].gain < LEAST_GAIN:

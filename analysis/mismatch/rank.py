@@ -1,7 +1,7 @@
 """Effects that could explain what is off, each with fitted parameters, the best first."""
 
 from collections.abc import Callable, Container, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import log
 
 import numpy as np
@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from analysis.mismatch.candidates import CANDIDATES, Proposal
 from analysis.mismatch.credited import together
+from analysis.mismatch.finding import Mismatch
 from analysis.mismatch.instance import Frequency, frequency_of, instance, same_line
 from analysis.mismatch.polish import Polished, needed, polish, stepped, with_effects
 from analysis.mismatch.state import Setting, State
@@ -36,8 +37,9 @@ _BY_DRAW = frozenset(
     {"bistable_pattern", "line_flicker", "pink_noise", "row_banding", "smooth_prnu"}
 )
 _BY_BIN = frozenset({"periodic_noise"})  # of few frames: the noise of one bin comes on top
+# That greens differ is seen; what amplifiers of even and odd rows make of red and blue is not.
+_SAYS_LESS = {"channel_imbalance": "tap_mismatch"}
 _TWINS = {
-    "channel_imbalance": "tap_mismatch",
     "tap_mismatch": "channel_imbalance",
     "pink_noise": "row_banding",
     "row_banding": "pink_noise",
@@ -297,12 +299,37 @@ def alike(state: State, one: Array, other: Array) -> bool:
     return size > 0 and float(a @ b) / size > _COSINE
 
 
+def plainest(state: State, fitted: Sequence[Ranked]) -> list[Ranked]:
+    """Return ranked effects, before the best what says less and explains the same as well.
+
+    In a mosaic whose light is of unknown colour amplifiers of even and odd rows show in nothing
+    but the greens: that the greens differ holds whatever the cause; it is its alternative.
+    """
+    said = next((one for one in fitted[1:] if _SAYS_LESS.get(one.kind) == fitted[0].kind), None)
+    if said is None or not ties(state, fitted[0], said):
+        return list(fitted)
+    first = replace(said, gain=fitted[0].gain)
+    return [first, *(one for one in fitted if one is not said)]
+
+
 def ties(state: State, best: Ranked, other: Ranked) -> bool:
-    """Return whether another effect explains the same numbers nearly as well as the best."""
+    """Return whether another effect explains the same numbers nearly as well as the best.
+
+    What is seen in them, and no more, ties with nothing that says the same and more.
+    """
     near = other.gain > best.gain - TOLD_APART and other.kind != best.kind
-    if not near or _other_line(state, best, other):
+    if not near or _SAYS_LESS.get(best.kind) == other.kind or _other_line(state, best, other):
         return False
     return alike(state, best.polished.mean, other.polished.mean)
+
+
+def newly_off(before: Sequence[Mismatch], now: Sequence[Mismatch]) -> bool:
+    """Return whether something differs now that did not before, or not surely."""
+    sure = {m.statistic: m.p_adjusted < SURE_CHANCE for m in before}
+    return any(
+        m.statistic not in sure or (m.p_adjusted < SURE_CHANCE and not sure[m.statistic])
+        for m in now
+    )
 
 
 def twin(
@@ -310,9 +337,9 @@ def twin(
 ) -> Ranked | None:
     """Return the effect that the best cannot be told from, though it must not be named itself.
 
-    Amplifiers of even and odd rows, and greens that differ, do nearly the same to a mosaic whose
-    light is of unknown colour: only the noise of each channel tells. Over the rows of few small
-    frames 1/f noise and a black level that lags behind are as near.
+    Amplifiers of even and odd rows do nearly what greens that differ do to a mosaic whose light
+    is of unknown colour: only the noise of each channel tells. Over the rows of few small frames
+    1/f noise and a black level that lags behind are as near.
     """
     other = _TWINS.get(best.kind)
     if other is None or other in vocabulary:

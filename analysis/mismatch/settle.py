@@ -26,7 +26,9 @@ _PAIRS = {
     frozenset({"smooth_prnu", "shading"}): "flats with the camera turned before the light",
     frozenset({"smooth_prnu", "crosstalk"}): "more frames: only one correlates what is new in each",
     frozenset({"line_settling", "amp_glow"}): "darks at two exposure times",
-    frozenset({"tap_mismatch", "channel_imbalance"}): "the slope of each channel: more levels",
+    frozenset(
+        {"tap_mismatch", "channel_imbalance"}
+    ): "light of known colour: amplifiers of rows change red and blue too",
     frozenset({"dark_current", "black_level_drift"}): "darks at several exposure times, shuffled",
 }
 

@@ -1,0 +1,55 @@
+"""Greens that differ: named as what is seen, with the amplifiers that could have made them."""
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
+
+import pytest
+from planter import Choice, draw_case, plant
+from planter.case import Effect as Planted
+
+from analysis.mismatch import Finding, find_mismatch
+from analysis.mismatch.diagnose import VOCABULARY
+from dsis.camera import read_camera
+from dsis.recording import read_recording
+
+WORDS = frozenset({"channel_imbalance", "tap_mismatch", "shading", "row_fpn", "row_prnu"})
+
+
+def _found(folder: Path, planted: Planted, words: frozenset[str] = WORDS) -> Finding:
+    choice = Choice(cfa="GRBG", segments=1, light=True, times="darks")
+    plant(folder, draw_case(4, "small", choice).having(planted))
+    camera = read_camera(folder / "camera.toml")
+    return find_mismatch(camera, read_recording(folder), seed=1, vocabulary=words)
+
+
+@pytest.mark.parametrize("percent", [0.4, -0.4])
+def test_greens_that_differ_are_named_and_amplifiers_are_their_alternative(
+    tmp_path: Path, percent: float
+) -> None:
+    found = _found(tmp_path, Planted("channel_imbalance", {"gain_percent": percent}))
+    (named,) = found.omitted_physics
+    assert named.effect == "channel_imbalance"
+    fitted = named.parameters["gain_percent"]
+    assert isinstance(fitted.value, float)
+    assert abs(abs(fitted.value) - abs(percent)) < 3 * fitted.standard_error
+    (other,) = (one for one in named.alternatives if one.effect == "tap_mismatch")
+    assert other.would_settle
+    assert not found.undecided
+
+
+def test_greens_that_differ_are_no_amplifiers_where_they_have_no_word(tmp_path: Path) -> None:
+    words = VOCABULARY - {"channel_imbalance"}
+    found = _found(tmp_path, Planted("channel_imbalance", {"gain_percent": 0.4}), words)
+    assert not found.omitted_physics
+    assert "channel_ratio" in {one.statistic for one in found.unexplained}
+
+
+def test_amplifiers_whose_noise_tells_them_are_no_greens_that_differ(tmp_path: Path) -> None:
+    """Gains that differ by an eighth scale the noise with the signal: light does not."""
+    taps = Planted("tap_mismatch", {"gain_percent": 12.0, "regions": "even_odd_rows"})
+    found = _found(tmp_path, taps)
+    (named,) = found.omitted_physics
+    assert named.effect == "tap_mismatch"
+    assert named.choices["regions"] == "even_odd_rows"

@@ -59,11 +59,16 @@ class Memory:
     changes
         Effect, the numbers' means then, and its change of them.
     gains
-        What each kind gained when it was tried last, as it was proposed then.
+        What each kind gained when it was tried last, by the words of its parameters: halves of a
+        sensor say nothing of its even and odd rows.
     """
 
     changes: list[tuple[Effect, Array, Array]] = field(default_factory=list)
-    gains: dict[str, float] = field(default_factory=dict)
+    gains: dict[str, dict[tuple[str, ...], float]] = field(default_factory=dict)
+
+    def gained(self, kind: str, unknown: float) -> float:
+        """Return what a kind gained at most; `unknown`: it was never tried."""
+        return max(self.gains.get(kind, {}).values(), default=unknown)
 
     def recalled(self, effect: Effect, state: State) -> Array | None:
         """Return the numbers with an effect added, as remembered; None: it must be simulated."""
@@ -220,11 +225,11 @@ def _tried(
     before = predictor.loglik(state.null.mean)
     known = {kind: CANDIDATES[kind] for kind in kinds if kind in CANDIDATES}
     left = {kind for kind, own in known.items() if off & {*own.calls, *own.hints}}
-    best = max((memory.gains.get(kind, 0.0) for kind in left), default=0.0)
+    best = max((memory.gained(kind, 0.0) for kind in left), default=0.0)
     found: list[tuple[float, str, Proposal, Array]] = []
     while True:
         worth = _WORTH_IT * best if best > _STRONG else -np.inf
-        chosen = sorted(kind for kind in left if memory.gains.get(kind, np.inf) >= worth)
+        chosen = sorted(kind for kind in left if memory.gained(kind, np.inf) >= worth)
         if not chosen:
             break
         left -= set(chosen)
@@ -235,15 +240,17 @@ def _tried(
             if possible(proposal.effect)
         ]
         means = _means(state, [proposal for _, proposal in proposed], memory, step)
-        for kind in chosen:
-            memory.gains.pop(kind, None)
+        gains: dict[tuple[str, tuple[str, ...]], float] = {}
         for (kind, proposal), mean in zip(proposed, means, strict=True):
             if mean is None:
                 continue
             value = predictor.loglik(mean)
-            memory.gains[kind] = max(memory.gains.get(kind, -np.inf), value - before)
+            which = kind, _words(proposal.effect)
+            gains[which] = max(gains.get(which, -np.inf), value - before)
             if not any(alike(state, mean, other) for other in apart):
                 found.append((value, kind, proposal, mean))
+        for (kind, words), gain in gains.items():
+            memory.gains.setdefault(kind, {})[words] = gain
         best = max((value - before for value, *_ in found), default=0.0)
     # Of one kind, each that changes other numbers: memory of one lag says nothing of another's.
     kept: list[tuple[float, str, Proposal, Array]] = []
@@ -251,6 +258,12 @@ def _tried(
         if not any(one[1] == other[1] and alike(state, one[3], other[3]) for other in kept):
             kept.append(one)
     return [(value, kind, proposal) for value, kind, proposal, _ in kept]
+
+
+def _words(effect: Effect) -> tuple[str, ...]:
+    """Return those of an effect's parameters that are words: an edge, the regions of amplifiers."""
+    values = effect.model_dump(exclude={"kind"}).values()
+    return tuple(value for value in values if isinstance(value, str))
 
 
 def _means(

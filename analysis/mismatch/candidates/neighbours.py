@@ -11,6 +11,8 @@ from analysis.mismatch.clues import Clues, alike
 _ALONG_ROWS, _ALONG_COLUMNS = "correlation_0_1", "correlation_1_0"
 _SEEN_STEPS = 100.0  # of chi-squared: ten standard deviations
 _AS_LIKELY = 4.6  # of chi-squared, odds of 10: of few levels, periods may be alike
+_LEAST_FLATS = 2  # of one, colours may be the light's
+_BESIDE = {"R": ("Gr", "Gb"), "Gr": ("R", "B"), "Gb": ("B", "R"), "B": ("Gb", "Gr")}
 _NEAR = (_ALONG_ROWS, _ALONG_COLUMNS, "line_correlation", "pixel_variance")
 
 
@@ -30,8 +32,33 @@ def _brighter_fatter(clues: Clues) -> Sequence[Proposal]:
 
     across, _ = clues.amplitude(_ALONG_ROWS, shape)
     down, _ = clues.amplitude(_ALONG_COLUMNS, shape)
-    rate = (across + down) / 2
-    return proposals("brighter_fatter", ["per_dn"], per_dn=rate) if rate > 0 else []
+    found: list[Proposal] = []
+    for rate in ((across + down) / 2, _exchanged(clues)):
+        if rate > 0:
+            found += proposals("brighter_fatter", ["per_dn"], per_dn=rate)
+    return found
+
+
+def _exchanged(clues: Clues) -> float:
+    """Return the rate per DN at which levels show that colours exchange charge; 0: they do not.
+
+    At a rate a, a site of signal S gains a / 2 (N^2 - S^2) of each neighbour of signal N: what is
+    darker gains what is brighter loses. What is in proportion to the signal is the light's colour.
+    """
+    levels = clues.excess("level")
+    places = [p for p in levels if p[1] in _BESIDE and clues.signal(p) > 0]
+    design, values = [], []
+    for place in places:
+        name, channel = place
+        value, sd = levels[place]
+        own, *others = (clues.signal((name, c)) for c in (channel, *_BESIDE[channel]))
+        light = [own * (channel == c) for c in _BESIDE]
+        exchange = sum(other**2 - own**2 for other in others)
+        design.append(np.array([exchange, *light]) / sd)
+        values.append(value / sd)
+    if len({name for name, _ in places}) < _LEAST_FLATS:
+        return 0.0
+    return float(np.linalg.lstsq(np.array(design), np.array(values), rcond=None)[0][0])
 
 
 def _filtering(clues: Clues) -> Sequence[Proposal]:
@@ -121,7 +148,7 @@ def _lag(clues: Clues) -> Sequence[Proposal]:
 
 CANDIDATES = (
     Candidate("crosstalk", _NEAR, _crosstalk),
-    Candidate("brighter_fatter", _NEAR, _brighter_fatter),
+    Candidate("brighter_fatter", (*_NEAR, "level"), _brighter_fatter),
     Candidate(
         "spatial_filtering",
         ("correlation_0_1", "correlation_0_2", "correlation_1_0", "correlation_2_0",

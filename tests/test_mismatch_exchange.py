@@ -1,0 +1,35 @@
+"""Charge that sites of a mosaic exchange shows in the levels of their colours."""
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
+
+from planter import Choice, draw_case, plant
+from planter.case import Effect as Planted
+
+from analysis.mismatch import find_mismatch
+from dsis.camera import read_camera
+from dsis.recording import read_recording
+
+WORDS = frozenset(
+    {"brighter_fatter", "crosstalk", "nonlinearity", "saturation", "adc_memory", "prnu"}
+)
+
+
+def test_charge_that_colours_exchange_is_named_before_any_covariance_shows(tmp_path: Path) -> None:
+    choice = Choice(cfa="GRBG", segments=1, light=True, times="darks")
+    case = draw_case(4, "small", choice)
+    top = max(one.signal_dn for one in case.exposures)
+    rate = 0.004 / top
+    plant(tmp_path, case.having(Planted("brighter_fatter", {"per_dn": rate})))
+    camera = read_camera(tmp_path / "camera.toml")
+    found = find_mismatch(camera, read_recording(tmp_path), seed=1, vocabulary=WORDS)
+    (named,) = found.omitted_physics
+    assert named.effect == "brighter_fatter"
+    assert "level" in named.because
+    assert "correlation_0_1" not in {one.statistic for one in found.mismatches}
+    fitted = named.parameters["per_dn"]
+    assert isinstance(fitted.value, float)
+    assert abs(fitted.value - rate) < 3 * fitted.standard_error
+    assert not found.unexplained

@@ -175,6 +175,22 @@ def test_proposals_start_from_the_spectrum_of_the_gain(length: float) -> None:
         assert rest.effect.model_dump()["sigma_percent"] < 0.2
 
 
+def test_of_a_weak_field_several_lengths_are_proposed() -> None:
+    """Its long waves are few: noise of pixels may then look like the shortest of all."""
+    rng = np.random.default_rng(8)
+    shape = (96, 128)
+    near = 0
+    for k in range(10):
+        gain = 10 * (_field(4.0, shape, k, 0.1) * 100 + rng.normal(0, 0.4, shape))
+        lengths = [
+            one.effect.model_dump()["length_pixels"]
+            for one in CANDIDATES[0].propose(_clues(gain, 1.0))
+        ]
+        assert len(lengths) <= 4
+        near += any(4.0 / 2.5 < one < 4.0 * 2.5 for one in lengths)
+    assert near >= 9
+
+
 def test_without_a_map_of_gains_nothing_is_proposed() -> None:
     clues = _clues(np.zeros((96, 128)), 1.0)
     clues.seen.images.clear()
@@ -226,8 +242,9 @@ def test_uneven_light_that_a_field_has_by_chance_is_denied(
 
 
 @pytest.mark.parametrize("cfa", ["MONO", "RGGB"])
-def test_it_is_named_with_its_numbers(cfa: str) -> None:
-    own = {"sigma_percent": 0.25, "length_pixels": 4.0}
+@pytest.mark.parametrize(("sigma", "length"), [(0.25, 4.0), (0.13, 3.0)])
+def test_it_is_named_with_its_numbers(cfa: str, sigma: float, length: float) -> None:
+    own = {"sigma_percent": sigma, "length_pixels": length}
     true = camera(effect("smooth_prnu", **own), cfa=cfa)
     found = find_mismatch(camera(cfa=cfa), recorded(true, 9), seed=1, vocabulary=WORDS)
     (named,) = found.omitted_physics

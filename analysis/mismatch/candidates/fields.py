@@ -19,6 +19,7 @@ from dsis.effects.smooth_prnu import SmoothPrnu
 Array = NDArray[np.float64]
 _SHORTEST = 0.7  # pixels: neighbours of less have nothing in common
 _LENGTHS = 16
+_AS_LIKELY, _APART = 3.84, 2.5  # of chi-squared, 95 %; times as long, to be worth a trial
 _LONGEST, _UNEVEN = 1 / 4, 1 / 3  # of the shorter side: what is longer is a smooth surface
 _BINS = 32
 _LOWEST, _HIGHEST = 4.0, 0.75  # cycles a plane, a pixel: smooth surfaces have what is lower
@@ -49,16 +50,24 @@ class _Spectrum:
 
 
 def _smooth_prnu(clues: Clues) -> Sequence[Proposal]:
-    """Start from the field that, beside white gains, makes the gain's spectrum most likely."""
-    best = min(fields(clues), default=None)
-    if best is None or best.variance <= 0:
-        return []
-    return proposals(
-        "smooth_prnu",
-        ["sigma_percent", "length_pixels"],
-        sigma_percent=min(best.variance**0.5, 90.0),
-        length_pixels=best.length,
-    )
+    """Start from fields that, beside white gains, make the gain's spectrum most likely.
+
+    The long waves of a weak field are few: its spectrum then tells no length, all numbers do.
+    """
+    found: list[Proposal] = []
+    lengths: list[float] = []
+    near = sorted(fields(clues))
+    for own in near:
+        apart = all(max(own.length / one, one / own.length) > _APART for one in lengths)
+        if own.variance > 0 and own.left < near[0].left + _AS_LIKELY and apart:
+            lengths.append(own.length)
+            found += proposals(
+                "smooth_prnu",
+                ["sigma_percent", "length_pixels"],
+                sigma_percent=min(own.variance**0.5, 90.0),
+                length_pixels=own.length,
+            )
+    return found
 
 
 class Field(NamedTuple):
@@ -171,7 +180,8 @@ CANDIDATES = (
         "smooth_prnu",
         ("fixed_patch_variance", "fixed_correlation_0_1", "fixed_correlation_1_0"),
         _smooth_prnu,
-        hints=("fixed_smooth_variance",),  # a field has long waves too; so have many other surfaces
+        # A field has long waves too, so have many other surfaces; pixels vary with each gain.
+        hints=("fixed_smooth_variance", "fixed_pixel_variance"),
         sane=_shorter,
     ),
 )

@@ -31,9 +31,9 @@ _SPARSE = 4  # times as many simulations
 _BY_FRAME = frozenset({"frame_variance"})
 # A sign: half of the pairs of frames show nothing, half show it twice. A band: one bin's phase.
 # Pink noise and bands of rows: most of it in a frame's mean and in the first few bins. Gains that
-# neighbours share: in few patches.
+# neighbours share: in few patches. Hot pixels: the few brightest ones.
 _BY_DRAW = frozenset(
-    {"bistable_pattern", "line_flicker", "pink_noise", "row_banding", "smooth_prnu"}
+    {"bistable_pattern", "hot_pixels", "line_flicker", "pink_noise", "row_banding", "smooth_prnu"}
 )
 _BY_BIN = frozenset({"periodic_noise"})  # of few frames: the noise of one bin comes on top
 _TWINS = {
@@ -169,9 +169,8 @@ def ranked(
         if not any(alike(state, polished.mean, one) for one in apart):
             found.append((kind, proposal, polished))
     judged = ~_others(state, [polished.mean for _, _, polished in found])
-    before = predictor.loglik(state.null.mean, judged)
     fitted = [
-        Ranked(predictor.loglik(own.mean, judged) - before - len(start.free), kind, start, own)
+        Ranked(predictor.gain(own.mean, start.of_pixels, judged) - start.numbers, kind, start, own)
         for kind, start, own in found
     ]
     return sorted(fitted, key=lambda one: -one.gain)
@@ -238,7 +237,7 @@ def _tried(
         for (kind, proposal), mean in zip(proposed, means, strict=True):
             if mean is None:
                 continue
-            value = predictor.loglik(mean)
+            value = before + predictor.gain(mean, proposal.of_pixels)
             memory.gains[kind] = max(memory.gains.get(kind, -np.inf), value - before)
             if not any(alike(state, mean, other) for other in apart):
                 found.append((value, kind, proposal, mean))

@@ -29,8 +29,10 @@ def _hot(clues: Clues) -> Sequence[Proposal]:
             continue
         values = dict(zip(_NUMBERS, (law.share, law.mean / scale), strict=True))
         errors = dict(zip(_NUMBERS, (law.share_error, law.mean_error / scale), strict=True))
-        for own in proposals("hot_pixels", _NUMBERS, **values):
-            found.append(replace(measured(own, values, errors), of_pixels=law.gain))
+        found += [
+            replace(measured(own, values, errors), of_pixels=law.gain)
+            for own in proposals("hot_pixels", _NUMBERS, **values)
+        ]
     return found
 
 

@@ -1,6 +1,6 @@
 """Hot pixels, measured of the map that grows with exposure time."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -19,12 +19,13 @@ _SEEN = 2  # frames: of more there are variances
 
 def _hot(clues: Clues) -> Sequence[Proposal]:
     """Return the likeliest laws of the map's pixels, where they gain more than their parameters."""
-    images = clues.image("time")
-    if not images:
+    grown = _grown(clues)
+    if grown is None:
         return []
-    scale = clues.scale("time", next(iter(images)))
+    images, scale = grown
+    noisy = {name: _noisy(clues, name, image / scale) for name, (image, _) in images.items()}
     found: list[Proposal] = []
-    for law in hot_laws(images, {channel: _noisy(clues, channel) for channel in images}):
+    for law in hot_laws(images, noisy):
         if law.gain < len(_NUMBERS):
             continue
         values = dict(zip(_NUMBERS, (law.share, law.mean / scale), strict=True))
@@ -36,16 +37,29 @@ def _hot(clues: Clues) -> Sequence[Proposal]:
     return found
 
 
-def _noisy(clues: Clues, channel: str) -> Mask:
+def _grown(clues: Clues) -> tuple[Mapping[str, tuple[Array, float]], float] | None:
+    """Return a map with its noise by channel, and in how many seconds it grows so; None: unknown.
+
+    Where all exposures take the same time the offset is what has grown in it.
+    """
+    if images := clues.image("time"):
+        return images, clues.scale("time", next(iter(images)))
+    times = {exposure.exposure_time_s for exposure in clues.layout.uniform}
+    images = clues.image("offset")
+    if not images or len(times) > 1 or not max(times) > 0:
+        return None
+    return images, max(times)
+
+
+def _noisy(clues: Clues, channel: str, rate: Array) -> Mask:
     """Return which pixels are noisier than the shot noise of their own charge: they jump.
 
-    Or were hit by a spike. What they add to a mean frame is no dark current.
+    Or were hit by a spike. What they add to a mean frame is no dark current. The rate is in DN/s.
     """
-    image, _ = clues.image("time")[channel]
     total, sd = clues.image("variance")[channel]
-    per_s = np.maximum(image - np.median(image), 0.0) / clues.scale("time", channel)
+    per_s = np.maximum(rate - np.median(rate), 0.0)
     dark, lit = clues.fit.line_dn2(np.array([0.0, 1.0]))
-    expected, most = np.zeros(image.shape), np.zeros(image.shape)
+    expected, most = np.zeros(rate.shape), np.zeros(rate.shape)
     for exposure in clues.layout.uniform:
         frames = len(exposure.numbers)
         if frames <= _SEEN or (exposure.name, channel) in clues.layout.still:

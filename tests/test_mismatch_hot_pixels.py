@@ -48,7 +48,7 @@ def test_the_density_is_that_of_a_normal_variate_and_an_exponential_one(
     ("share", "mean_dn"), [(0.004, 1.0), (0.01, 2.0), (0.003, 40.0), (0.05, 0.4)]
 )
 def test_intervals_hold_what_was_planted(share: float, mean_dn: float) -> None:
-    seeds, held = 20, np.zeros(2)
+    seeds, held = 12, np.zeros(2)
     for seed in range(seeds):
         law = _laws(_maps(seed, share, mean_dn))[0]
         assert law.gain > 2
@@ -70,10 +70,12 @@ def test_two_pixels_in_twelve_thousand_are_enough() -> None:
     maps["Gr"][0][7, 11] += 6 * NOISE_DN
     laws = _laws(maps)
     assert laws[0].gain > 15
-    # As likely as the nearest 2 of Poisson's law: few hot, or many warm ones of which few are seen.
-    shares = [law.share for law in laws]
-    assert min(shares) < 2 / 12288 < max(shares)
-    assert max(law.gain for law in laws[1:]) < laws[0].gain
+    # Few that are hot, or many warm ones of which two are seen, are nearly as likely: 1.92 less
+    # at the ends of a 95 % interval.
+    ends = [law.gain - laws[0].gain for law in laws[1:]]
+    assert len(ends) == 2
+    assert all(-1.93 <= end <= 0 for end in ends)
+    assert max(law.share for law in laws) > 10 * min(law.share for law in laws)
 
 
 def test_what_is_left_out_says_nothing() -> None:
@@ -85,12 +87,13 @@ def test_what_is_left_out_says_nothing() -> None:
     assert hot_laws(maps, out)[0].gain < 6
 
 
-def test_a_glow_is_no_hot_pixel() -> None:
+@pytest.mark.parametrize("noises", [5, 10])
+def test_a_glow_is_no_hot_pixel(noises: int) -> None:
     y, x = np.mgrid[: SHAPE[0], : SHAPE[1]]
     maps = _maps(3, 0.0, 0.0)
-    glow = 20 * NOISE_DN * np.exp(-np.hypot(y, x) / 8)
+    glow = noises * NOISE_DN * np.exp(-np.hypot(y, x) / 8)
     maps = {channel: (image + glow, noise) for channel, (image, noise) in maps.items()}
-    assert _laws(maps)[0].gain < 15  # less than two pixels have
+    assert _laws(maps)[0].gain < 6
 
 
 def _clues(

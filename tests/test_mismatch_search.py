@@ -282,7 +282,9 @@ def test_beside_what_gains_much_only_what_gained_enough_is_tried_anew(
     state: Any = SimpleNamespace(
         mismatches=[SimpleNamespace(statistic="row_variance")],
         clues=lambda _: None,
-        predictor=lambda _: SimpleNamespace(loglik=lambda mean: float(mean[0])),
+        predictor=lambda _: SimpleNamespace(
+            loglik=lambda mean: float(mean[0]), gain=lambda mean, _of_pixels: float(mean[0])
+        ),
         null=SimpleNamespace(mean=np.zeros(1)),
         setting=SimpleNamespace(screening=1),
     )

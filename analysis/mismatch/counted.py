@@ -106,7 +106,7 @@ def _mixed(seen: Array, expected: Array, excess: Array) -> Array:
     )
     law = np.where(excess > _LEAST * expected, spread, own)
     any_of_all = -np.log((seen + 1) * (seen + 2))
-    return np.logaddexp(np.log1p(-_ELSEWHERE) + law, np.log(_ELSEWHERE) + any_of_all)
+    return np.asarray(np.logaddexp(np.log1p(-_ELSEWHERE) + law, np.log(_ELSEWHERE) + any_of_all))
 
 
 def expected_of(roots: Array) -> Array:

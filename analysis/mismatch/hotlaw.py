@@ -8,7 +8,7 @@ brightest pixels count most is chance; this is a closed form.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import pi, sqrt
+from math import log, pi, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -100,15 +100,19 @@ def hot_laws(
         Pixels of it that say nothing.
     """
     pixels = [
-        _binned((image - median_filter(image, _AROUND))[~left_out[name]], noise)
+        _binned((image - _around(image))[~left_out[name]], noise)
         for name, (image, noise) in images.items()
     ]
     noise = float(np.mean([own.noise for own in pixels]))
-    error = 1 / np.sqrt(2 * sum(float(own.counts.sum()) for own in pixels))
+    error = 1 / sqrt(2 * sum(float(own.counts.sum()) for own in pixels))
     # Noise is known: what is narrower is not the map. What else differs makes it wider.
-    known, most = np.log(_BESIDE), max(np.log(_robust(pixels)), np.log(_BESIDE))
+    known, most = log(_BESIDE), max(log(_robust(pixels)), log(_BESIDE))
     width = (known - error, most + _WIDTHS * error)
-    bounds: Bounds = (np.log(_SHARES), np.log(np.array(_MEANS) * noise), width)
+    bounds: Bounds = (
+        (log(_SHARES[0]), log(_SHARES[1])),
+        (log(_MEANS[0] * noise), log(_MEANS[1] * noise)),
+        width,
+    )
     for number in range(1 + _PASSES):
         points = _POINTS if number else _COUNTS
         axes = [np.linspace(*ends, n) for ends, n in zip(bounds, points, strict=True)]
@@ -130,6 +134,13 @@ def hot_laws(
         )
         laws.append(HotLaw(float(profile[at] - plain.max()), *values, *errors))
     return laws
+
+
+def _around(image: Array) -> Array:
+    """Return the median of the pixels around each; beyond the edges a map goes on as steeply."""
+    reach = _AROUND // 2
+    padded = np.pad(image, reach, mode="reflect", reflect_type="odd")
+    return np.asarray(median_filter(padded, _AROUND)[reach:-reach, reach:-reach])
 
 
 def _binned(image: Array, noise: float) -> _Pixels:

@@ -32,7 +32,7 @@ def _hot(clues: Clues) -> Sequence[Proposal]:
         errors = dict(zip(_NUMBERS, (law.share_error, law.mean_error / scale), strict=True))
         found += [
             replace(measured(own, values, errors), of_pixels=law.gain)
-            for own in proposals("hot_pixels", _NUMBERS, **values)
+            for own in proposals("hot_pixels", _NUMBERS, (), **values)
         ]
     return found
 

@@ -26,8 +26,9 @@ from analysis.mismatch.bank.carryover import (
     profile,
     sawteeth,
 )
+from analysis.mismatch.memory import Memory
 from analysis.mismatch.observe import observe
-from analysis.mismatch.rank import SURE_GAIN, Memory, ranked
+from analysis.mismatch.rank import SURE_GAIN, ranked
 from analysis.mismatch.source import Source
 from analysis.mismatch.state import Setting, State
 from analysis.mismatch.taking import layout_of

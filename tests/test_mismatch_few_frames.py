@@ -14,6 +14,7 @@ from mismatch_recordings import camera
 FRAMES = 6
 DOF = FRAMES - 1
 NAMES = ("flat-0", "flat-1", "flat-2")
+LAYOUT = SimpleNamespace(rows=64, columns=96)
 
 
 def roots(variances: np.ndarray) -> np.ndarray:
@@ -30,7 +31,7 @@ def predictor(squares: np.ndarray, statistic: str = "frame_variance") -> Predict
     sd = np.sqrt(square - roots(np.ones(3)) ** 2)
     null: Any = SimpleNamespace(mean=roots(np.ones(3)), sd=sd, known=np.ones(len(NAMES), bool))
     vector: Any = SimpleNamespace(keys=keys, values=np.cbrt(squares))
-    simulations: Any = SimpleNamespace(of=lambda *_: np.ones((2, len(NAMES))))
+    simulations: Any = SimpleNamespace(layout=LAYOUT, of=lambda *_: np.ones((2, len(NAMES))))
     return Predictor(simulations, Reference(camera(), null, vector), replicates=2)
 
 
@@ -77,7 +78,7 @@ def test_a_little_wander_is_not_preferred_to_none(dof: int) -> None:
     sd = np.full(len(names), np.sqrt(square - one**2))
     mean, known = np.full(len(names), one), np.ones(len(names), bool)
     rng, gains = np.random.default_rng(2), []
-    simulations: Any = SimpleNamespace(of=lambda *_: np.ones((2, len(names))))
+    simulations: Any = SimpleNamespace(layout=LAYOUT, of=lambda *_: np.ones((2, len(names))))
     for _ in range(200):
         null: Any = SimpleNamespace(mean=mean, sd=sd, known=known)
         vector: Any = SimpleNamespace(keys=keys, values=np.cbrt(rng.chisquare(dof, 12) / dof))

@@ -12,9 +12,10 @@ from analysis.mismatch import judge, name, rank
 from analysis.mismatch.candidates import Proposal
 from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.judge import Judge
+from analysis.mismatch.memory import Memory, _near
 from analysis.mismatch.name import Search
 from analysis.mismatch.named import Named
-from analysis.mismatch.rank import Ranked, _near, alike, ties
+from analysis.mismatch.rank import Ranked, alike, ties
 from analysis.mismatch.recalibrate import _moved
 from analysis.mismatch.resolved import explains
 from dsis.effects import registry
@@ -282,11 +283,13 @@ def test_beside_what_gains_much_only_what_gained_enough_is_tried_anew(
     state: Any = SimpleNamespace(
         mismatches=[SimpleNamespace(statistic="row_variance")],
         clues=lambda _: None,
-        predictor=lambda _: SimpleNamespace(loglik=lambda mean: float(mean[0])),
+        predictor=lambda _: SimpleNamespace(
+            loglik=lambda mean: float(mean[0]), gain=lambda mean, _of_pixels: float(mean[0])
+        ),
         null=SimpleNamespace(mean=np.zeros(1)),
         setting=SimpleNamespace(screening=1),
     )
-    memory = rank.Memory()
+    memory = Memory()
 
     def look(*without: str) -> list[str]:
         tried.clear()

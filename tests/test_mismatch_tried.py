@@ -8,6 +8,7 @@ import pytest
 
 from analysis.mismatch import rank
 from analysis.mismatch.candidates import Proposal
+from analysis.mismatch.memory import Memory
 from dsis.effects import registry
 
 
@@ -47,7 +48,7 @@ def test_what_halves_gained_is_remembered_though_even_rows_were_tried_since(
         null=SimpleNamespace(mean=np.zeros(1)),
         setting=SimpleNamespace(screening=1),
     )
-    memory = rank.Memory()
+    memory = Memory()
     for now in ("left_right", "even_odd_rows", "left_right"):
         offered[:] = [now]
         found = rank._tried(state, candidates, memory, lambda: None, (), (), lambda _: True)

@@ -162,7 +162,7 @@ class Judge:
         share = resolved(predictor, self.state, mean)
         if predictor.worth(mean) < LEAST_GAIN:
             return share, NEEDLESS
-        if share < _RESOLVED and not named.measured:
+        if share < _RESOLVED and not (named.measured or named.of_pixels):
             return share, f"{LITTLE} {max(share, 0):.0%} of what it changes"
         if named.kind not in LINES and not locates(self.state, mean):  # frames show lines
             return 1.0, NOTHING

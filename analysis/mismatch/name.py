@@ -14,6 +14,7 @@ from analysis.mismatch.fitted import Fitted
 from analysis.mismatch.instance import LINES, Frequency, frequency_of, instance
 from analysis.mismatch.judge import INSTEAD, LITTLE, NEEDLESS, NOTHING, Judge
 from analysis.mismatch.mapped import as_maps_show
+from analysis.mismatch.memory import Memory
 from analysis.mismatch.named import Named
 from analysis.mismatch.phase import ABSENT, WholeFrames
 from analysis.mismatch.polish import with_effects
@@ -22,7 +23,6 @@ from analysis.mismatch.rank import (
     SURE_CHANCE,
     SURE_GAIN,
     TOLD_APART,
-    Memory,
     Ranked,
     newly_off,
     plainest,
@@ -386,7 +386,7 @@ class Search(Fitted):
         if why != NEEDLESS or (own := named.proposal) is None:
             return False
         gain = gained(state, bare, own.effect, replicates_for(self.setting, [own.effect]))
-        return gain - len(own.free) >= self._least(bare, named.kind)
+        return gain - own.numbers >= self._least(bare, named.kind)
 
     def _judge(self, state: State) -> Judge:
         return Judge(state, lambda named: self.without(state, named), self.setting.nulls)

@@ -58,6 +58,11 @@ class Named:
         """Whether it is a line that whole frames show, with an amplitude of their own."""
         return self.kind in LINES and self.proposal is not None and not self.proposal.free
 
+    @property
+    def of_pixels(self) -> bool:
+        """Whether single pixels show it: what numbers have of few scatters like themselves."""
+        return self.proposal is not None and self.proposal.of_pixels is not None
+
 
 def unclear(named: Named) -> str:
     """Return why an effect is not told from none by its own size; empty: it is.

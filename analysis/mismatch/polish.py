@@ -185,7 +185,7 @@ def information(predictor: Predictor, mean: Array, j: Array) -> tuple[Array, Arr
 def precisions(predictor: Predictor, mean: Array, j: Array) -> Array:
     """Return by how much each number's residual counts; 0 where it or a derivative is unknown."""
     rest, sd, known = predictor.weights(mean)
-    known &= np.isfinite(j).all(1)
+    known &= np.isfinite(j).all(1) & ~predictor.counts.repeated
     return np.where(known, (_NU + 1) / _NU / (1 + (rest / sd) ** 2 / _NU) / sd**2, 0.0)
 
 

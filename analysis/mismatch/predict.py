@@ -4,7 +4,7 @@ Cameras are compared on the same few simulated recordings: draws are counted, so
 have in common cancels. The likelihood has heavy tails, and allows every predicted change an error
 of its own: no effect of the vocabulary is exactly what a sensor does. Mean squares of few frames
 scatter by more than that, and by a law that is known: chi-squared (Wilson & Hilferty, 1931, of
-their cube roots).
+their cube roots). Counts of pixels have theirs; see `counted`.
 """
 
 from collections import Counter
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy.special import gammaln
 
 from analysis.mismatch.bank.key import Key
+from analysis.mismatch.counted import Counted
 from analysis.mismatch.null import Null
 from analysis.mismatch.simulations import Simulations
 from analysis.mismatch.touches import touched
@@ -74,6 +75,8 @@ class Predictor:
         self.simulations, self.reference, self.replicates = simulations, reference, replicates
         self.forms = form_errors(reference.vector.keys)
         self.base = simulations.of(reference.camera, replicates)
+        layout = simulations.layout
+        self.counts = Counted(reference.vector.keys, layout.rows * layout.columns)
         self.few = np.array([key.statistic == _OF_FRAMES for key in reference.vector.keys], bool)
 
     def ready(self, cameras: Iterable[Camera | None]) -> None:
@@ -101,6 +104,7 @@ class Predictor:
         noise = change.var(0, ddof=1) / len(change) if len(change) > 1 else 0.0 * mean
         with np.errstate(invalid="ignore", divide="ignore"):
             kept = np.where(mean == 0, 0.0, mean**2 / (mean**2 + noise))
+        kept[self.counts.which] = 1.0  # their likelihood knows how many were simulated
         return np.asarray(self.reference.null.mean + mean * kept)
 
     def spread(self, camera: Camera) -> Array:
@@ -133,7 +137,24 @@ class Predictor:
     def loglik(self, mean: Array, of: NDArray[np.bool_] | None = None) -> float:
         """Return the log-likelihood of the recorded numbers, or some, relative to any constant."""
         rest, sd, known = self.weights(mean)
-        return self._likely(rest, sd, known if of is None else known & of)
+        judged = known if of is None else known & of
+        counts = self._of_counts(mean, self.reference.null.mean, judged)
+        return self._likely(rest, sd, judged) + counts
+
+    def gain(
+        self, mean: Array, of_pixels: float | None = None, of: NDArray[np.bool_] | None = None
+    ) -> float:
+        """Return what the recorded numbers, or some, gain over the current model, nats.
+
+        `of_pixels`: what single pixels gain, which says all that counts of them say, and more.
+        """
+        before = self.reference.null.mean
+        gain = self.loglik(mean, of) - self.loglik(before, of)
+        if of_pixels is None:
+            return gain
+        known = self.weights(mean)[2] if of is None else self.weights(mean)[2] & of
+        counts = [self._of_counts(one, before, known) for one in (mean, before)]
+        return gain - counts[0] + counts[1] + of_pixels
 
     def worth(self, without: Array) -> float:
         """Return the log-likelihood that the reference gains over a prediction without an effect.
@@ -145,12 +166,19 @@ class Predictor:
         form = np.where(known, self.forms * (without - null.mean), 0.0)
         left = np.where(known, self.reference.vector.values - null.mean, 0.0)
         scatter = np.sqrt(np.maximum(sd**2 - form**2, 0.0))
-        return self._likely(left, np.hypot(null.sd, form), known) - self._likely(
-            rest, scatter, known
-        )
+        own, other = (self._of_counts(one, without, known) for one in (null.mean, without))
+        gain = self._likely(left, np.hypot(null.sd, form), known)
+        return gain + own - self._likely(rest, scatter, known) - other
+
+    def _of_counts(self, mean: Array, before: Array, known: NDArray[np.bool_]) -> float:
+        """Return the log-likelihood of counts, where all of them are known."""
+        if not known[self.counts.which].all():
+            return 0.0
+        form = _FORMS["outlying_pixels"]
+        return self.counts.loglik(self.reference.vector.values, mean, before, form, self.replicates)
 
     def _likely(self, rest: Array, sd: Array, known: NDArray[np.bool_]) -> float:
-        few, many = known & self.few, known & ~self.few
+        few, many = known & self.few, known & ~self.few & ~self.counts.said
         own = rest[many] / sd[many]
         spread = np.log(sd[many] / self.reference.null.sd[many])
         total = float(-((_NU + 1) / 2 * np.log1p(own**2 / _NU) + spread).sum())

@@ -1,21 +1,25 @@
 """Effects that could explain what is off, each with fitted parameters, the best first."""
 
 from collections.abc import Callable, Container, Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from math import log
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.candidates import CANDIDATES, Proposal
-from analysis.mismatch.credited import together
+from analysis.mismatch.credited import joined, together
 from analysis.mismatch.finding import Mismatch
 from analysis.mismatch.instance import Frequency, frequency_of, instance, same_line
+from analysis.mismatch.memory import Memory, words
 from analysis.mismatch.polish import Polished, needed, polish, stepped, with_effects
 from analysis.mismatch.state import Setting, State
 from dsis.effects import Effect
 
 Array = NDArray[np.float64]
+Fit = tuple[str, Proposal, Polished]
+"""A kind, what it was proposed as, and that with fitted parameters."""
+
 LEAST_GAIN = 2.0  # of log-likelihood, below which an effect is not worth its parameter
 # For an effect to be taken in: odds of 20, were any of the vocabulary as likely beforehand. Where
 # that something calls for it is as sure, the likelihood need only tell it from others.
@@ -27,14 +31,13 @@ _SHARE = 0.03  # or that share of what the best gains
 _ROUNDS = 2  # of a fit, where each simulation takes long
 TOLD_APART = 3.0  # of log-likelihood: odds below 20 do not tell two effects apart
 _COSINE = 0.5  # of what two predictions change, from which they change the same
-_ALIKE = 0.05  # relative difference of parameters up to which a proposal is an earlier one
 _SPARSE = 4  # times as many simulations
 _BY_FRAME = frozenset({"frame_variance"})
 # A sign: half of the pairs of frames show nothing, half show it twice. A band: one bin's phase.
 # Pink noise and bands of rows: most of it in a frame's mean and in the first few bins. Gains that
-# neighbours share: in few patches.
+# neighbours share: in few patches. Hot pixels: the few brightest ones.
 _BY_DRAW = frozenset(
-    {"bistable_pattern", "line_flicker", "pink_noise", "row_banding", "smooth_prnu"}
+    {"bistable_pattern", "hot_pixels", "line_flicker", "pink_noise", "row_banding", "smooth_prnu"}
 )
 _BY_BIN = frozenset({"periodic_noise"})  # of few frames: the noise of one bin comes on top
 # That greens differ is seen; what amplifiers of even and odd rows make of red and blue is not.
@@ -47,45 +50,6 @@ _TWINS = {
 _FAR_OFF, _LITTLE = 8.0, 0.3  # departures, and the share of one that is little
 _STRONG = 30.0  # gain of log-likelihood beside which what gained little before needs no new trial
 _WORTH_IT = 0.3  # share of it
-_SHARED = 0.1  # share of an effect's change that may lie where the model moved since
-
-
-@dataclass
-class Memory:
-    """What proposals changed beside earlier models: contributions of different physics add.
-
-    Attributes
-    ----------
-    changes
-        Effect, the numbers' means then, and its change of them.
-    gains
-        What each kind gained when it was tried last, by the words of its parameters: halves of a
-        sensor say nothing of its even and odd rows.
-    """
-
-    changes: list[tuple[Effect, Array, Array]] = field(default_factory=list)
-    gains: dict[str, dict[tuple[str, ...], float]] = field(default_factory=dict)
-
-    def gained(self, kind: str, unknown: float) -> float:
-        """Return what a kind gained at most; `unknown`: it was never tried."""
-        return max(self.gains.get(kind, {}).values(), default=unknown)
-
-    def recalled(self, effect: Effect, state: State) -> Array | None:
-        """Return the numbers with an effect added, as remembered; None: it must be simulated."""
-        null = state.null
-        for known, means, change in self.changes:
-            if not _near(known, effect):
-                continue
-            size = np.where(null.known, np.abs(change) / null.sd, 0.0)
-            moved = np.where(null.known, np.abs(null.mean - means) / null.sd, 0.0) > 1.0
-            if size[moved].sum() <= _SHARED * size.sum():
-                return null.mean + change
-        return None
-
-    def keep(self, effect: Effect, state: State, mean: Array) -> None:
-        """Remember what an effect changed."""
-        means = state.null.mean
-        self.changes.append((effect, means, np.nan_to_num(mean - means)))
 
 
 def replicates_for(setting: Setting, effects: Iterable[Effect]) -> int:
@@ -101,18 +65,6 @@ def replicates_for(setting: Setting, effects: Iterable[Effect]) -> int:
 def _sparse(setting: Setting, effect: Effect) -> bool:
     few = not setting.large and effect.kind in _BY_BIN
     return few or effect.measures == _BY_FRAME or effect.kind in _BY_DRAW
-
-
-def _near(one: Effect, other: Effect) -> bool:
-    if type(one) is not type(other):
-        return False
-    a, b = one.model_dump(), other.model_dump()
-    return all(
-        abs(a[name] - b[name]) <= _ALIKE * abs(a[name])
-        if isinstance(a[name], float) and isinstance(b[name], float)
-        else a[name] == b[name]
-        for name in a
-    )
 
 
 @dataclass(frozen=True)
@@ -159,7 +111,7 @@ def ranked(
         asked.ready(camera for fit in fits for camera in needed(*fit))
         if state.setting.jobs > 1 and len(starts) > 1:
             asked.ready(stepped(asked, *fit) for fit in fits)
-    found: list[tuple[str, Proposal, Polished]] = []
+    found: list[Fit] = []
     given = state.setting.given
     for value, kind, proposal in tried:
         kinds_so_far = {one[0] for one in found}
@@ -175,13 +127,38 @@ def ranked(
             continue
         if not any(alike(state, polished.mean, one) for one in apart):
             found.append((kind, proposal, polished))
-    judged = ~_others(state, [polished.mean for _, _, polished in found])
-    before = predictor.loglik(state.null.mean, judged)
+    fitted = _in_order(state, found)
+    best = max((one.gain for one in fitted), default=SURE_GAIN)
+    if best >= SURE_GAIN or state.setting.large:
+        return fitted
+    return _in_order(state, _once_more(state, found))
+
+
+def _in_order(state: State, found: Sequence[Fit]) -> list[Ranked]:
+    """Return fitted effects with their gains, the best first."""
+    predictor = state.predictor()
+    judged = ~_others(state, [own.mean for _, _, own in found])
     fitted = [
-        Ranked(predictor.loglik(own.mean, judged) - before - len(start.free), kind, start, own)
+        Ranked(predictor.gain(own.mean, start.of_pixels, judged) - start.numbers, kind, start, own)
         for kind, start, own in found
     ]
     return sorted(fitted, key=lambda one: -one.gain)
+
+
+def _once_more(state: State, found: Sequence[Fit]) -> list[Fit]:
+    """Return fitted effects with what more simulations predict.
+
+    Few that draw lines or pixels at random have some of it in numbers that the effect leaves alone
+    on the whole: that costs a weak one more than it gains.
+    """
+    predictor = state.predictor(state.setting.drafts)
+    given = state.setting.given
+    cameras = [joined(state.camera, own.effects, given) for _, _, own in found]
+    predictor.ready(cameras)
+    return [
+        (kind, start, own if camera is None else replace(own, mean=predictor.mean(camera)))
+        for (kind, start, own), camera in zip(found, cameras, strict=True)
+    ]
 
 
 def _likely(tried: Sequence[tuple[float, str, Proposal]], least: float) -> list[Proposal]:
@@ -244,13 +221,13 @@ def _tried(
         for (kind, proposal), mean in zip(proposed, means, strict=True):
             if mean is None:
                 continue
-            value = predictor.loglik(mean)
-            which = kind, _words(proposal.effect)
+            value = before + predictor.gain(mean, proposal.of_pixels)
+            which = kind, words(proposal.effect)
             gains[which] = max(gains.get(which, -np.inf), value - before)
             if not any(alike(state, mean, other) for other in apart):
                 found.append((value, kind, proposal, mean))
-        for (kind, words), gain in gains.items():
-            memory.gains.setdefault(kind, {})[words] = gain
+        for (kind, which_of), gain in gains.items():
+            memory.gains.setdefault(kind, {})[which_of] = gain
         best = max((value - before for value, *_ in found), default=0.0)
     # Of one kind, each that changes other numbers: memory of one lag says nothing of another's.
     kept: list[tuple[float, str, Proposal, Array]] = []
@@ -258,12 +235,6 @@ def _tried(
         if not any(one[1] == other[1] and alike(state, one[3], other[3]) for other in kept):
             kept.append(one)
     return [(value, kind, proposal) for value, kind, proposal, _ in kept]
-
-
-def _words(effect: Effect) -> tuple[str, ...]:
-    """Return those of an effect's parameters that are words: an edge, the regions of amplifiers."""
-    values = effect.model_dump(exclude={"kind"}).values()
-    return tuple(value for value in values if isinstance(value, str))
 
 
 def _means(

@@ -81,7 +81,7 @@ _SPECTRA = frozenset({"spectral_peak", "row_spectrum_peak", "column_spectrum_pea
                       "slow_row_variance", "row_correlation"})  # fmt: skip
 _SHARED = frozenset({"fixed_row_variance", "fixed_column_variance", "fixed_smooth_variance",
                      "fixed_smooth_tilt", "fixed_smooth_falloff", "fixed_edge",
-                     "fixed_patch_variance", "half_seam"})  # fmt: skip
+                     "fixed_patch_variance", "half_seam", "outlying_pixels"})  # fmt: skip
 
 
 def together_too(scope: str, detail: str) -> str:

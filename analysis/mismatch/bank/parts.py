@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from math import log, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from analysis.mismatch.bank.edges import edges
 from analysis.mismatch.bank.patches import patches
@@ -19,7 +19,7 @@ from dsis.measures.residuals import pixel_residuals
 Array = NDArray[np.float64]
 _FAR_OUT, _FEW = 5.0, 0.01  # standard deviations of single pixels, and their share at most
 _CHANCE = 3.0  # standard errors of a mean square
-STANDING_OUT = (3.5, 5)  # standard deviations of a map above its middle
+STANDING_OUT = (3.5, 5, 8)  # standard deviations of a map above its middle
 
 
 @dataclass(frozen=True)
@@ -138,9 +138,19 @@ def _outlying(fourth: float, square: float, size: int) -> Number:
 
 
 def _standing_out(pixels: Array, square: float) -> dict[str, Number]:
-    """Return how many pixels lie far above the others, as twice the root (Anscombe 1948)."""
+    """Return how many pixels lie far above the others, as roots."""
     sd = sqrt(square)
     return {
-        f"outlying_pixels of {limit:g}": (2 * sqrt((pixels > limit * sd).sum() + 3 / 8), 1.0)
+        f"outlying_pixels of {limit:g}": (float(rooted((pixels > limit * sd).sum())), 1.0)
         for limit in STANDING_OUT
     }
+
+
+def rooted(count: ArrayLike) -> Array:
+    """Return twice the root of counts, of standard deviation 1 (Anscombe 1948)."""
+    return np.asarray(2 * np.sqrt(np.asarray(count) + 3 / 8))
+
+
+def counted(root: Array) -> Array:
+    """Return the counts of such roots."""
+    return np.asarray((root / 2) ** 2 - 3 / 8)

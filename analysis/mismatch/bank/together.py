@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.bank.edges import names as edge_names
-from analysis.mismatch.bank.parts import Parts, sure_of_lines
+from analysis.mismatch.bank.parts import STANDING_OUT, Parts, counted, rooted, sure_of_lines
 from analysis.mismatch.bank.patches import patches
 from analysis.mismatch.bank.scalars import Number, ratio_root
 from analysis.mismatch.bank.seams import WHOLE
@@ -27,7 +27,7 @@ def together(
     sharpness: Mapping[str, float],
     sites: Mapping[str, tuple[int, int]],
 ) -> dict[str, Number]:
-    """Return the numbers of lines and surfaces that channels share.
+    """Return the numbers of lines and surfaces that channels share, and of pixels that stand out.
 
     Parameters
     ----------
@@ -66,6 +66,9 @@ def together(
         found[f"{one}, {TOGETHER}"] = (size, 1.0)
     for name, number in _patches(list(parts.values()), [sharpness[n] for n in names]).items():
         found[f"{name}, {TOGETHER}"] = number
+    for one in (f"outlying_pixels of {limit:g}" for limit in STANDING_OUT):
+        roots = np.array([parts[n].numbers[one][0] for n in names])
+        found[f"{one}, {TOGETHER}"] = (float(rooted(counted(roots).sum())), 1.0)
     least = min(len(parts[name].coefficients) for name in names)
     surface = _mean(
         [parts[name].coefficients[:least, :least] for name in names],

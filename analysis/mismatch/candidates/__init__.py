@@ -3,6 +3,7 @@
 from analysis.mismatch.candidates import (
     edges,
     fields,
+    hot,
     neighbours,
     patterns,
     pixels,
@@ -14,7 +15,7 @@ from analysis.mismatch.candidates.candidate import Candidate, Proposal, measured
 
 CANDIDATES: dict[str, Candidate] = {
     candidate.kind: candidate
-    for module in (temporal, rows, pixels, neighbours, patterns, fields, edges, response)
+    for module in (temporal, rows, pixels, neighbours, patterns, hot, fields, edges, response)
     for candidate in module.CANDIDATES
 }
 

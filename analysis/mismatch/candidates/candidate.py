@@ -24,12 +24,20 @@ class Proposal:
         Those of them that may be negative: fitted as they are, others by their logarithm.
     errors
         Standard errors of parameters that the proposal has measured by itself.
+    of_pixels
+        What single pixels gain by the effect, nats, in place of counts of them; None: not asked.
     """
 
     effect: Effect
     free: tuple[str, ...]
     signed: frozenset[str] = field(default_factory=frozenset)
     errors: Mapping[str, float] = field(default_factory=dict)
+    of_pixels: float | None = None
+
+    @property
+    def numbers(self) -> int:
+        """How many numbers the recording has chosen, or will."""
+        return len({*self.free, *self.errors})
 
 
 @dataclass(frozen=True)

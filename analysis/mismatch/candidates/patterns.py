@@ -1,4 +1,4 @@
-"""What mean frames show: fixed patterns, shading, taps, hot pixels, glow."""
+"""What mean frames show: fixed patterns, shading, taps, glow."""
 
 from collections.abc import Callable, Mapping, Sequence
 from math import exp, log, sqrt
@@ -207,43 +207,6 @@ def _imbalance(clues: Clues) -> Sequence[Proposal]:
     )
 
 
-def _hot(clues: Clues) -> Sequence[Proposal]:
-    values, noise, scale = _pooled(clues, "time")
-    if values is None:
-        return []
-    found: list[Proposal] = []
-    clear = values > 5 * noise
-    if clear.sum() >= 2:
-        # Exponential: the same mean beyond any start.
-        excess = float((values[clear] - 5 * noise).mean())
-        fraction = float(clear.mean()) * float(np.exp(min(5 * noise / excess, 3.0)))
-        found += _of_hot(fraction, excess / scale)
-    tails = 3 * np.expm1(max(clues.number("outlying_pixels", "time"), 0.0))
-    for fraction in (0.001, 0.003, 0.01):
-        # E[x^4] = 24 mean^4 of an exponential: an excess kurtosis of 24 f (mean / noise)^4.
-        mean = noise * float(tails / (24 * fraction)) ** 0.25
-        found += _of_hot(fraction, mean / scale)
-    return found
-
-
-def _of_hot(fraction: float, mean_dn_per_s: float) -> Sequence[Proposal]:
-    names = ["pixel_fraction", "mean_dn_per_s"]
-    if mean_dn_per_s <= 0:
-        return []
-    return proposals(
-        "hot_pixels", names, pixel_fraction=min(fraction, 0.4), mean_dn_per_s=mean_dn_per_s
-    )
-
-
-def _pooled(clues: Clues, name: str) -> tuple[Array | None, float, float]:
-    images = clues.image(name)
-    if not images:
-        return None, 1.0, 1.0
-    values = np.concatenate([(i - np.median(i)).ravel() for i, _ in images.values()])
-    noise = float(np.mean([s for _, s in images.values()]))
-    return values, noise, clues.scale(name, next(iter(images)))
-
-
 def _glow(clues: Clues) -> Sequence[Proposal]:
     """Fit exp(-r / L) from each edge and corner to the map that grows with time."""
     images = clues.image("time")
@@ -306,6 +269,5 @@ CANDIDATES = (
     Candidate("shading", _SMOOTH, _shading),
     Candidate("tap_mismatch", ("half_seam", "parity", "channel_ratio", *_SMOOTH), _taps),
     Candidate("channel_imbalance", ("channel_ratio",), _imbalance),
-    Candidate("hot_pixels", ("outlying_pixels", "one_off_outliers", "fixed_pixel_variance"), _hot),
     Candidate("amp_glow", _SMOOTH, _glow, sane=_is_glow),
 )

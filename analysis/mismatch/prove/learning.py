@@ -15,6 +15,7 @@ import numpy as np
 from analysis.mismatch.prove.cells import cells_of
 from analysis.mismatch.prove.dependence import with_dependence, with_levels
 from analysis.mismatch.prove.held import Held, HeldExposure
+from analysis.mismatch.prove.hot import hot_of
 from analysis.mismatch.prove.law import Conspicuous, ExposureLaw, Law
 from analysis.mismatch.prove.marginal import with_groups, with_shapes, with_variances
 from analysis.mismatch.prove.patterns import Halves, Pattern, pattern_of
@@ -169,11 +170,15 @@ def _patterns(
     if not uniform:
         return ()
     trained = np.array([e.trained for e in uniform], np.float64)
+    times = np.array([e.exposure_time_s for e in uniform])
     found = []
     for place in site_places(held.cfa):
         variance = np.array([law.exposures[e.name].variance_dn2[place].mean() for e in uniform])
         own, base = (_halves([stacks[e.name] for e in uniform], place) for stacks in (model, other))
-        found.append(pattern_of(own, base, variance, trained))
+        pattern = pattern_of(own, base, variance, trained)
+        if pattern.outliers is None:
+            pattern = replace(pattern, hot=hot_of(law.camera.effect, times, trained / variance))
+        found.append(pattern)
     return tuple(found)
 
 

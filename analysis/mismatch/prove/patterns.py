@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
+from analysis.mismatch.prove.hot import Hot
+
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 _FAR = 6.0  # robust standard deviations from which a pixel is an outlier of a map
@@ -51,10 +53,13 @@ class Pattern:
         Wiener gain of each class of frequencies: (class, exposure, exposure).
     outliers
         Gain of pixels far from all others, (exposure, exposure); None: the model has none.
+    hot
+        Pixels that are hot, where they are too few for that; None: the model has none.
     """
 
     gains: Array
     outliers: Array | None
+    hot: Hot | None = None
 
     def estimate(self, maps: Array) -> tuple[Array, Mask]:
         """Return the pattern that training maps (exposure, row, column) tell, and outliers."""
@@ -69,6 +74,8 @@ class Pattern:
         pattern = fft.idctn(made.reshape(maps.shape), axes=(1, 2), norm="ortho")
         if self.outliers is not None and far.any():
             pattern[:, far] += self.outliers @ (maps[:, far] - pattern[:, far])
+        if self.hot is not None:
+            pattern += self.hot.estimate(maps - pattern)
         return np.asarray(pattern, np.float64), far
 
 

@@ -1,0 +1,76 @@
+"""Hot pixels, measured of the map that grows with exposure time."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.mismatch.candidates.candidate import Candidate, Proposal, measured, proposals
+from analysis.mismatch.clues import Clues
+from analysis.mismatch.hotlaw import hot_laws
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+_NUMBERS = ("pixel_fraction", "mean_dn_per_s")
+_CLEAR = 5.0  # standard deviations of a pixel's summed variance
+_SEEN = 2  # frames: of more there are variances
+
+
+def _hot(clues: Clues) -> Sequence[Proposal]:
+    """Return the likeliest laws of the map's pixels, where they gain more than their parameters."""
+    grown = _grown(clues)
+    if grown is None:
+        return []
+    images, scale = grown
+    noisy = {name: _noisy(clues, name, image / scale) for name, (image, _) in images.items()}
+    found: list[Proposal] = []
+    for law in hot_laws(images, noisy):
+        if law.gain < len(_NUMBERS):
+            continue
+        values = dict(zip(_NUMBERS, (law.share, law.mean / scale), strict=True))
+        errors = dict(zip(_NUMBERS, (law.share_error, law.mean_error / scale), strict=True))
+        found += [
+            replace(measured(own, values, errors), of_pixels=law.gain)
+            for own in proposals("hot_pixels", _NUMBERS, (), **values)
+        ]
+    return found
+
+
+def _grown(clues: Clues) -> tuple[Mapping[str, tuple[Array, float]], float] | None:
+    """Return a map with its noise by channel, and in how many seconds it grows so; None: unknown.
+
+    Where all exposures take the same time the offset is what has grown in it.
+    """
+    if images := clues.image("time"):
+        return images, clues.scale("time", next(iter(images)))
+    times = {exposure.exposure_time_s for exposure in clues.layout.uniform}
+    images = clues.image("offset")
+    if not images or len(times) > 1 or not max(times) > 0:
+        return None
+    return images, max(times)
+
+
+def _noisy(clues: Clues, channel: str, rate: Array) -> Mask:
+    """Return which pixels are noisier than the shot noise of their own charge: they jump.
+
+    Or were hit by a spike. What they add to a mean frame is no dark current. The rate is in DN/s.
+    """
+    total, sd = clues.image("variance")[channel]
+    per_s = np.maximum(rate - np.median(rate), 0.0)
+    dark, lit = clues.fit.line_dn2(np.array([0.0, 1.0]))
+    expected, most = np.zeros(rate.shape), np.zeros(rate.shape)
+    for exposure in clues.layout.uniform:
+        frames = len(exposure.numbers)
+        if frames <= _SEEN or (exposure.name, channel) in clues.layout.still:
+            continue
+        variance = clues.layout.variance_dn2[exposure.name, channel]
+        share = max(float(lit - dark), 0.0) * per_s * exposure.exposure_time_s / variance
+        expected += (frames - 1) / variance * share
+        most = np.maximum(most, share)
+    return np.asarray(total - expected > _CLEAR * sd * (1 + most))
+
+
+CANDIDATES = (
+    Candidate("hot_pixels", ("outlying_pixels", "one_off_outliers", "fixed_pixel_variance"), _hot),
+)

@@ -1,0 +1,69 @@
+"""What a search remembers of effects that it tried: contributions of different physics add."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.mismatch.state import State
+from dsis.effects import Effect
+
+Array = NDArray[np.float64]
+_ALIKE = 0.05  # relative difference of parameters up to which a proposal is an earlier one
+_SHARED = 0.1  # share of an effect's change that may lie where the model moved since
+
+
+@dataclass
+class Memory:
+    """What proposals changed beside earlier models: contributions of different physics add.
+
+    Attributes
+    ----------
+    changes
+        Effect, the numbers' means then, and its change of them.
+    gains
+        What each kind gained when it was tried last, by the words of its parameters: halves of a
+        sensor say nothing of its even and odd rows.
+    """
+
+    changes: list[tuple[Effect, Array, Array]] = field(default_factory=list)
+    gains: dict[str, dict[tuple[str, ...], float]] = field(default_factory=dict)
+
+    def gained(self, kind: str, unknown: float) -> float:
+        """Return what a kind gained at most; `unknown`: it was never tried."""
+        return max(self.gains.get(kind, {}).values(), default=unknown)
+
+    def recalled(self, effect: Effect, state: State) -> Array | None:
+        """Return the numbers with an effect added, as remembered; None: it must be simulated."""
+        null = state.null
+        for known, means, change in self.changes:
+            if not _near(known, effect):
+                continue
+            size = np.where(null.known, np.abs(change) / null.sd, 0.0)
+            moved = np.where(null.known, np.abs(null.mean - means) / null.sd, 0.0) > 1.0
+            if size[moved].sum() <= _SHARED * size.sum():
+                return null.mean + change
+        return None
+
+    def keep(self, effect: Effect, state: State, mean: Array) -> None:
+        """Remember what an effect changed."""
+        means = state.null.mean
+        self.changes.append((effect, means, np.nan_to_num(mean - means)))
+
+
+def words(effect: Effect) -> tuple[str, ...]:
+    """Return those of an effect's parameters that are words: an edge, the regions of amplifiers."""
+    values = effect.model_dump(exclude={"kind"}).values()
+    return tuple(value for value in values if isinstance(value, str))
+
+
+def _near(one: Effect, other: Effect) -> bool:
+    if type(one) is not type(other):
+        return False
+    a, b = one.model_dump(), other.model_dump()
+    return all(
+        abs(a[name] - b[name]) <= _ALIKE * abs(a[name])
+        if isinstance(a[name], float) and isinstance(b[name], float)
+        else a[name] == b[name]
+        for name in a
+    )

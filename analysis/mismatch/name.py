@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from analysis.mismatch.candidates import CANDIDATES, measured
 from analysis.mismatch.contradicted import refuted
 from analysis.mismatch.credited import joined, kept_up
-from analysis.mismatch.finding import Mismatch
 from analysis.mismatch.fitted import Fitted
 from analysis.mismatch.instance import LINES, Frequency, frequency_of, instance
 from analysis.mismatch.judge import INSTEAD, LITTLE, NEEDLESS, NOTHING, Judge
@@ -30,7 +29,7 @@ from analysis.mismatch.rank import (
     ties,
     twin,
 )
-from analysis.mismatch.resolved import calls_alone, explains, gained, opened
+from analysis.mismatch.resolved import calls_alone, differ, explains, gained, opened
 from analysis.mismatch.segments import second_path
 from analysis.mismatch.state import State
 from dsis.camera import Camera
@@ -44,15 +43,6 @@ _MOST_LINES = 5  # further ones stay unexplained, located
 _ROUNDS = 3  # of a search that goes on
 _SPIKY = 10.0  # standard errors from which tails bend the variances
 _TAILS = frozenset({"kurtosis", "kurtosis_within_pixels", "one_off_outliers"})
-
-
-def _differ(before: Sequence[Mismatch], now: Sequence[Mismatch]) -> bool:
-    """Return whether something differs now that did not before, or not surely."""
-    sure = {m.statistic: m.p_adjusted < SURE_CHANCE for m in before}
-    return any(
-        m.statistic not in sure or (m.p_adjusted < SURE_CHANCE and not sure[m.statistic])
-        for m in now
-    )
 
 
 @dataclass
@@ -114,7 +104,7 @@ class Search(Fitted):
             state = self._asked_of_all(self._pruned(state))
             kept = {one.name for one in self.named}
             dropped = [one for one in taken if one.name not in kept]
-            if not (dropped or _differ(sought, state.mismatches)) or not state.mismatches:
+            if not (dropped or differ(sought, state.mismatches)) or not state.mismatches:
                 break
             forgiven |= self._forgiven(dropped) if number == 0 else {}
         left = forgiven.keys() - {one.name for one in self.named}
@@ -298,7 +288,9 @@ class Search(Fitted):
             apart = [one.polished.mean for pair in self.ties for one in pair]
             settled = tuple(self.settled)
             left = self._left() - self.doubted.keys()
-            fitted = ranked(state, left, self.memory, self.step, settled, apart, self._possible)
+            fitted = ranked(
+                state, left, self.memory, self.step, settled, apart, self._possible, self._shown
+            )
             if len(self.settled) > len(settled):
                 continue  # a line was refused: behind it another may be
             before = len(self.doubted)
@@ -358,6 +350,10 @@ class Search(Fitted):
         elif denial is not None:
             self._refuse(effect.kind, effect, denial)
         return denial is None
+
+    def _shown(self, effect: Effect) -> float:
+        """Return what whole frames gain by a line; minus infinity: nothing, or it is none."""
+        return -np.inf if self.lines is None else self.lines.gain(effect)
 
     def denied(self, state: State) -> tuple[Named, str] | None:
         """Return the effect that the recording denies most, and why; None: it denies none."""

@@ -131,11 +131,13 @@ def ranked(
     settled: tuple[tuple[str, Frequency], ...] = (),
     apart: Sequence[Array] = (),
     possible: Callable[[Effect], bool] = lambda _: True,
+    shown: Callable[[Effect], float] = lambda _: -np.inf,
 ) -> list[Ranked]:
     """Return the effects among `kinds` that mismatches call for, fitted one at a time.
 
     `settled` are lines that need no trial; see `Clues`. What changes the same numbers as one of the
-    predictions `apart` is not considered, nor what is not `possible`.
+    predictions `apart` is not considered, nor what is not `possible`. `shown` says what whole
+    frames gain by a line: one number of the bank, the largest of many, says less of a weak one.
     """
     predictor = state.predictor()
     before = predictor.loglik(state.null.mean)
@@ -170,10 +172,10 @@ def ranked(
             found.append((kind, proposal, polished))
     judged = ~_others(state, [polished.mean for _, _, polished in found])
     before = predictor.loglik(state.null.mean, judged)
-    fitted = [
-        Ranked(predictor.loglik(own.mean, judged) - before - len(start.free), kind, start, own)
-        for kind, start, own in found
-    ]
+    fitted = []
+    for kind, start, fit in found:
+        gain = max(predictor.loglik(fit.mean, judged) - before, shown(start.effect))
+        fitted.append(Ranked(gain - len(start.free), kind, start, fit))
     return sorted(fitted, key=lambda one: -one.gain)
 
 

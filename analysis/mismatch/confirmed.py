@@ -1,8 +1,10 @@
 """What a search found, confirmed or dropped: by all frames together, and by the locked ones."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 
+from analysis.mismatch.allframes import shown_by_all
 from analysis.mismatch.finding import Gain
 from analysis.mismatch.judge import Judge
 from analysis.mismatch.name import Search
@@ -101,7 +103,13 @@ def _gained(search: Search, final: State, trial: Trial) -> dict[str, Gained]:
     little = [named for named in search.named if named.gain < _DOUBTFUL]
     for some in (little, [named for named in search.named if named not in little]):
         cameras = _fitted_without(search, final, some)
-        found |= trial.gains(final, cameras)
+        told = trial.gains(final, cameras)
+        for named in some:
+            one = told[named.name]
+            if not (one.certain or one.denied):
+                sure = shown_by_all(search, final, named, cameras[named.name], trial)
+                told[named.name] = replace(one, certain=sure)
+        found |= told
         if not all(one.certain for one in found.values()):
             break
     return found

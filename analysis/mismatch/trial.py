@@ -1,8 +1,8 @@
 """The locked frames: what they say of the base model, the final model and every effect."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import partial
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,7 @@ from analysis.mismatch.heldnumbers import HeldNumbers
 from analysis.mismatch.model import each, in_threads, simulate
 from analysis.mismatch.null import null_of
 from analysis.mismatch.observe import Observation, observe
+from analysis.mismatch.phase import WholeFrames
 from analysis.mismatch.prove.gain import heldout_gain, telling
 from analysis.mismatch.prove.gap import gap_closed
 from analysis.mismatch.prove.held import Held, hold
@@ -37,10 +38,14 @@ _ERRORS = 2.2  # standard errors from a gain to the end of its interval, of few 
 
 @dataclass(frozen=True)
 class Gained:
-    """A gain per locked frame with its interval, and whether chance is ruled out."""
+    """A gain per locked frame with its interval, and whether chance is ruled out.
+
+    `denied`: the pixels are sure that the effect makes it worse.
+    """
 
     gain: Gain
     certain: bool
+    denied: bool = False
 
 
 def _of_pixels(gain: Gain, frames: int) -> Gained:
@@ -106,6 +111,14 @@ class Trial:
         numbers = HeldNumbers(recording, split, source, setting)
         return cls(recording, split, held, numbers, setting.seed)
 
+    @cached_property
+    def lines(self) -> WholeFrames:
+        """What all frames show of lines, the locked ones too."""
+        layout = self.numbers.whole[0]
+        numbers = {e.name: e.numbers for e in layout.exposures}
+        source = self.numbers.source
+        return WholeFrames(layout, lambda name: source.frames(name, numbers[name]))
+
     def gains(self, final: State, without: Mapping[str, Camera]) -> dict[str, Gained]:
         """Return what the final model gains over cameras without an effect, by effect."""
         if self.held is None:
@@ -120,7 +133,9 @@ class Trial:
             frames = sum(whole.frames[name].size for name in telling(less, whole))
             found[kind] = _of_pixels(heldout_gain(less, whole, seed=self.seed), frames)
             # Where the pixels are sure that it is worse, sums of numbers do not overrule them.
-            if not found[kind].certain and not _denied(found[kind].gain, frames):
+            if _denied(found[kind].gain, frames):
+                found[kind] = replace(found[kind], denied=True)
+            elif not found[kind].certain:
                 told = self.numbers.gain(final, camera)
                 if told is not None and told.certain:
                     found[kind] = Gained(_per_frame(told, self.numbers.frames), certain=True)

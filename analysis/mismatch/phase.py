@@ -50,6 +50,7 @@ class WholeFrames:
     frames_of: FramesOf
     _shown: dict[Frequency, bool] = field(default_factory=dict)
     _looks: dict[Frequency, "Look"] = field(default_factory=dict)
+    _gains: dict[tuple[Frequency, bool], float] = field(default_factory=dict)
 
     def shown(self, effect: Effect) -> bool:
         """Return whether an effect is no line of a mosaic, or the one that whole frames show."""
@@ -124,6 +125,12 @@ class WholeFrames:
         return self._gain(frequency, kept=effect.kind == "bistable_pattern")
 
     def _gain(self, frequency: Frequency, *, kept: bool) -> float:
+        """Return the gain of a line whose phase is kept but for its sign, or of another in each."""
+        if (frequency, kept) not in self._gains:
+            self._gains[frequency, kept] = self._gained(frequency, kept=kept)
+        return self._gains[frequency, kept]
+
+    def _gained(self, frequency: Frequency, *, kept: bool) -> float:
         line = self._looks[frequency].line
         power = 0.0 if line is None else float(line.excess[0])
         if line is None or not power > 0:

@@ -64,7 +64,7 @@ def there(
         Whether all samples of the pattern are real: projections are, noise and all; then it has no
         phase but its sign.
     """
-    phases = (1.0 + 0.0j,) if real else tuple(_phases())
+    phases = tuple(_phases()) if kept and not real else (1.0 + 0.0j,)
     unit = np.sqrt(0.5) if real else 1.0
     line = np.zeros((_STRENGTHS.size, len(phases)))
     for own, amplitude in zip(found, amplitudes, strict=True):

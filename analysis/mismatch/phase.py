@@ -12,10 +12,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.mismatch.bandgain import gain_of_bands
 from analysis.mismatch.instance import Frequency, frequency_of, same_line
 from analysis.mismatch.layout import Layout
 from analysis.mismatch.projections import LEAST, SURE, FramesOf, Power, projections
 from dsis.effects import Effect
+from dsis.effects.line_flicker import LineFlicker
 
 _CLEAR_POWER = 3.0  # standard errors of a line's power from which its amplitude is known
 _ASIDE = 3  # bins to the neighbours that say what is around
@@ -119,6 +121,8 @@ class WholeFrames:
         have few. Interference, which knows nothing of pixels, may be at any: it pays for all of
         them there too. Minus infinity where frames deny the line, or cannot tell.
         """
+        if isinstance(effect, LineFlicker):
+            return gain_of_bands(self.layout, self.frames_of, effect.cycles_per_frame)
         frequency = frequency_of(effect)
         if frequency is None or self.denial(effect) is not None:
             return -np.inf
@@ -208,10 +212,10 @@ def look(layout: Layout, frames_of: FramesOf, frequency: Frequency) -> Look:
     crest, off = _top(float(power.excess[best]), around.excess[-len(_CROSS) :])
     around = around.at(range(2 * count))
     # What rows or columns have in common is noise beside which a line must stand out.
-    ground = max(
-        float(np.median(around.excess[i * count + len(_NEAR) : (i + 1) * count])) for i in (0, 1)
-    )
-    own, around = own.above(ground), around.above(ground)
+    far = [slice(i * count + len(_NEAR), (i + 1) * count) for i in (0, 1)]
+    ground = max(float(np.median(around.excess[one])) for one in far)
+    level = min(max(float(np.median(around.level[one])) for one in far), 1.0)
+    own, around = own.above(ground, level), around.above(ground, level)
     real = all((2 * f) % 1 == 0 for f in (fx, fy))
     bins = _FEW if exact else rows * columns / 2
     broad = False
@@ -224,9 +228,9 @@ def look(layout: Layout, frames_of: FramesOf, frequency: Frequency) -> Look:
         ]
         if exact or not some:
             continue
-        level = float(np.median(around.excess[some]))  # one of them may be a line itself
-        raised = level / around.error * np.sqrt(len(some)) > _RAISED
-        broad |= bool(raised) and level > _SHARE * float(own.excess[0])
+        near = float(np.median(around.excess[some]))  # one of them may be a line itself
+        raised = near / around.error * np.sqrt(len(some)) > _RAISED
+        broad |= bool(raised) and near > _SHARE * float(own.excess[0])
     absent = own.chance(real=real) * bins > _CHANCE
     kept = own.keeps_phase(real=real)
     if exact:

@@ -27,7 +27,8 @@ class Power:
     found
         Of each exposure: (frame, frequency), noise at 1.
     weights
-        Of each exposure: one over its variance, DN^-2.
+        Of each exposure: one over its variance, DN^-2; of what is in proportion to the signal, its
+        square over its variance.
     """
 
     found: tuple[NDArray[np.complex128], ...]
@@ -46,18 +47,39 @@ class Power:
         """Return the same of some frequencies."""
         return replace(self, found=tuple(own[:, which] for own in self.found))
 
-    def above(self, ground: float) -> "Power":
-        """Return the same beside noise of so much more power at a frequency, DN^2."""
-        more = [1 + max(ground, 0.0) * w for w in self.weights]
+    def above(self, ground: float, level: float = 1.0) -> "Power":
+        """Return the same beside noise of so much more power at a frequency, DN^2.
+
+        `level`: of white noise, of which what makes neighbours alike leaves less at high
+        frequencies.
+        """
+        return self._over([level + max(ground, 0.0) * w for w in self.weights])
+
+    def _over(self, noise: Sequence[float]) -> "Power":
+        """Return the same beside noise of so much power at a frequency, white noise at 1."""
         return Power(
-            tuple(own / np.sqrt(m) for own, m in zip(self.found, more, strict=True)),
-            tuple(w / m for w, m in zip(self.weights, more, strict=True)),
+            tuple(own / np.sqrt(m) for own, m in zip(self.found, noise, strict=True)),
+            tuple(w / m for w, m in zip(self.weights, noise, strict=True)),
         )
 
     @property
     def frames(self) -> int:
         """Independent frames: what is fixed was taken off."""
         return sum(len(own) - 1 for own in self.found)
+
+    def lifted(self, first: int) -> "Power":
+        """Return the same beside noise that is, in each exposure, as the frequencies from one on.
+
+        The median of them, where it is more than white.
+        """
+        middles = [float(np.median((np.abs(own[:, first:]) ** 2).sum(0))) for own in self.found]
+        frames = [max(len(own) - 1, 1) for own in self.found]
+        return self._over([max(m / n, 1.0) for m, n in zip(middles, frames, strict=True)])
+
+    @property
+    def level(self) -> NDArray[np.float64]:
+        """Power of all exposures alike over that of white noise: (frequency,)."""
+        return np.asarray(sum((np.abs(own) ** 2).sum(0) for own in self.found) / self.frames)
 
     def _sum(self, power: int) -> float:
         parts = zip(self.found, self.weights, strict=True)

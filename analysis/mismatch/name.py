@@ -54,7 +54,8 @@ class Search(Fitted):
     doubted: dict[str, str] = field(default_factory=dict)
     settled: list[tuple[str, Frequency]] = field(default_factory=list)
     absent: set[Frequency] = field(default_factory=set)  # peaks that were no line
-    lines: WholeFrames | None = None
+    lines: WholeFrames | None = None  # of all frames of a small recording
+    measuring: WholeFrames | None = None  # of those that are not locked
     memory: Memory = field(default_factory=Memory)
     least: float = SURE_GAIN  # for an effect to be taken in
     asked: tuple[State, State] | None = None  # with what differs in all frames, and without
@@ -241,7 +242,7 @@ class Search(Fitted):
             rivals = (*rivals, ("dual_gain", best.gain - path.gain))
         proposal = replace(best.proposal, effect=best.polished.effects[0])
         errors = best.polished.errors[0]
-        line = None if self.lines is None else self.lines.measured(proposal.effect)
+        line = None if self.measuring is None else self.measuring.measured(proposal.effect)
         if line is not None:  # better known than from the heights of peaks
             values = {"amplitude_dn": line.amplitude_dn, "frequency": line.frequency}
             known = {"amplitude_dn": line.amplitude_error_dn, "frequency": line.frequency_error}

@@ -147,3 +147,20 @@ def test_clear_interference_at_pixels_own_frequencies_is_interference() -> None:
     whole = WholeFrames(LAYOUT, _frames((0.25, 0.25), 4 * PATTERN, 1, free=True))
     assert whole.denial(_line("periodic_noise", (0.25, 0.25))) is None
     assert whole.denial(_line("bistable_pattern", (0.25, 0.25))) is not None
+
+
+@pytest.mark.parametrize("share", [0.5, 1.0])
+def test_a_line_stands_beside_the_noise_of_its_own_frequencies(share: float) -> None:
+    """Where neighbours are alike, noise of high frequencies is less than white."""
+    at = (0.4, 0.45)
+    y, x = np.arange(ROWS)[:, np.newaxis], np.arange(COLUMNS)
+
+    def of(name: str) -> Iterator[NDArray[np.float64]]:
+        rng = np.random.default_rng([9, name == "dark"])
+        for _ in range(12):
+            noise = rng.normal(0, np.sqrt(share) * SD, (ROWS, COLUMNS))  # there, the rest elsewhere
+            wave = np.cos(2 * np.pi * (at[0] * x + at[1] * y + rng.uniform(0, 1)))
+            yield 100 + np.sqrt(share) * 1.6 * PATTERN * wave + noise
+
+    gain = WholeFrames(LAYOUT, of).gain(_line("periodic_noise", at))
+    assert gain > 5  # the same of both: the line is as clear beside its noise

@@ -106,9 +106,10 @@ def _gained(search: Search, final: State, trial: Trial) -> dict[str, Gained]:
         told = trial.gains(final, cameras)
         for named in some:
             one = told[named.name]
-            if not (one.certain or one.denied):
-                sure = shown_by_all(search, final, named, cameras[named.name], trial)
-                told[named.name] = replace(one, certain=sure)
+            if one.certain or one.denied:
+                continue
+            if shown_by_all(search, final, named, cameras[named.name], trial):
+                told[named.name] = replace(one, certain=True)
         found |= told
         if not all(one.certain for one in found.values()):
             break

@@ -53,6 +53,7 @@ class WholeFrames:
     _shown: dict[Frequency, bool] = field(default_factory=dict)
     _looks: dict[Frequency, "Look"] = field(default_factory=dict)
     _gains: dict[tuple[Frequency, bool], float] = field(default_factory=dict)
+    _bands: dict[float, float] = field(default_factory=dict)
 
     def shown(self, effect: Effect) -> bool:
         """Return whether an effect is no line of a mosaic, or the one that whole frames show."""
@@ -122,7 +123,10 @@ class WholeFrames:
         them there too. Minus infinity where frames deny the line, or cannot tell.
         """
         if isinstance(effect, LineFlicker):
-            return gain_of_bands(self.layout, self.frames_of, effect.cycles_per_frame)
+            at = effect.cycles_per_frame
+            if at not in self._bands:
+                self._bands[at] = gain_of_bands(self.layout, self.frames_of, at)
+            return self._bands[at]
         frequency = frequency_of(effect)
         if frequency is None or self.denial(effect) is not None:
             return -np.inf

@@ -88,3 +88,11 @@ def test_in_the_dark_there_are_none() -> None:
     assert gain_of_bands(dark, _frames(DEPTH, 1), 7.3) == -np.inf
     assert gain_of_bands(LAYOUT, _frames(5 * DEPTH, 1, frames=4), 7.3) == -np.inf
     assert gain_of_bands(LAYOUT, _frames(5 * DEPTH, 1), 0.2) == -np.inf
+
+
+def test_the_slowest_waves_have_no_neighbours_to_stand_out_of() -> None:
+    """Of 1/f noise they are the highest, without being bands."""
+    for cycles in (1.0, 2.2):
+        of = _frames(5 * DEPTH, 1, cycles=cycles)
+        assert gain_of_bands(LAYOUT, of, cycles) == -np.inf
+    assert gain_of_bands(LAYOUT, _frames(5 * DEPTH, 1, cycles=3.2), 3.2) > 10

@@ -21,9 +21,10 @@ def gain_of_bands(layout: Layout, frames_of: FramesOf, cycles: float) -> float:
     """Return the log-likelihood that frames gain by bands at a place not known before.
 
     Of all places where bands could be as likely, these take the share to which frames tell it:
-    sqrt(2 pi) times its error, of the bins of a column (Laplace). Noise is, in each exposure, white
-    or what its rows have in common. Minus infinity where neighbours are raised as well, or where
-    there is too little to tell.
+    sqrt(2 pi) times its error, of the bins of a column (Laplace). Noise is, in each exposure,
+    white, or what its rows have in common, or what slow waves leave beside the place. Minus
+    infinity where neighbours are raised as well, where there are none on both sides (of 1/f noise
+    the slowest waves stand out), or where there is too little to tell.
 
     Parameters
     ----------
@@ -36,11 +37,12 @@ def gain_of_bands(layout: Layout, frames_of: FramesOf, cycles: float) -> float:
     tried = [cycles + k for k in _BETWEEN]
     near = [cycles + k for k in _NEAR if _LOWEST <= cycles + k <= rows / 2]
     far = [cycles + k for k in _FAR if _LOWEST <= cycles + k <= rows / 2]
-    if not near or not far or min(tried) <= 0:
+    if len(near) < len(_NEAR) or not far:
         return -np.inf
     places = [*tried, *near, *far]
     found = tuple(projections(layout, frames_of, [(0.0, own / rows) for own in places]))
-    seen = Power(found, tuple(_light(layout) ** 2)).lifted(len(tried) + len(near))
+    seen = Power(found, tuple(_light(layout) ** 2))
+    seen = seen.lifted([slice(len(tried), len(tried) + len(near)), slice(-len(far), None)])
     if seen.frames < LEAST or not any(seen.weights):
         return -np.inf
     best = int(seen.excess[: len(tried)].argmax())

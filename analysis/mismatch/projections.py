@@ -67,14 +67,16 @@ class Power:
         """Independent frames: what is fixed was taken off."""
         return sum(len(own) - 1 for own in self.found)
 
-    def lifted(self, first: int) -> "Power":
-        """Return the same beside noise that is, in each exposure, as the frequencies from one on.
+    def lifted(self, groups: Sequence[slice]) -> "Power":
+        """Return the same beside noise that is, in each exposure, as groups of frequencies are.
 
-        The median of them, where it is more than white.
+        The largest of their medians, where it is more than white.
         """
-        middles = [float(np.median((np.abs(own[:, first:]) ** 2).sum(0))) for own in self.found]
-        frames = [max(len(own) - 1, 1) for own in self.found]
-        return self._over([max(m / n, 1.0) for m, n in zip(middles, frames, strict=True)])
+        noise = []
+        for own in self.found:
+            power = (np.abs(own) ** 2).sum(0) / max(len(own) - 1, 1)
+            noise.append(max(1.0, *(float(np.median(power[group])) for group in groups)))
+        return self._over(noise)
 
     @property
     def level(self) -> NDArray[np.float64]:

@@ -44,7 +44,9 @@ def test_what_halves_gained_is_remembered_though_even_rows_were_tried_since(
     state: Any = SimpleNamespace(
         mismatches=[SimpleNamespace(statistic="half_seam")],
         clues=lambda _: None,
-        predictor=lambda _: SimpleNamespace(loglik=lambda mean: float(mean[0])),
+        predictor=lambda _: SimpleNamespace(
+            loglik=lambda mean: float(mean[0]), gain=lambda mean, _: float(mean[0])
+        ),
         null=SimpleNamespace(mean=np.zeros(1)),
         setting=SimpleNamespace(screening=1),
     )

@@ -1,8 +1,10 @@
 """What a search found, confirmed or dropped: by all frames together, and by the locked ones."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 
+from analysis.mismatch.allframes import shown_by_all
 from analysis.mismatch.finding import Gain
 from analysis.mismatch.judge import Judge
 from analysis.mismatch.name import Search
@@ -95,13 +97,21 @@ def _without(search: Search, final: State, which: tuple[Named, str], *, judged: 
 def _gained(search: Search, final: State, trial: Trial) -> dict[str, Gained]:
     """Return the gains of all effects; of those that chance could feign, where one of them fails.
 
-    What gained little when it was taken in is asked first: the others change with it.
+    What gained little when it was taken in is asked first: the others change with it. Where the
+    locked frames gain by an effect and leave it open, all frames may show it.
     """
     found: dict[str, Gained] = {}
     little = [named for named in search.named if named.gain < _DOUBTFUL]
     for some in (little, [named for named in search.named if named not in little]):
         cameras = _fitted_without(search, final, some)
-        found |= trial.gains(final, cameras)
+        told = trial.gains(final, cameras)
+        for named in some:
+            one = told[named.name]
+            if one.certain or not one.gain.nats_per_frame > 0:
+                continue
+            if shown_by_all(search, final, named, cameras[named.name], trial):
+                told[named.name] = replace(one, certain=True)
+        found |= told
         if not all(one.certain for one in found.values()):
             break
     return found

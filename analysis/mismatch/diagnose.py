@@ -130,7 +130,8 @@ def _found(
         words,
         step,
         whole=None if large else whole.setting,
-        lines=WholeFrames(stages(layout)[-1][0] if large else layout, frames_of),
+        lines=WholeFrames(stages(layout)[-1][0], frames_of) if large else trial.lines,
+        measuring=WholeFrames(stages(layout)[-1][0] if large else layout, frames_of),
     )
     final = _searched(search, source) if large else search.run()
     known: dict[str, Array] = {}

@@ -160,7 +160,7 @@ class Judge:
             return None
         mean = predictor.mean(self.without(named))
         share = resolved(predictor, self.state, mean)
-        if predictor.worth(mean) < LEAST_GAIN:
+        if not named.measured and predictor.worth(mean) < LEAST_GAIN:
             return share, NEEDLESS
         if share < _RESOLVED and not (named.measured or named.of_pixels):
             return share, f"{LITTLE} {max(share, 0):.0%} of what it changes"

@@ -24,14 +24,13 @@ from analysis.mismatch.rank import (
     SURE_GAIN,
     TOLD_APART,
     Ranked,
-    newly_off,
     plainest,
     ranked,
     replicates_for,
     ties,
     twin,
 )
-from analysis.mismatch.resolved import calls_alone, explains, gained, opened
+from analysis.mismatch.resolved import calls_alone, differ, explains, gained, opened
 from analysis.mismatch.segments import second_path
 from analysis.mismatch.state import State
 from dsis.camera import Camera
@@ -56,7 +55,8 @@ class Search(Fitted):
     doubted: dict[str, str] = field(default_factory=dict)
     settled: list[tuple[str, Frequency]] = field(default_factory=list)
     absent: set[Frequency] = field(default_factory=set)  # peaks that were no line
-    lines: WholeFrames | None = None
+    lines: WholeFrames | None = None  # of all frames of a small recording
+    measuring: WholeFrames | None = None  # of those that are not locked
     memory: Memory = field(default_factory=Memory)
     least: float = SURE_GAIN  # for an effect to be taken in
     asked: tuple[State, State] | None = None  # with what differs in all frames, and without
@@ -106,7 +106,7 @@ class Search(Fitted):
             state = self._asked_of_all(self._pruned(state))
             kept = {one.name for one in self.named}
             dropped = [one for one in taken if one.name not in kept]
-            if not (dropped or newly_off(sought, state.mismatches)) or not state.mismatches:
+            if not (dropped or differ(sought, state.mismatches)) or not state.mismatches:
                 break
             forgiven |= self._forgiven(dropped) if number == 0 else {}
         left = forgiven.keys() - {one.name for one in self.named}
@@ -243,7 +243,7 @@ class Search(Fitted):
             rivals = (*rivals, ("dual_gain", best.gain - path.gain))
         proposal = replace(best.proposal, effect=best.polished.effects[0])
         errors = best.polished.errors[0]
-        line = None if self.lines is None else self.lines.measured(proposal.effect)
+        line = None if self.measuring is None else self.measuring.measured(proposal.effect)
         if line is not None:  # better known than from the heights of peaks
             values = {"amplitude_dn": line.amplitude_dn, "frequency": line.frequency}
             known = {"amplitude_dn": line.amplitude_error_dn, "frequency": line.frequency_error}
@@ -290,7 +290,9 @@ class Search(Fitted):
             apart = [one.polished.mean for pair in self.ties for one in pair]
             settled = tuple(self.settled)
             left = self._left() - self.doubted.keys()
-            fitted = ranked(state, left, self.memory, self.step, settled, apart, self._possible)
+            fitted = ranked(
+                state, left, self.memory, self.step, settled, apart, self._possible, self._shown
+            )
             if len(self.settled) > len(settled):
                 continue  # a line was refused: behind it another may be
             before = len(self.doubted)
@@ -350,6 +352,10 @@ class Search(Fitted):
         elif denial is not None:
             self._refuse(effect.kind, effect, denial)
         return denial is None
+
+    def _shown(self, effect: Effect) -> float:
+        """Return what whole frames gain by a line; minus infinity: nothing, or it is none."""
+        return -np.inf if self.lines is None else self.lines.gain(effect)
 
     def denied(self, state: State) -> tuple[Named, str] | None:
         """Return the effect that the recording denies most, and why; None: it denies none."""

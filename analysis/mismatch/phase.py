@@ -6,24 +6,20 @@ Where noise hides that, the likelihoods of both decide. In white noise |c|^2 is 
 the chance of the largest of all frequencies is known.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
-import scipy.stats
 from numpy.typing import NDArray
 
+from analysis.mismatch.bandgain import gain_of_bands
 from analysis.mismatch.instance import Frequency, frequency_of, same_line
 from analysis.mismatch.layout import Layout
-from analysis.mismatch.phaselaw import kept_rather_than_free, strength_of
+from analysis.mismatch.projections import LEAST, SURE, FramesOf, Power, projections
 from dsis.effects import Effect
+from dsis.effects.line_flicker import LineFlicker
 
-FramesOf = Callable[[str], Iterable[NDArray[np.generic]]]
-_ONE_LINE, _CIRCLE = 0.75, 0.45
-_LEAST = 8  # frames, to tell
 _CLEAR_POWER = 3.0  # standard errors of a line's power from which its amplitude is known
-_CLEAR = 8.0  # standard errors of the noise's power from which a line's phase is seen
-_SURE = 3.0  # of log-likelihood, to prefer one kind of phase
 _ASIDE = 3  # bins to the neighbours that say what is around
 _NEAR = (-2, -1, 1, 2)  # bins to those that a line leaves as they are
 _FAR = (-23, -17, -13, -9, 9, 13, 17, 23)  # bins to those that say what lines have in common
@@ -38,6 +34,7 @@ _PHASE_WORDS = {
     "bistable_pattern": "the pattern's phase is another in every frame",
 }
 ABSENT = "the frames show nothing there that noise does not show at some frequency"
+_BY_CHANCE = "it would be at a frequency of single pixels by chance only"
 _BROAD = "frequencies beside it are raised as well: it is no line"
 
 
@@ -55,6 +52,8 @@ class WholeFrames:
     frames_of: FramesOf
     _shown: dict[Frequency, bool] = field(default_factory=dict)
     _looks: dict[Frequency, "Look"] = field(default_factory=dict)
+    _gains: dict[tuple[Frequency, bool], float] = field(default_factory=dict)
+    _bands: dict[float, float] = field(default_factory=dict)
 
     def shown(self, effect: Effect) -> bool:
         """Return whether an effect is no line of a mosaic, or the one that whole frames show."""
@@ -84,9 +83,13 @@ class WholeFrames:
             return ABSENT
         if seen.broad:
             return _BROAD
-        if seen.kept is None or seen.kept == (effect.kind == "bistable_pattern"):
-            return None
-        return _PHASE_WORDS[effect.kind]
+        kept = effect.kind == "bistable_pattern"
+        if seen.kept is not None:
+            return None if seen.kept == kept else _PHASE_WORDS[effect.kind]
+        if not kept and _of_pixels(frequency) and seen.line is not None:
+            odds = self._gain(frequency, kept=True) - self._gain(frequency, kept=False)
+            return _BY_CHANCE if odds > SURE else None
+        return None
 
     def measured(self, effect: Effect) -> "Line | None":
         """Return amplitude and frequency of a line; None: too little is seen.
@@ -110,6 +113,41 @@ class WholeFrames:
         at = frequency if seen.frequency is None else seen.frequency
         off = 0.0 if at == frequency else seen.line.bins(power) / min(self._size)
         return Line(unit * strength, unit * error, at, off)
+
+    def gain(self, effect: Effect) -> float:
+        """Return the log-likelihood that frames gain by a line at a frequency not known before.
+
+        Of all frequencies that could be as likely, the line's takes the share to which the frames
+        tell it: 2 pi times its squared error, of a bin's area (Laplace). Patterns of single pixels
+        have few. Interference, which knows nothing of pixels, may be at any: it pays for all of
+        them there too. Minus infinity where frames deny the line, or cannot tell.
+        """
+        if isinstance(effect, LineFlicker):
+            at = effect.cycles_per_frame
+            if at not in self._bands:
+                self._bands[at] = gain_of_bands(self.layout, self.frames_of, at)
+            return self._bands[at]
+        frequency = frequency_of(effect)
+        if frequency is None or self.denial(effect) is not None:
+            return -np.inf
+        return self._gain(frequency, kept=effect.kind == "bistable_pattern")
+
+    def _gain(self, frequency: Frequency, *, kept: bool) -> float:
+        """Return the gain of a line whose phase is kept but for its sign, or of another in each."""
+        if (frequency, kept) not in self._gains:
+            self._gains[frequency, kept] = self._gained(frequency, kept=kept)
+        return self._gains[frequency, kept]
+
+    def _gained(self, frequency: Frequency, *, kept: bool) -> float:
+        line = self._looks[frequency].line
+        power = 0.0 if line is None else float(line.excess[0])
+        if line is None or not power > 0:
+            return -np.inf
+        real = all((2 * f) % 1 == 0 for f in frequency)
+        share = min(2 * np.pi * line.bins(power) ** 2, 1.0)
+        anywhere = float(np.log(self.layout.rows * self.layout.columns / 2 / share))
+        chosen = float(np.log(_FEW)) if kept and _of_pixels(frequency) else anywhere
+        return line.there(power, kept=kept, real=real) - chosen
 
     @property
     def _size(self) -> tuple[int, int]:
@@ -149,7 +187,7 @@ class Look:
     absent: bool
     broad: bool
     kept: bool | None
-    line: "_Power | None" = None
+    line: "Power | None" = None
     crest: float = 1.0
     frequency: Frequency | None = None
 
@@ -159,11 +197,11 @@ def look(layout: Layout, frames_of: FramesOf, frequency: Frequency) -> Look:
     fx, fy = frequency
     columns, rows = layout.columns, layout.rows
     # Stripes and checkerboards of single pixels lie where they lie.
-    exact = all((4 * f) % 1 == 0 for f in frequency)
+    exact = _of_pixels(frequency)
     steps = (0.0,) if exact else _BETWEEN
     tried = [(fx + u / columns, fy + w / rows) for u in steps for w in steps]
-    power = _Power.of(layout, _projections(layout, frames_of, tried))
-    if power.frames < _LEAST:
+    power = Power.of(layout, projections(layout, frames_of, tried))
+    if power.frames < LEAST:
         return Look(absent=False, broad=False, kept=None)
     best = int(power.excess.argmax())
     own, (fx, fy) = power.at([best]), tried[best]
@@ -173,15 +211,15 @@ def look(layout: Layout, frames_of: FramesOf, frequency: Frequency) -> Look:
     ]
     beside = [(fx + u / columns, fy + w / rows) for u, w in _CROSS]
     looked_at = [*axes[0], *axes[1], *beside]
-    around = _Power.of(layout, _projections(layout, frames_of, looked_at))
+    around = Power.of(layout, projections(layout, frames_of, looked_at))
     count = len(axes[0])
     crest, off = _top(float(power.excess[best]), around.excess[-len(_CROSS) :])
     around = around.at(range(2 * count))
     # What rows or columns have in common is noise beside which a line must stand out.
-    ground = max(
-        float(np.median(around.excess[i * count + len(_NEAR) : (i + 1) * count])) for i in (0, 1)
-    )
-    own, around = own.above(ground), around.above(ground)
+    far = [slice(i * count + len(_NEAR), (i + 1) * count) for i in (0, 1)]
+    ground = max(float(np.median(around.excess[one])) for one in far)
+    level = min(max(float(np.median(around.level[one])) for one in far), 1.0)
+    own, around = own.above(ground, level), around.above(ground, level)
     real = all((2 * f) % 1 == 0 for f in (fx, fy))
     bins = _FEW if exact else rows * columns / 2
     broad = False
@@ -194,9 +232,9 @@ def look(layout: Layout, frames_of: FramesOf, frequency: Frequency) -> Look:
         ]
         if exact or not some:
             continue
-        level = float(np.median(around.excess[some]))  # one of them may be a line itself
-        raised = level / around.error * np.sqrt(len(some)) > _RAISED
-        broad |= bool(raised) and level > _SHARE * float(own.excess[0])
+        near = float(np.median(around.excess[some]))  # one of them may be a line itself
+        raised = near / around.error * np.sqrt(len(some)) > _RAISED
+        broad |= bool(raised) and near > _SHARE * float(own.excess[0])
     absent = own.chance(real=real) * bins > _CHANCE
     kept = own.keeps_phase(real=real)
     if exact:
@@ -227,114 +265,15 @@ def _top(at: float, beside: NDArray[np.float64]) -> tuple[float, list[float]]:
     return min(found, _MOST_CREST), off
 
 
+def _of_pixels(frequency: Frequency) -> bool:
+    """Return whether a frequency is that of stripes or checkerboards of one or two pixels."""
+    return all((4 * f) % 1 == 0 for f in frequency)
+
+
 def _apart(layout: Layout, one: Frequency, other: Frequency) -> bool:
     """Return whether two frequencies are more than half a bin apart along an axis."""
     across, down = ((a - b + 0.5) % 1 - 0.5 for a, b in zip(one, other, strict=True))
     return abs(across) * layout.columns > 0.5 or abs(down) * layout.rows > 0.5
-
-
-@dataclass(frozen=True)
-class _Power:
-    """Projections of frames on patterns, and the power beyond white noise.
-
-    Attributes
-    ----------
-    found
-        Of each exposure: (frame, frequency), noise at 1.
-    weights
-        Of each exposure: one over its variance, DN^-2.
-    """
-
-    found: tuple[NDArray[np.complex128], ...]
-    weights: tuple[float, ...]
-
-    @classmethod
-    def of(cls, layout: Layout, projections: Iterator[NDArray[np.complex128]]) -> "_Power":
-        weights = tuple(
-            1 / float(np.mean([layout.variance_dn2[e.name, c] for c in layout.channels]))
-            for e in layout.uniform
-        )
-        return cls(tuple(projections), weights)
-
-    def at(self, which: Sequence[int]) -> "_Power":
-        """Return the same of some frequencies."""
-        return replace(self, found=tuple(own[:, which] for own in self.found))
-
-    def above(self, ground: float) -> "_Power":
-        """Return the same beside noise of so much more power at a frequency, DN^2."""
-        more = [1 + max(ground, 0.0) * w for w in self.weights]
-        return _Power(
-            tuple(own / np.sqrt(m) for own, m in zip(self.found, more, strict=True)),
-            tuple(w / m for w, m in zip(self.weights, more, strict=True)),
-        )
-
-    @property
-    def frames(self) -> int:
-        """Independent frames: what is fixed was taken off."""
-        return sum(len(own) - 1 for own in self.found)
-
-    def _sum(self, power: int) -> float:
-        parts = zip(self.found, self.weights, strict=True)
-        return sum((len(own) - 1) * weight**power for own, weight in parts)
-
-    @property
-    def excess(self) -> NDArray[np.float64]:
-        """Power of a pattern of one amplitude in all exposures, DN^2: (frequency,)."""
-        parts = zip(self.found, self.weights, strict=True)
-        total = sum(w * ((np.abs(own) ** 2).sum(0) - len(own) + 1) for own, w in parts)
-        return np.asarray(total / self._sum(2))
-
-    @property
-    def error(self) -> float:
-        """Standard error of the excess in white noise."""
-        return float(1 / np.sqrt(self._sum(2)))
-
-    def strength(self, power: float, *, kept: bool, real: bool) -> tuple[float, float]:
-        """Return the first pattern's amplitude over that of a power, DN^2, and its error."""
-        if kept:
-            own = [float(np.sqrt(power * w)) for w in self.weights]
-            return strength_of([one[:, 0] for one in self.found], own, real=real)
-        total = 0.0
-        for found, weight in zip(self.found, self.weights, strict=True):
-            n, each = len(found), power * weight
-            total += weight**2 * ((n - 1) * (1 + 2 * each) + (1 - 1 / n) * each**2)
-        return 1.0, float(np.sqrt(total) / self._sum(2) / power / 2)
-
-    def bins(self, power: float) -> float:
-        """Return the standard error of a line's frequency along an axis, in bins."""
-        total = sum(
-            (len(own) - 1) * power * w for own, w in zip(self.found, self.weights, strict=True)
-        )
-        return float(np.sqrt(1.5 / max(total, 1e-9)) / np.pi)
-
-    def chance(self, *, real: bool) -> float:
-        """Return the chance of as much at the first frequency: a sum of squares as Gamma's.
-
-        `real`: all samples of the pattern are real; then squares have one degree of freedom, not
-        two.
-        """
-        mean, square = self._sum(1), self._sum(2)
-        total = float(self.excess[0]) * square + mean
-        spread = square * (2 if real else 1)
-        return float(scipy.stats.gamma.sf(total * mean / spread, mean**2 / spread))
-
-    def keeps_phase(self, *, real: bool) -> bool | None:
-        """Return whether the first pattern's phase is kept but for its sign; None: untold."""
-        free = self.frames
-        if free < _LEAST:
-            return None
-        if real:
-            return True
-        c = np.concatenate([own[:, 0] for own in self.found])
-        size = float((np.abs(c) ** 2).sum()) - free  # noise has no phase to keep
-        if size > _CLEAR * np.sqrt(free):
-            share = abs(complex((c**2).sum())) / size
-            if share > _ONE_LINE or share < _CIRCLE:
-                return share > _ONE_LINE
-        amplitude = np.sqrt(max(float(self.excess[0]), 0.0))
-        own = [amplitude * np.sqrt(w) for w in self.weights]
-        more = kept_rather_than_free([one[:, 0] for one in self.found], own)
-        return None if abs(more) < _SURE else bool(more > 0)
 
 
 def strongest(layout: Layout, frames_of: FramesOf, frequencies: Sequence[Frequency]) -> Frequency:
@@ -346,7 +285,7 @@ def strongest(layout: Layout, frames_of: FramesOf, frequencies: Sequence[Frequen
     steps = ((0.0, 0.0), (-across, 0.0), (across, 0.0), (0.0, -down), (0.0, down))
     looked_at = [(fx + u, fy + w) for fx, fy in frequencies for u, w in steps]
     power = np.zeros(len(looked_at))
-    for found in _projections(layout, frames_of, looked_at):
+    for found in projections(layout, frames_of, looked_at):
         power += (np.abs(found) ** 2).sum(0)
     own, left, right, below, above = power.reshape(-1, len(steps)).T
     around = np.maximum(left + right, below + above) / 2
@@ -362,26 +301,3 @@ def aliases(frequency: Frequency) -> list[Frequency]:
             if abs(fx) + abs(fy) > 0:
                 found.append((fx, fy))
     return found
-
-
-def _projections(
-    layout: Layout, frames_of: FramesOf, frequencies: Sequence[Frequency]
-) -> Iterator[NDArray[np.complex128]]:
-    """Yield of each exposure how its frames vary at each frequency: (frame, frequency).
-
-    In units of the noise's standard deviation at one frequency.
-    """
-    fx, fy = np.array(frequencies).T
-    y, x = np.arange(layout.rows)[:, np.newaxis], np.arange(layout.columns)[:, np.newaxis]
-    down, turns = np.exp(-2j * np.pi * fy * y), 2 * np.pi * fx * x
-    across = np.concatenate([np.cos(turns), -np.sin(turns)], 1)  # real: frames are
-    for exposure in layout.uniform:
-        variance = float(np.mean([layout.variance_dn2[exposure.name, c] for c in layout.channels]))
-        found = []
-        for frame in frames_of(exposure.name):
-            image = np.asarray(frame, np.float64)
-            real, imaginary = np.split((image - image.mean()) @ across, 2, axis=1)
-            found.append((down * (real + 1j * imaginary)).sum(0))
-        made = np.array(found)
-        # What is fixed is no pattern that changes.
-        yield (made - made.mean(0)) / np.sqrt(variance * y.size * x.size)

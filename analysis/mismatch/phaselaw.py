@@ -1,4 +1,4 @@
-"""How likely a line's projections are if its phase is kept but for its sign, or is another in each.
+"""How likely a line's projections are: of one phase but for its sign, of any phase, of noise.
 
 A frame's projection is m + a s u + noise or m + a exp(i phi) + noise, the noise's mean square 1: m
 is what all frames share, a fixed pattern at the line's frequency, and is known from few frames only
@@ -43,6 +43,37 @@ def kept_rather_than_free(found: Sequence[Complex], amplitudes: Sequence[float])
             free[i] += other
     both = (scipy.special.logsumexp(x) - np.log(x.size) for x in (kept, free))
     return float(next(both) - next(both))
+
+
+def there(
+    found: Sequence[Complex], amplitudes: Sequence[float], *, kept: bool, real: bool
+) -> float:
+    """Return the log-likelihood of a line of one kind of phase, less that of noise alone.
+
+    A mean over amplitudes about those given, and over the phase that is kept. What frames of an
+    exposure share is integrated out of both, so that it speaks for neither. Of strong lines less is
+    returned: more is not needed.
+
+    Parameters
+    ----------
+    found, amplitudes
+        As above.
+    kept
+        Whether the phase is kept but for its sign; else it is another in each frame.
+    real
+        Whether all samples of the pattern are real: projections are, noise and all; then it has no
+        phase but its sign.
+    """
+    phases = tuple(_phases()) if kept and not real else (1.0 + 0.0j,)
+    unit = np.sqrt(0.5) if real else 1.0
+    line = np.zeros((_STRENGTHS.size, len(phases)))
+    for own, amplitude in zip(found, amplitudes, strict=True):
+        for i, strength in enumerate(_STRENGTHS):
+            scale = unit * _MOST / max(strength * amplitude, _MOST)
+            one, other = _likelihoods(own * scale, strength * amplitude * scale, phases)
+            _, nothing = _likelihoods(own * scale, 0.0, phases[:1])
+            line[i] += (one if kept or real else other) - nothing
+    return float(scipy.special.logsumexp(line) - np.log(line.size))
 
 
 def strength_of(

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from analysis.mismatch.candidates import CANDIDATES, Proposal
 from analysis.mismatch.credited import joined, together
-from analysis.mismatch.finding import Mismatch
 from analysis.mismatch.instance import Frequency, frequency_of, instance, same_line
 from analysis.mismatch.memory import Memory, words
 from analysis.mismatch.polish import Polished, needed, polish, stepped, with_effects
@@ -90,11 +89,13 @@ def ranked(
     settled: tuple[tuple[str, Frequency], ...] = (),
     apart: Sequence[Array] = (),
     possible: Callable[[Effect], bool] = lambda _: True,
+    shown: Callable[[Effect], float] = lambda _: -np.inf,
 ) -> list[Ranked]:
     """Return the effects among `kinds` that mismatches call for, fitted one at a time.
 
     `settled` are lines that need no trial; see `Clues`. What changes the same numbers as one of the
-    predictions `apart` is not considered, nor what is not `possible`.
+    predictions `apart` is not considered, nor what is not `possible`. `shown` says what whole
+    frames gain by a line: one number of the bank, the largest of many, says less of a weak one.
     """
     predictor = state.predictor()
     before = predictor.loglik(state.null.mean)
@@ -127,21 +128,21 @@ def ranked(
             continue
         if not any(alike(state, polished.mean, one) for one in apart):
             found.append((kind, proposal, polished))
-    fitted = _in_order(state, found)
+    fitted = _in_order(state, found, shown)
     best = max((one.gain for one in fitted), default=SURE_GAIN)
     if best >= SURE_GAIN or state.setting.large:
         return fitted
-    return _in_order(state, _once_more(state, found))
+    return _in_order(state, _once_more(state, found), shown)
 
 
-def _in_order(state: State, found: Sequence[Fit]) -> list[Ranked]:
+def _in_order(state: State, found: Sequence[Fit], shown: Callable[[Effect], float]) -> list[Ranked]:
     """Return fitted effects with their gains, the best first."""
     predictor = state.predictor()
     judged = ~_others(state, [own.mean for _, _, own in found])
-    fitted = [
-        Ranked(predictor.gain(own.mean, start.of_pixels, judged) - start.numbers, kind, start, own)
-        for kind, start, own in found
-    ]
+    fitted = []
+    for kind, start, own in found:
+        gain = max(predictor.gain(own.mean, start.of_pixels, judged), shown(start.effect))
+        fitted.append(Ranked(gain - start.numbers, kind, start, own))
     return sorted(fitted, key=lambda one: -one.gain)
 
 
@@ -305,15 +306,6 @@ def ties(state: State, best: Ranked, other: Ranked) -> bool:
     if not near or _SAYS_LESS.get(best.kind) == other.kind or _other_line(state, best, other):
         return False
     return alike(state, best.polished.mean, other.polished.mean)
-
-
-def newly_off(before: Sequence[Mismatch], now: Sequence[Mismatch]) -> bool:
-    """Return whether something differs now that did not before, or not surely."""
-    sure = {m.statistic: m.p_adjusted < SURE_CHANCE for m in before}
-    return any(
-        m.statistic not in sure or (m.p_adjusted < SURE_CHANCE and not sure[m.statistic])
-        for m in now
-    )
 
 
 def twin(

@@ -1,14 +1,16 @@
 """How much an effect explains of what it changes."""
 
-from collections.abc import Container, Iterable
+from collections.abc import Container, Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.candidates import CANDIDATES
+from analysis.mismatch.finding import Mismatch
 from analysis.mismatch.locate import FAMILY, tested
 from analysis.mismatch.predict import Predictor
+from analysis.mismatch.rank import SURE_CHANCE
 from analysis.mismatch.state import State
 from dsis.effects import Effect
 
@@ -120,3 +122,12 @@ def opened(state: State, bare: State) -> bool:
     """Return whether a state without an effect leaves open what the state with it explains."""
     known = {m.statistic for m in state.mismatches}
     return any(m.statistic not in known and abs(m.z) > _OPEN for m in bare.mismatches)
+
+
+def differ(before: Sequence[Mismatch], now: Sequence[Mismatch]) -> bool:
+    """Return whether something differs now that did not before, or not surely."""
+    sure = {m.statistic: m.p_adjusted < SURE_CHANCE for m in before}
+    return any(
+        m.statistic not in sure or (m.p_adjusted < SURE_CHANCE and not sure[m.statistic])
+        for m in now
+    )

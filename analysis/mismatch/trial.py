@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,7 @@ from analysis.mismatch.heldnumbers import HeldNumbers
 from analysis.mismatch.model import each, in_threads, simulate
 from analysis.mismatch.null import null_of
 from analysis.mismatch.observe import Observation, observe
+from analysis.mismatch.phase import WholeFrames
 from analysis.mismatch.prove.gain import heldout_gain, telling
 from analysis.mismatch.prove.gap import gap_closed
 from analysis.mismatch.prove.held import Held, hold
@@ -105,6 +106,14 @@ class Trial:
         held = hold(recording, split.development, split.locked) if split.locked else None
         numbers = HeldNumbers(recording, split, source, setting)
         return cls(recording, split, held, numbers, setting.seed)
+
+    @cached_property
+    def lines(self) -> WholeFrames:
+        """What all frames show of lines, the locked ones too."""
+        layout = self.numbers.whole[0]
+        numbers = {e.name: e.numbers for e in layout.exposures}
+        source = self.numbers.source
+        return WholeFrames(layout, lambda name: source.frames(name, numbers[name]))
 
     def gains(self, final: State, without: Mapping[str, Camera]) -> dict[str, Gained]:
         """Return what the final model gains over cameras without an effect, by effect."""

@@ -15,6 +15,7 @@ _AROUND = 9  # bins along each axis whose median says what is around
 _LOOKED_AT = 1024  # highest bins: lines are among them
 _ALONE = -40.0  # ln of a chance, of which two bins in a spectrum are none
 _HELD = 1e-290  # chances that a float holds
+_ALMOST = 1 - 1e-12  # of a chance: its logarithm is finite
 _CHANCE = 0.01  # that any bin of a spectrum without lines is taken for one
 
 
@@ -88,6 +89,13 @@ def log_chance(power: float, rank: int, bins: int, degrees: float) -> float:
         return float(np.log(betainc(rank, bins - rank + 1, np.exp(single))))
     # The first term of the binomial sum: the next is as rare as one bin more.
     return float(rank * single + gammaln(bins + 1) - gammaln(rank + 1) - gammaln(bins - rank + 1))
+
+
+def any_of(log_least: float, count: int) -> float:
+    """Return the logarithm of the chance that the least of independent chances is no larger."""
+    if log_least < _ALONE:
+        return log_least + float(np.log(count))
+    return float(np.log(-np.expm1(count * np.log1p(-min(np.exp(log_least), _ALMOST)))))
 
 
 def _log_above(shape: float, x: float) -> float:

@@ -13,7 +13,7 @@ import scipy.fft
 from numpy.typing import NDArray
 
 from analysis.mismatch.bank.coherent import LAGS, Peak, frequency, top, white_level
-from analysis.mismatch.bank.lines import log_chance, without_lines
+from analysis.mismatch.bank.lines import any_of, log_chance, without_lines
 from analysis.mismatch.bank.scalars import UNKNOWN, Number, score_of_log
 from dsis.compiled import inlined, kernel
 from dsis.measures import Channel
@@ -113,7 +113,11 @@ class WaveSums:
                 self.uneven[axis] += weight**2 / seen * float(np.mean(alike)) / white**2
 
     def number(self) -> Number:
-        """Return the normal score of the largest power, on bins or between them."""
+        """Return the normal score of the largest power, on bins or between them.
+
+        Of the least of so many chances, as of independent ones (Sidak, 1967): it is standard normal
+        in white noise, and its upper tail, by which a line is told, no lighter than that.
+        """
         parts = [part for part in self._parts() if part.size]
         if not self.weight or not parts:
             return UNKNOWN
@@ -127,7 +131,7 @@ class WaveSums:
             log_chance(float(part.max()) / white, 1, part.size, degrees)
             for part, white in zip(parts, whites, strict=True)
         )
-        return score_of_log(least), 1.0
+        return score_of_log(any_of(least, len(parts))), 1.0
 
     def odd_lags(self) -> dict[str, Number]:
         """Return correlations along lines of samples an odd number of pixels apart.

@@ -160,7 +160,7 @@ def unproven(finding: Finding) -> list[str]:
     if weak:
         said.append(
             f"Weakly proven: {joined(weak)}. The 95 % interval of the gain per locked frame "
-            "reaches zero; only the locked frames together speak for it."
+            "reaches zero; only the frames together speak for it."
         )
     return said
 

@@ -1,0 +1,41 @@
+"""What all frames together show of an effect that the locked ones leave open.
+
+What draws one number a frame shows as many in the locked frames as these are: two of an exposure,
+where it may be seen in one exposure only. The odds of locked frames alone then scatter by more than
+they are worth. Those of all frames are their product with those of the frames before, and of a
+model without the effect, whatever was sought, they exceed a hundred in one recording of a hundred
+at most (Markov's inequality), once what was chosen is paid for.
+"""
+
+from analysis.mismatch.instance import LINES
+from analysis.mismatch.name import Search
+from analysis.mismatch.named import Named
+from analysis.mismatch.rank import SURE_GAIN, replicates_for
+from analysis.mismatch.resolved import gained
+from analysis.mismatch.state import State
+from analysis.mismatch.trial import Trial
+from dsis.camera import Camera
+from dsis.effects import Effect
+
+_OF_FRAMES = frozenset({"frame_variance"})
+_ONE_PHASE = LINES | {"line_flicker"}
+
+
+def shown_by_all(search: Search, final: State, named: Named, without: Camera, trial: Trial) -> bool:
+    """Return whether all frames of a small recording show an effect, at odds that take it in.
+
+    `without` is the camera without it.
+    """
+    own = named.proposal
+    if own is None or search.whole is None or not once_a_frame(own.effect):
+        return False
+    if trial.lines.gain(own.effect) - 1 >= SURE_GAIN:  # of its amplitude; its place is paid for
+        return True
+    state, bare = (State.of(search.whole, c, search.step) for c in (final.camera, without))
+    replicates = replicates_for(search.setting, [own.effect])
+    return gained(state, bare, own.effect, replicates) - len(own.free) >= SURE_GAIN
+
+
+def once_a_frame(effect: Effect) -> bool:
+    """Return whether an effect draws one number a frame: a level, a sign, a phase."""
+    return effect.measures == _OF_FRAMES or effect.kind in _ONE_PHASE

@@ -1,0 +1,88 @@
+"""What draws one number a frame is shown by all frames together, where it is, and only there."""
+
+from dataclasses import replace
+
+import pytest
+
+from analysis.mismatch.allframes import once_a_frame, shown_by_all
+from analysis.mismatch.candidates import Proposal
+from analysis.mismatch.name import Search
+from analysis.mismatch.named import Named
+from analysis.mismatch.observe import observe
+from analysis.mismatch.source import Source
+from analysis.mismatch.split import Split
+from analysis.mismatch.state import Setting, State
+from analysis.mismatch.taking import layout_of
+from analysis.mismatch.trial import Trial
+from dsis.effects import Effect, registry
+from mismatch_recordings import camera, recorded
+
+# A frame's mean of 48 x 64 pixels scatters by 0.03 % of 1600 DN, and by 0.08 DN in darks.
+FLICKER = registry()["flicker"](sigma_percent=0.12)
+DRIFT = registry()["black_level_drift"](sigma_dn=0.4)
+# Its power at its frequency is a^2 / 4 of 3072 pixels: four times the noise's in darks, 20 DN^2.
+WAVE = registry()["periodic_noise"](amplitude_dn=0.32, frequency=(0.2, 0.3))
+BANDS = registry()["line_flicker"](depth_percent=0.2, cycles_per_frame=5.3)
+
+
+def shown(true: Effect | None, asked: Effect, free: tuple[str, ...], *, some: bool = True) -> bool:
+    """Return whether all frames of a recording show an effect that was fitted to some."""
+    effects = () if true is None else (true,)
+    recording = recorded(camera(*effects), 5, rows=48, columns=64, levels=(400.0, 1600.0))
+    split, source = Split.of(recording), Source(recording)
+    layout = layout_of(recording, split.development, source.frames)
+    numbers = {e.name: e.numbers for e in layout.exposures}
+    seen = observe(layout, lambda name: source.frames(name, numbers[name]), keep=True)
+    setting = Setting(layout, seen, None, 0, 1, 16, 16, 2, 2, 4)
+    final = State.of(setting, camera(asked), lambda: None)
+    trial = Trial.of(recording, split, source, setting)
+    everything, all_seen = trial.numbers.whole
+    whole = replace(setting, layout=everything, seen=all_seen) if some else None
+    words = frozenset({asked.kind})
+    search = Search(setting, camera(), final, words, lambda: None, whole=whole)
+    named = Named(asked.kind, Proposal(asked, free), {}, 10.0, ())
+    without = final.camera.model_copy(update={"effect": ()})
+    return shown_by_all(search, final, named, without, trial)
+
+
+@pytest.mark.parametrize(
+    ("effect", "free"),
+    [
+        (FLICKER, ("sigma_percent",)),
+        (DRIFT, ("sigma_dn",)),
+        (WAVE, ()),
+        (BANDS, ("depth_percent",)),
+    ],
+)
+@pytest.mark.parametrize("there", [True, False])
+def test_all_frames_show_what_is_there(
+    effect: Effect, free: tuple[str, ...], *, there: bool
+) -> None:
+    assert shown(effect if there else None, effect, free) == there
+
+
+def test_what_is_another_is_not_shown() -> None:
+    assert not shown(DRIFT, FLICKER, ("sigma_percent",))
+
+
+def test_of_large_recordings_locked_frames_tell_enough() -> None:
+    assert not shown(FLICKER, FLICKER, ("sigma_percent",), some=False)
+
+
+def test_what_draws_once_a_frame() -> None:
+    examples = {
+        "flicker": True,
+        "black_level_drift": True,
+        "line_flicker": True,
+        "row_noise": False,
+        "dsnu": False,
+    }
+    made = {
+        "flicker": FLICKER,
+        "black_level_drift": DRIFT,
+        "line_flicker": BANDS,
+        "row_noise": registry()["row_noise"](sigma_dn=1.0),
+        "dsnu": registry()["dsnu"](sigma_dn=1.0),
+    }
+    assert {kind: once_a_frame(effect) for kind, effect in made.items()} == examples
+    assert once_a_frame(WAVE)

@@ -25,8 +25,18 @@ WAVE = registry()["periodic_noise"](amplitude_dn=0.32, frequency=(0.2, 0.3))
 BANDS = registry()["line_flicker"](depth_percent=0.2, cycles_per_frame=5.3)
 
 
-def shown(true: Effect | None, asked: Effect, free: tuple[str, ...], *, some: bool = True) -> bool:
-    """Return whether all frames of a recording show an effect that was fitted to some."""
+def shown(
+    true: Effect | None,
+    asked: Effect,
+    free: tuple[str, ...],
+    *,
+    some: bool = True,
+    own: tuple[Effect, ...] = (),
+) -> bool:
+    """Return whether all frames of a recording show an effect that was fitted to some.
+
+    `own` are effects that the user's camera has.
+    """
     effects = () if true is None else (true,)
     recording = recorded(camera(*effects), 5, rows=48, columns=64, levels=(400.0, 1600.0))
     split, source = Split.of(recording), Source(recording)
@@ -34,14 +44,14 @@ def shown(true: Effect | None, asked: Effect, free: tuple[str, ...], *, some: bo
     numbers = {e.name: e.numbers for e in layout.exposures}
     seen = observe(layout, lambda name: source.frames(name, numbers[name]), keep=True)
     setting = Setting(layout, seen, None, 0, 1, 16, 16, 2, 2, 4)
-    final = State.of(setting, camera(asked), lambda: None)
+    final = State.of(setting, camera(*own, asked), lambda: None)
     trial = Trial.of(recording, split, source, setting)
     everything, all_seen = trial.numbers.whole
     whole = replace(setting, layout=everything, seen=all_seen) if some else None
     words = frozenset({asked.kind})
     search = Search(setting, camera(), final, words, lambda: None, whole=whole)
     named = Named(asked.kind, Proposal(asked, free), {}, 10.0, ())
-    without = final.camera.model_copy(update={"effect": ()})
+    without = final.camera.model_copy(update={"effect": own})
     return shown_by_all(search, final, named, without, trial)
 
 
@@ -59,6 +69,18 @@ def test_all_frames_show_what_is_there(
     effect: Effect, free: tuple[str, ...], *, there: bool
 ) -> None:
     assert shown(effect if there else None, effect, free) == there
+
+
+@pytest.mark.parametrize(
+    ("own", "asked"),
+    [
+        (WAVE, registry()["periodic_noise"](amplitude_dn=0.02, frequency=(0.2, 0.3))),
+        (BANDS, registry()["line_flicker"](depth_percent=0.02, cycles_per_frame=5.3)),
+    ],
+)
+def test_a_wave_that_the_camera_has_already_is_not_shown_again(own: Effect, asked: Effect) -> None:
+    free = ("depth_percent",) if asked.kind == "line_flicker" else ()
+    assert not shown(own, asked, free, own=(own,))
 
 
 def test_what_is_another_is_not_shown() -> None:

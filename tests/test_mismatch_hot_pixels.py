@@ -8,6 +8,9 @@ import pytest
 from scipy.integrate import quad
 from scipy.stats import binom, exponnorm, norm
 
+from analysis.mismatch.bank.key import Key
+from analysis.mismatch.bank.parts import STANDING_OUT, rooted
+from analysis.mismatch.bank.together import TOGETHER
 from analysis.mismatch.candidates import CANDIDATES
 from analysis.mismatch.hotlaw import HotLaw, _Pixels, hot_laws
 from analysis.mismatch.prove.hot import Hot, expected_rate, hot_of
@@ -16,6 +19,9 @@ from dsis.effects import registry
 SHAPE, NOISE_DN = (48, 64), 0.4
 CHANNELS = ("R", "Gr", "Gb", "B")
 SURE = 4.0  # standard errors
+KEYS = tuple(
+    Key("outlying_pixels", "time", "", "", f"{limit:g}, {TOGETHER}") for limit in STANDING_OUT
+)
 
 
 def _maps(seed: int, share: float, mean_dn: float) -> dict[str, tuple[np.ndarray, float]]:
@@ -101,24 +107,36 @@ def _clues(
     noisy: tuple[int, int] | None = None,
     name: str = "time",
     times: tuple[float, ...] = (0.5,),
+    kind: str = "dark",
+    far_out: float = 0.0,
+    spread: float = 1.0,
 ) -> Any:
-    """Return clues of darks of 8 frames, of .5 s, one pixel of which is noisy, if any."""
-    variances = np.zeros(SHAPE)
+    """Return clues of exposures of 8 frames, of .5 s, one pixel of which is noisy, if any.
+
+    `far_out` pixels are expected far out of a map; `spread` is that of the pixels' variances.
+    """
+    variances = np.random.default_rng(0).normal(0, 1, SHAPE)
     if noisy is not None:
         variances[noisy] = 100.0
-    images = {name: maps, "variance": dict.fromkeys(maps, (variances, 1.0))}
+    images = {name: maps, "variance": dict.fromkeys(maps, (variances, spread))}
     variance = 8 * NOISE_DN**2
     return SimpleNamespace(
         image=lambda own: images.get(own, {}),
         scale=lambda _name, _channel: 0.5,
         fit=SimpleNamespace(line_dn2=lambda signal: variance + 0.1 * signal),
+        vector=SimpleNamespace(keys=KEYS),
+        null=SimpleNamespace(mean=np.full(len(KEYS), rooted(far_out))),
         layout=SimpleNamespace(
+            rows=2 * SHAPE[0],
+            columns=2 * SHAPE[1],
             uniform=[
-                SimpleNamespace(name="dark", numbers=tuple(range(8)), exposure_time_s=time_s)
+                SimpleNamespace(
+                    name=kind, kind=kind, numbers=tuple(range(8)), exposure_time_s=time_s
+                )
                 for time_s in times
             ],
             still={},
-            variance_dn2={("dark", channel): variance for channel in maps},
+            variance_dn2={(kind, channel): variance for channel in maps},
         ),
     )
 
@@ -139,6 +157,20 @@ def test_an_offset_beside_other_times_is_no_charge() -> None:
     hot = CANDIDATES["hot_pixels"]
     assert not hot.propose(_clues(_maps(1, 0.01, 2.0), name="offset", times=(0.01, 0.5)))
     assert not hot.propose(_clues(_maps(1, 0.01, 2.0), name="offset", times=(0.0,)))
+    assert not hot.propose(_clues(_maps(1, 0.01, 2.0), name="offset", kind="flat"))
+
+
+def test_what_the_camera_expects_far_out_is_told_by_counts() -> None:
+    """The law is told from normal noise, which a camera with hot pixels of its own has not."""
+    for one in CANDIDATES["hot_pixels"].propose(_clues(_maps(1, 0.01, 2.0), far_out=3.0)):
+        assert one.of_pixels is None
+
+
+def test_maps_that_say_nothing_have_no_law() -> None:
+    maps = _maps(1, 0.01, 2.0)
+    assert not hot_laws(maps, {name: np.ones(SHAPE, bool) for name in maps})
+    still = {name: (np.zeros(SHAPE), noise) for name, (_, noise) in maps.items()}
+    assert not hot_laws(still, {name: np.zeros(SHAPE, bool) for name in still})
 
 
 def test_a_pixel_that_jumps_is_no_hot_one() -> None:
@@ -147,6 +179,9 @@ def test_a_pixel_that_jumps_is_no_hot_one() -> None:
     hot = CANDIDATES["hot_pixels"]
     assert hot.propose(_clues(maps))
     assert not any((one.of_pixels or 0) > 6 for one in hot.propose(_clues(maps, (20, 30))))
+    # Whatever the spikes have made of the spread that is given with the map.
+    spiky = hot.propose(_clues(maps, (20, 30), spread=30.0))
+    assert not any((one.of_pixels or 0) > 6 for one in spiky)
 
 
 @pytest.mark.parametrize(("share", "mean", "sd"), [(0.01, 1.0, 0.3), (0.2, 0.5, 1.0)])

@@ -129,7 +129,8 @@ def test_numbers_are_settled_where_the_search_has_touched_them(
     search: Any = Proving(after)
     gains = Stub(
         gains=lambda _state, without: {
-            name: Stub(certain=name != "weak", gain=Stub(nats_per_frame=1.0)) for name in without
+            name: Stub(certain=name != "weak", gain=Stub(nats_per_frame=1.0, ci95=(-2.0, 4.0)))
+            for name in without
         }
     )
     trial: Any = gains
@@ -143,7 +144,8 @@ def test_what_is_found_only_without_an_effect_must_gain_more_than_that() -> None
     search.named[1] = Named("weak", None, {}, 64.0, ())
     trial: Any = Stub(
         gains=lambda _state, without: {
-            name: Stub(certain=name != "weak", gain=Stub(nats_per_frame=-14.0)) for name in without
+            name: Stub(certain=name != "weak", gain=Stub(nats_per_frame=-14.0, ci95=(-20.0, -8.0)))
+            for name in without
         }
     )
     proven(search, OPEN, trial, judged=False)
@@ -174,7 +176,8 @@ def test_an_effect_within_its_errors_is_dropped_and_what_it_hid_is_looked_for() 
     search.named = [_decay(0.3, 0.2), _named("kept", x=1.0)]
     trial: Any = Stub(
         gains=lambda _state, without: {
-            name: Stub(certain=True, gain=Stub(nats_per_frame=1.0)) for name in without
+            name: Stub(certain=True, gain=Stub(nats_per_frame=1.0, ci95=(-2.0, 4.0)))
+            for name in without
         }
     )
     _, found = proven(search, OPEN, trial, judged=False)
@@ -188,7 +191,8 @@ def test_what_gained_little_is_asked_first_and_the_rest_only_where_all_of_it_sta
     def gains(_state: Any, without: Any) -> dict[str, Any]:
         asked.append(sorted(without))
         return {
-            name: Stub(certain=name != "weak", gain=Stub(nats_per_frame=1.0)) for name in without
+            name: Stub(certain=name != "weak", gain=Stub(nats_per_frame=1.0, ci95=(-2.0, 4.0)))
+            for name in without
         }
 
     strong = Named("strong", None, {}, 500.0, ())

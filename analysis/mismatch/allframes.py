@@ -2,12 +2,11 @@
 
 What draws one number a frame shows as many in the locked frames as these are: two of an exposure,
 where it may be seen in one exposure only. The odds of locked frames alone then scatter by more than
-they are worth. Those of all frames are their product with those of the frames before, and of a
-model without the effect, whatever was sought, they exceed a hundred in one recording of a hundred
-at most (Markov's inequality), once what was chosen is paid for.
+they are worth. Those of all frames are their product with those of the frames before: asked for is
+what takes an effect into a search, once the numbers that were chosen are paid for.
 """
 
-from analysis.mismatch.instance import LINES
+from analysis.mismatch.instance import LINES, same_place
 from analysis.mismatch.name import Search
 from analysis.mismatch.named import Named
 from analysis.mismatch.rank import SURE_GAIN, replicates_for
@@ -29,11 +28,15 @@ def shown_by_all(search: Search, final: State, named: Named, without: Camera, tr
     own = named.proposal
     if own is None or search.whole is None or not once_a_frame(own.effect):
         return False
-    if trial.lines.gain(own.effect) - 1 >= SURE_GAIN:  # of its amplitude; its place is paid for
+    alone = not any(same_place(own.effect, one, search.whole.layout) for one in without.effect)
+    # Of its amplitude; its place is paid for.
+    if alone and trial.lines.gain(own.effect) - 1 >= SURE_GAIN:
         return True
+    if own.effect.kind in LINES:  # one number of the bank says less of them than frames do
+        return False
     state, bare = (State.of(search.whole, c, search.step) for c in (final.camera, without))
     replicates = replicates_for(search.setting, [own.effect])
-    return gained(state, bare, own.effect, replicates) - len(own.free) >= SURE_GAIN
+    return gained(state, bare, own.effect, replicates) - own.numbers >= SURE_GAIN
 
 
 def once_a_frame(effect: Effect) -> bool:

@@ -10,7 +10,7 @@ from analysis.mismatch.judge import Judge
 from analysis.mismatch.name import Search
 from analysis.mismatch.named import Named, unclear
 from analysis.mismatch.state import State
-from analysis.mismatch.trial import Gained, Trial
+from analysis.mismatch.trial import Gained, Trial, exceeds
 from dsis.camera import Camera
 
 _DOUBTFUL = 30.0  # gain of log-likelihood below which locked frames may not confirm an effect
@@ -98,7 +98,8 @@ def _gained(search: Search, final: State, trial: Trial) -> dict[str, Gained]:
     """Return the gains of all effects; of those that chance could feign, where one of them fails.
 
     What gained little when it was taken in is asked first: the others change with it. Where the
-    locked frames gain by an effect and leave it open, all frames may show it.
+    locked frames gain more than their error by an effect, and leave it open, all frames may show
+    it.
     """
     found: dict[str, Gained] = {}
     little = [named for named in search.named if named.gain < _DOUBTFUL]
@@ -107,7 +108,7 @@ def _gained(search: Search, final: State, trial: Trial) -> dict[str, Gained]:
         told = trial.gains(final, cameras)
         for named in some:
             one = told[named.name]
-            if one.certain or not one.gain.nats_per_frame > 0:
+            if one.certain or not exceeds(one.gain):
                 continue
             if shown_by_all(search, final, named, cameras[named.name], trial):
                 told[named.name] = replace(one, certain=True)

@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 _STATISTIC = "outlying_pixels"
 _ELSEWHERE = 1e-3  # share of maps with pixels of which no law is known
 _MANY = 40.0  # from which the mean of a root is that of a normal variate
+_FAR, _NO_PIXEL = 5.0, 0.5  # standard deviations; pixels of a normal map beyond them are fewer
 _LEAST = 1e-9  # of a variance, beside the Poisson law's own
 
 
@@ -58,7 +59,13 @@ class Counted:
         self.pixels = pixels
 
     def loglik(
-        self, values: Array, mean: Array, before: Array, form: float, replicates: int
+        self,
+        values: Array,
+        mean: Array,
+        before: Array,
+        form: float,
+        replicates: int,
+        known: NDArray[np.bool_] | None = None,
     ) -> float:
         """Return the log-likelihood of the counts that were recorded.
 
@@ -70,9 +77,13 @@ class Counted:
             Relative error of a predicted change.
         replicates
             Simulated recordings that a prediction is from: they are counts, too.
+        known
+            Which numbers are known; None: all. Maps with others say nothing.
         """
         total = 0.0
         for limits, which in self.maps:
+            if known is not None and not known[which].all():
+                continue
             normal = _between(self.pixels * ndtr(-limits))
             seen = np.rint(_between(counted(values[which])))
             expected, current = (
@@ -82,6 +93,13 @@ class Counted:
             excess = own + (form * (expected - current)) ** 2
             total += float(_mixed(seen, expected, excess).sum())
         return total
+
+    def normal(self, mean: Array) -> bool:
+        """Return whether a model with these numbers expects no pixel that is far out of a map."""
+        return not any(
+            (expected_of(mean[which][limits >= _FAR]) > _NO_PIXEL).any()
+            for limits, which in self.maps
+        )
 
 
 def _between(beyond: Array) -> Array:

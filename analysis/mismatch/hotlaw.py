@@ -102,7 +102,10 @@ def hot_laws(
     pixels = [
         _binned((image - _around(image))[~left_out[name]], noise)
         for name, (image, noise) in images.items()
+        if not left_out[name].all()
     ]
+    if not pixels or not _robust(pixels) > 0:
+        return []
     noise = float(np.mean([own.noise for own in pixels]))
     error = 1 / sqrt(2 * sum(float(own.counts.sum()) for own in pixels))
     # Noise is known: what is narrower is not the map. What else differs makes it wider.
@@ -154,10 +157,13 @@ def _binned(image: Array, noise: float) -> _Pixels:
 
 
 def _robust(pixels: Sequence[_Pixels]) -> float:
-    """Return the width of most pixels, in noises: from how many lie within one."""
+    """Return the width of most pixels, in noises: from how many lie within one.
+
+    0 where that says none: all pixels lie within one, or none does.
+    """
     within = sum(float(own.counts[np.abs(own.values) < 1 + _BIN / 2].sum()) for own in pixels)
     share = within / sum(float(own.counts.sum()) for own in pixels)
-    return float((1 + _BIN / 2) / ndtri((1 + share) / 2))
+    return float((1 + _BIN / 2) / ndtri((1 + share) / 2)) if 0 < share < 1 else 0.0
 
 
 def _ends(axis: Array, found: Array, which: int, least: float) -> tuple[float, float]:

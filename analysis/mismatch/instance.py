@@ -1,6 +1,8 @@
 """Which of its kind an effect is: lines have frequencies of their own, decays their edges."""
 
+from analysis.mismatch.layout import Layout
 from dsis.effects import Effect
+from dsis.effects.line_flicker import LineFlicker
 from dsis.effects.line_settling import LineSettling
 
 LINES = frozenset({"periodic_noise", "bistable_pattern"})
@@ -41,3 +43,17 @@ def same_line(one: Frequency, other: Frequency, rows: int, columns: int, step: i
         return abs(turns - round(turns)) * size
 
     return any(apart(s, 0, columns) < _SAME and apart(s, 1, rows) < _SAME for s in (1, -1))
+
+
+def same_place(one: Effect, other: Effect, layout: Layout) -> bool:
+    """Return whether two effects are waves of one frequency: bands of light go down the rows."""
+    first, second = (_wave(own, layout.rows) for own in (one, other))
+    if first is None or second is None:
+        return False
+    return same_line(first, second, layout.rows, layout.columns)
+
+
+def _wave(effect: Effect, rows: int) -> Frequency | None:
+    if isinstance(effect, LineFlicker):
+        return 0.0, effect.cycles_per_frame / rows
+    return frequency_of(effect)

@@ -149,10 +149,11 @@ class Predictor:
         `of_pixels`: what single pixels gain, which says all that counts of them say, and more.
         """
         before = self.reference.null.mean
-        gain = self.loglik(mean, of) - self.loglik(before, of)
+        known = self.weights(mean)[2]  # of both: what one does not know says nothing of the other
+        known = known if of is None else known & of
+        gain = self.loglik(mean, known) - self.loglik(before, known)
         if of_pixels is None:
             return gain
-        known = self.weights(mean)[2] if of is None else self.weights(mean)[2] & of
         counts = [self._of_counts(one, before, known) for one in (mean, before)]
         return gain - counts[0] + counts[1] + of_pixels
 
@@ -171,11 +172,9 @@ class Predictor:
         return gain + own - self._likely(rest, scatter, known) - other
 
     def _of_counts(self, mean: Array, before: Array, known: NDArray[np.bool_]) -> float:
-        """Return the log-likelihood of counts, where all of them are known."""
-        if not known[self.counts.which].all():
-            return 0.0
-        form = _FORMS["outlying_pixels"]
-        return self.counts.loglik(self.reference.vector.values, mean, before, form, self.replicates)
+        """Return the log-likelihood of counts, of maps of which all are known."""
+        form, seen = _FORMS["outlying_pixels"], self.reference.vector.values
+        return self.counts.loglik(seen, mean, before, form, self.replicates, known)
 
     def _likely(self, rest: Array, sd: Array, known: NDArray[np.bool_]) -> float:
         few, many = known & self.few, known & ~self.few & ~self.counts.said

@@ -9,7 +9,13 @@ from numpy.typing import NDArray
 
 from analysis.mismatch.candidates import CANDIDATES, Proposal
 from analysis.mismatch.credited import joined, together
-from analysis.mismatch.instance import Frequency, frequency_of, instance, same_line
+from analysis.mismatch.instance import (
+    Frequency,
+    frequency_of,
+    instance,
+    same_line,
+    same_place,
+)
 from analysis.mismatch.memory import Memory, words
 from analysis.mismatch.polish import Polished, needed, polish, stepped, with_effects
 from analysis.mismatch.state import Setting, State
@@ -139,9 +145,12 @@ def _in_order(state: State, found: Sequence[Fit], shown: Callable[[Effect], floa
     """Return fitted effects with their gains, the best first."""
     predictor = state.predictor()
     judged = ~_others(state, [own.mean for _, _, own in found])
-    fitted = []
+    fitted, there = [], state.camera.effect
     for kind, start, own in found:
-        gain = max(predictor.gain(own.mean, start.of_pixels, judged), shown(start.effect))
+        gain = predictor.gain(own.mean, start.of_pixels, judged)
+        # Frames tell a wave from noise, and not from one that the camera has there already.
+        if not any(same_place(start.effect, one, state.setting.layout) for one in there):
+            gain = max(gain, shown(start.effect))
         fitted.append(Ranked(gain - start.numbers, kind, start, own))
     return sorted(fitted, key=lambda one: -one.gain)
 

@@ -44,6 +44,11 @@ class Gained:
     certain: bool
 
 
+def exceeds(gain: Gain) -> bool:
+    """Return whether a gain is more than its own standard error."""
+    return gain.nats_per_frame > (gain.nats_per_frame - gain.ci95[0]) / _ERRORS
+
+
 def _of_pixels(gain: Gain, frames: int) -> Gained:
     """Return the gain of the locked frames' pixels.
 
@@ -51,9 +56,8 @@ def _of_pixels(gain: Gain, frames: int) -> Gained:
     zero or the ratio of likelihoods is above 100: of a model fixed before, chance exceeds that in
     1 % of recordings at most (Markov's inequality).
     """
-    own = gain.nats_per_frame
-    above = own > (own - gain.ci95[0]) / _ERRORS
-    return Gained(gain, above and (gain.ci95[0] > 0 or own * frames > _TOTAL))
+    total = gain.nats_per_frame * frames
+    return Gained(gain, exceeds(gain) and (gain.ci95[0] > 0 or total > _TOTAL))
 
 
 def _denied(gain: Gain, frames: int) -> bool:

@@ -5,9 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import median_abs_deviation
 
 from analysis.mismatch.candidates.candidate import Candidate, Proposal, measured, proposals
 from analysis.mismatch.clues import Clues
+from analysis.mismatch.counted import Counted
 from analysis.mismatch.hotlaw import hot_laws
 
 Array = NDArray[np.float64]
@@ -24,6 +26,9 @@ def _hot(clues: Clues) -> Sequence[Proposal]:
         return []
     images, scale = grown
     noisy = {name: _noisy(clues, name, image / scale) for name, (image, _) in images.items()}
+    # The law is told from normal noise: where the camera's maps are another's, counts must do.
+    pixels = clues.layout.rows * clues.layout.columns
+    normal = Counted(clues.vector.keys, pixels).normal(clues.null.mean)
     found: list[Proposal] = []
     for law in hot_laws(images, noisy):
         if law.gain < len(_NUMBERS):
@@ -31,7 +36,7 @@ def _hot(clues: Clues) -> Sequence[Proposal]:
         values = dict(zip(_NUMBERS, (law.share, law.mean / scale), strict=True))
         errors = dict(zip(_NUMBERS, (law.share_error, law.mean_error / scale), strict=True))
         found += [
-            replace(measured(own, values, errors), of_pixels=law.gain)
+            replace(measured(own, values, errors), of_pixels=law.gain if normal else None)
             for own in proposals("hot_pixels", _NUMBERS, (), **values)
         ]
     return found
@@ -40,13 +45,14 @@ def _hot(clues: Clues) -> Sequence[Proposal]:
 def _grown(clues: Clues) -> tuple[Mapping[str, tuple[Array, float]], float] | None:
     """Return a map with its noise by channel, and in how many seconds it grows so; None: unknown.
 
-    Where all exposures take the same time the offset is what has grown in it.
+    Where all exposures take the same time, and some are dark, the offset is what has grown in it.
     """
     if images := clues.image("time"):
         return images, clues.scale("time", next(iter(images)))
     times = {exposure.exposure_time_s for exposure in clues.layout.uniform}
     images = clues.image("offset")
-    if not images or len(times) > 1 or not max(times) > 0:
+    dark = any(exposure.kind == "dark" for exposure in clues.layout.uniform)
+    if not images or not dark or len(times) > 1 or not max(times) > 0:
         return None
     return images, max(times)
 
@@ -56,7 +62,7 @@ def _noisy(clues: Clues, channel: str, rate: Array) -> Mask:
 
     Or were hit by a spike. What they add to a mean frame is no dark current. The rate is in DN/s.
     """
-    total, sd = clues.image("variance")[channel]
+    total, _ = clues.image("variance")[channel]
     per_s = np.maximum(rate - np.median(rate), 0.0)
     dark, lit = clues.fit.line_dn2(np.array([0.0, 1.0]))
     expected, most = np.zeros(rate.shape), np.zeros(rate.shape)
@@ -68,7 +74,9 @@ def _noisy(clues: Clues, channel: str, rate: Array) -> Mask:
         share = max(float(lit - dark), 0.0) * per_s * exposure.exposure_time_s / variance
         expected += (frames - 1) / variance * share
         most = np.maximum(most, share)
-    return np.asarray(total - expected > _CLEAR * sd * (1 + most))
+    excess = total - expected
+    sd = float(median_abs_deviation(excess, axis=None, scale="normal"))  # spikes make none of it
+    return np.asarray(excess > _CLEAR * sd * (1 + most))
 
 
 CANDIDATES = (

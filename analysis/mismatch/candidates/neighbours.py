@@ -11,6 +11,7 @@ from analysis.mismatch.clues import Clues, alike
 _ALONG_ROWS, _ALONG_COLUMNS = "correlation_0_1", "correlation_1_0"
 _SEEN_STEPS = 100.0  # of chi-squared: ten standard deviations
 _AS_LIKELY = 4.6  # of chi-squared, odds of 10: of few levels, periods may be alike
+_TOLD = 2.0  # standard errors from which levels show an exchange
 _LEAST_FLATS = 2  # of one, colours may be the light's
 _BESIDE = {"R": ("Gr", "Gb"), "Gr": ("R", "B"), "Gb": ("B", "R"), "B": ("Gb", "Gr")}
 _NEAR = (_ALONG_ROWS, _ALONG_COLUMNS, "line_correlation", "pixel_variance")
@@ -58,7 +59,10 @@ def _exchanged(clues: Clues) -> float:
         values.append(value / sd)
     if len({name for name, _ in places}) < _LEAST_FLATS:
         return 0.0
-    return float(np.linalg.lstsq(np.array(design), np.array(values), rcond=None)[0][0])
+    shapes = np.array(design)
+    rate = float(np.linalg.lstsq(shapes, np.array(values), rcond=None)[0][0])
+    error = float(np.linalg.pinv(shapes.T @ shapes)[0, 0]) ** 0.5
+    return rate if rate > _TOLD * error > 0 else 0.0
 
 
 def _filtering(clues: Clues) -> Sequence[Proposal]:

@@ -1,6 +1,7 @@
 """Charge that sites of a mosaic exchange shows in the levels of their colours."""
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
@@ -13,8 +14,9 @@ from dsis.camera import read_camera
 from dsis.recording import read_recording
 
 WORDS = frozenset(
-    {"brighter_fatter", "crosstalk", "nonlinearity", "saturation", "adc_memory", "prnu"}
-)
+    {"brighter_fatter", "crosstalk", "nonlinearity", "saturation", "adc_memory", "prnu",
+     "channel_imbalance", "tap_mismatch"}
+)  # fmt: skip
 
 
 def test_charge_that_colours_exchange_is_named_before_any_covariance_shows(tmp_path: Path) -> None:
@@ -32,4 +34,22 @@ def test_charge_that_colours_exchange_is_named_before_any_covariance_shows(tmp_p
     fitted = named.parameters["per_dn"]
     assert isinstance(fitted.value, float)
     assert abs(fitted.value - rate) < 3 * fitted.standard_error
+    assert not found.unexplained
+
+
+def test_charge_shared_along_columns_makes_the_greens_differ(tmp_path: Path) -> None:
+    """Correlations of neighbours tell charge that is shared from light that is not."""
+    case = draw_case(4, "small", Choice(cfa="GRBG", segments=1, light=True, times="darks"))
+    case = replace(case, response=(0.55, 1.0, 0.85))
+    own = {"fraction": 0.005, "along": "columns"}
+    plant(tmp_path, case.having(Planted("crosstalk", own)))
+    camera = read_camera(tmp_path / "camera.toml")
+    found = find_mismatch(camera, read_recording(tmp_path), seed=1, vocabulary=WORDS)
+    (named,) = found.omitted_physics
+    assert named.effect == "crosstalk"
+    assert named.choices["along"] == "columns"
+    assert "channel_ratio" in named.because
+    fitted = named.parameters["fraction"]
+    assert isinstance(fitted.value, float)
+    assert abs(fitted.value - 0.005) < 3 * fitted.standard_error
     assert not found.unexplained

@@ -241,6 +241,22 @@ def test_uneven_light_that_a_field_has_by_chance_is_denied(
     assert fielded(state, effect("prnu", sigma_percent=1.0)) is None
 
 
+def test_a_field_that_is_named_feigns_as_much_light_as_it_was_fitted() -> None:
+    """Whatever the spectrum says, which other noise that neighbours share makes look short."""
+    gain = 10 * np.random.default_rng(7).normal(0, 0.3, (96, 128))
+    field = effect("smooth_prnu", sigma_percent=0.4, length_pixels=8.0)
+    for tilt, denied in ((0.3, True), (4.0, False)):
+        one = effect("shading", falloff_percent=0.0, tilt_right_percent=tilt)
+        clues = _clues(gain, 1.0, one, field)
+        state: Any = Stub(
+            camera=clues.camera,
+            mismatches=[],
+            clues=lambda clues=clues: clues,
+            setting=Stub(layout=clues.layout),
+        )
+        assert (fielded(state, one) is not None) == denied
+
+
 @pytest.mark.parametrize("cfa", ["MONO", "RGGB"])
 @pytest.mark.parametrize(("sigma", "length"), [(0.25, 4.0), (0.13, 3.0)])
 def test_it_is_named_with_its_numbers(cfa: str, sigma: float, length: float) -> None:

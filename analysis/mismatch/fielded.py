@@ -25,12 +25,12 @@ def fielded(state: State, effect: Effect) -> Denial | None:
     """Return how a pattern of the whole sensor is denied by a field of gains; None: it is not.
 
     Where neighbours share gains, named or not, the map beyond smooth surfaces tells how much, and
-    about how far. If fields of a length that may well be have the pattern by chance, there may be
-    no uneven light.
+    about how far; a field that is named, as it was fitted. If fields of a length that may well be
+    have the pattern by chance, there may be no uneven light.
     """
     if effect.kind not in _KINDS or (isinstance(effect, LineSettling) and effect.offset_dn):
         return None  # an offset is no gain
-    named = any(isinstance(other, SmoothPrnu) for other in state.camera.effect)
+    named = [own for own in state.camera.effect if isinstance(own, SmoothPrnu)]
     if not named and all(m.statistic != _STATISTIC for m in state.mismatches):
         return None
     others = tuple(own for own in state.camera.effect if not isinstance(own, SmoothPrnu))
@@ -39,11 +39,13 @@ def fielded(state: State, effect: Effect) -> Denial | None:
     pattern = gain_of([effect], state.setting.layout, camera.read_out)
     pattern -= pattern.mean()
     square = float((pattern**2).sum())
-    if not found or square == 0:
+    if not (found or named) or square == 0:
         return None
-    least = min(found).left
+    least = min((own.left for own in found), default=0.0)
     likely = [own for own in found if own.left <= least + _AS_LIKELY and own.variance > 0]
-    most = max((own.variance * _along(pattern, own.length) for own in likely), default=0.0)
+    by_chance = [own.variance * _along(pattern, own.length) for own in likely]
+    by_chance += [own.sigma_percent**2 * _along(pattern, own.length_pixels) for own in named]
+    most = max(by_chance, default=0.0)
     if square**2 >= _CHANCE**2 * most:
         return None
     share = 1 - _CHANCE * most**0.5 / square

@@ -20,11 +20,32 @@ _NEAR = (_ALONG_ROWS, _ALONG_COLUMNS, "line_correlation", "pixel_variance")
 def _crosstalk(clues: Clues) -> Sequence[Proposal]:
     across, _ = clues.amplitude(_ALONG_ROWS, clues.shot_share)
     down, _ = clues.amplitude(_ALONG_COLUMNS, clues.shot_share)
+    lines = _unequal(clues)
+    shares = [("both", (across + down) / 4), ("rows", across / 2), ("columns", down / 2),
+              ("rows", lines), ("columns", -lines)]  # fmt: skip
     found: list[Proposal] = []
-    for along, rho in (("both", (across + down) / 2), ("rows", across), ("columns", down)):
-        if rho > 0:
-            found += proposals("crosstalk", ["fraction"], fraction=min(rho / 2, 0.15), along=along)
+    for along, share in shares:
+        if share > 0:
+            found += proposals("crosstalk", ["fraction"], fraction=min(share, 0.15), along=along)
     return found
+
+
+def _unequal(clues: Clues) -> float:
+    """Return the share along rows by which greens would differ as they do; below 0: along columns.
+
+    Gr has red beside it in its row and blue in its column, Gb the other way round: charge that is
+    shared along one of both parts them.
+    """
+
+    def shape(place: tuple[str, str]) -> float:
+        own = {c: clues.signal((place[0], c)) for c in _BESIDE}
+        greens = own["Gr"] + own["Gb"]
+        return 4 * (own["R"] - own["B"]) / greens if greens > 0 else 0.0
+
+    if not set(_BESIDE) <= set(clues.layout.channels):
+        return 0.0
+    share, error = clues.amplitude("channel_ratio", shape)
+    return share if abs(share) > _TOLD * error else 0.0
 
 
 def _brighter_fatter(clues: Clues) -> Sequence[Proposal]:
@@ -151,7 +172,7 @@ def _lag(clues: Clues) -> Sequence[Proposal]:
 
 
 CANDIDATES = (
-    Candidate("crosstalk", _NEAR, _crosstalk),
+    Candidate("crosstalk", (*_NEAR, "channel_ratio"), _crosstalk),
     Candidate("brighter_fatter", (*_NEAR, "level"), _brighter_fatter),
     Candidate(
         "spatial_filtering",

@@ -205,7 +205,7 @@ def test_few_rows_or_columns_hold_no_frequency_of_a_field(shape: tuple[int, int]
     assert not CANDIDATES[0].propose(clues)
 
 
-@pytest.mark.parametrize(("length", "sane"), [(10.0, True), (40.0, False)])
+@pytest.mark.parametrize(("length", "sane"), [(10.0, True), (40.0, False), (0.5, False)])
 def test_a_field_as_long_as_the_sensor_is_uneven_light(length: float, sane: bool) -> None:
     layout: Any = Stub(rows=96, columns=128)
     one = effect("smooth_prnu", sigma_percent=1.0, length_pixels=length)

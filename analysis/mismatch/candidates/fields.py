@@ -59,7 +59,8 @@ def _smooth_prnu(clues: Clues) -> Sequence[Proposal]:
     near = sorted(fields(clues))
     for own in near:
         apart = all(max(own.length / one, one / own.length) > _APART for one in lengths)
-        if own.variance > 0 and own.left < near[0].left + _AS_LIKELY and apart:
+        likely = own.variance > 0 and own.left < near[0].left + _AS_LIKELY
+        if likely and apart and own.length > _SHORTEST:
             lengths.append(own.length)
             found += proposals(
                 "smooth_prnu",
@@ -170,9 +171,14 @@ def _bins(shape: tuple[int, ...]) -> NDArray[np.int64]:
 
 
 def _shorter(layout: Layout, effect: Effect) -> bool:
-    """Return whether a field is far shorter than the sensor: longer ones are uneven light."""
+    """Return whether a field is far shorter than the sensor, and longer than a pixel.
+
+    Longer ones are uneven light, of shorter ones neighbours share nothing: they are white.
+    """
     size = min(layout.rows, layout.columns)
-    return not isinstance(effect, SmoothPrnu) or effect.length_pixels < _UNEVEN * size
+    if not isinstance(effect, SmoothPrnu):
+        return True
+    return _SHORTEST < effect.length_pixels < _UNEVEN * size
 
 
 CANDIDATES = (

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from analysis.mismatch import judge, name, rank
+from analysis.mismatch import judge, name
 from analysis.mismatch.candidates import Proposal
 from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.judge import Judge
-from analysis.mismatch.memory import Memory, _near
+from analysis.mismatch.memory import _near
 from analysis.mismatch.name import Search
 from analysis.mismatch.named import Named
 from analysis.mismatch.rank import Ranked, alike, ties
@@ -260,50 +260,6 @@ def test_an_effect_explains_half_of_something_that_differs_without_it(
         return SimpleNamespace(mismatches=mismatches)
 
     assert explains(of(with_it), of(without), of(first), {"kurtosis"}) == explained
-
-
-def test_beside_what_gains_much_only_what_gained_enough_is_tried_anew(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    gains = {"row_noise": 200.0, "crosstalk": 90.0, "flicker": 50.0, "prnu": 3.0, "rts": 1.0}
-    calls, tried = ("row_variance",), []
-
-    def propose(kind: str) -> Any:
-        def proposed(_clues: Any) -> list[Any]:
-            tried.append(kind)
-            return [_proposal("row_noise", sigma_dn=gains[kind])]
-
-        return SimpleNamespace(calls=calls, hints=(), propose=proposed)
-
-    monkeypatch.setattr(rank, "CANDIDATES", {kind: propose(kind) for kind in gains})
-    monkeypatch.setattr(
-        rank, "_means", lambda _s, some, *_: [np.array([p.effect.sigma_dn]) for p in some]
-    )
-    monkeypatch.setattr(rank, "alike", lambda *_: False)
-    state: Any = SimpleNamespace(
-        mismatches=[SimpleNamespace(statistic="row_variance")],
-        clues=lambda _: None,
-        predictor=lambda _: SimpleNamespace(
-            loglik=lambda mean: float(mean[0]), gain=lambda mean, _of_pixels: float(mean[0])
-        ),
-        null=SimpleNamespace(mean=np.zeros(1)),
-        setting=SimpleNamespace(screening=1),
-    )
-    memory = Memory()
-
-    def look(*without: str) -> list[str]:
-        tried.clear()
-        kinds = gains.keys() - set(without)
-        rank._tried(state, kinds, memory, lambda: None, (), (), lambda _: True)
-        return sorted(tried)
-
-    assert look() == sorted(gains)  # none was tried before
-    assert look("row_noise") == ["crosstalk", "flicker"]
-    gains |= {"crosstalk": 40.0, "flicker": 10.0}  # less than before: what gained 3 still may wait
-    assert look("row_noise") == ["crosstalk", "flicker"]
-    assert look("row_noise", "crosstalk") == sorted(gains.keys() - {"row_noise", "crosstalk"})
-    memory.gains.clear()  # something was dropped
-    assert look("row_noise") == sorted(gains.keys() - {"row_noise"})
 
 
 def test_a_switch_may_part_the_colours_of_one_exposure() -> None:

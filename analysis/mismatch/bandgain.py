@@ -14,7 +14,6 @@ _BETWEEN = (-1 / 3, 0.0, 1 / 3)  # bins by which a frequency may be off
 _FAR = (-19, -15, -12, -9, -7, -5, 5, 7, 9, 12, 15, 19)  # bins that say what rows have in common
 _NEAR = (-2, -1, 1, 2)  # bins that a band leaves as they are, and slow waves do not
 _LOWEST = 1.0  # cycles a frame: below, a wave is much like the frame's mean
-_RAISED, _SHARE = 4.0, 0.3  # standard errors, and of the power, from which neighbours are raised
 
 
 def gain_of_bands(layout: Layout, frames_of: FramesOf, cycles: float) -> float:
@@ -47,9 +46,7 @@ def gain_of_bands(layout: Layout, frames_of: FramesOf, cycles: float) -> float:
         return -np.inf
     best = int(seen.excess[: len(tried)].argmax())
     power = float(seen.excess[best])
-    beside = float(np.median(seen.excess[len(tried) : len(tried) + len(near)]))
-    raised = beside / seen.error * np.sqrt(len(near)) > _RAISED
-    if not power > 0 or (raised and beside > _SHARE * power):
+    if not power > 0 or seen.crowded(range(len(tried), len(tried) + len(near)), power):
         return -np.inf
     own = seen.at([best])
     share = min(np.sqrt(2 * np.pi) * own.bins(power), 1.0)

@@ -27,7 +27,6 @@ _CROSS = ((-1 / 3, 0.0), (1 / 3, 0.0), (0.0, -1 / 3), (0.0, 1 / 3))  # bins, bes
 _MOST_CREST = 1.21  # power between steps: sinc(1/6)^-4, a sixth of a bin off on both axes
 _BETWEEN = (-1 / 3, 0.0, 1 / 3)  # bins by which a frequency may be off
 _CHANCE = 0.05  # of a line as strong among all frequencies
-_RAISED, _SHARE = 4.0, 0.3  # standard errors, and of the line's power, from which neighbours are
 _FEW = 8  # multiples of a quarter, at which patterns of single pixels lie
 _PHASE_WORDS = {
     "periodic_noise": "the pattern's phase is the same in all frames but for its sign",
@@ -232,9 +231,7 @@ def look(layout: Layout, frames_of: FramesOf, frequency: Frequency) -> Look:
         ]
         if exact or not some:
             continue
-        near = float(np.median(around.excess[some]))  # one of them may be a line itself
-        raised = near / around.error * np.sqrt(len(some)) > _RAISED
-        broad |= bool(raised) and near > _SHARE * float(own.excess[0])
+        broad |= around.crowded(some, float(own.excess[0]))
     absent = own.chance(real=real) * bins > _CHANCE
     kept = own.keeps_phase(real=real)
     if exact:

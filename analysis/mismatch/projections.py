@@ -13,6 +13,7 @@ from analysis.mismatch.phaselaw import kept_rather_than_free, strength_of, there
 
 FramesOf = Callable[[str], Iterable[NDArray[np.generic]]]
 LEAST = 8  # frames, to tell
+_RAISED, _SHARE = 4.0, 0.3  # standard errors, and of the power, from which neighbours are raised
 _ONE_LINE, _CIRCLE = 0.75, 0.45
 _CLEAR = 8.0  # standard errors of the noise's power from which a line's phase is seen
 SURE = 3.0  # of log-likelihood, to prefer one kind of phase
@@ -98,6 +99,15 @@ class Power:
     def error(self) -> float:
         """Standard error of the excess in white noise."""
         return float(1 / np.sqrt(self._sum(2)))
+
+    def crowded(self, which: Sequence[int], power: float) -> bool:
+        """Return whether neighbours of a line of a power, DN^2, are raised as well.
+
+        Their median is asked: one of them may be a line itself.
+        """
+        beside = float(np.median(self.excess[which]))
+        clear = beside / self.error * np.sqrt(len(which)) > _RAISED
+        return bool(clear) and beside > _SHARE * power
 
     def strength(self, power: float, *, kept: bool, real: bool) -> tuple[float, float]:
         """Return the first pattern's amplitude over that of a power, DN^2, and its error."""

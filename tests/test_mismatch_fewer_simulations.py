@@ -59,7 +59,7 @@ def test_recordings_made_ahead_are_those_that_are_asked_for(
 
     monkeypatch.setattr("analysis.mismatch.simulations.each", each)
     model: Any = SimpleNamespace(with_camera=lambda own: SimpleNamespace(camera=own))
-    made = Simulations(SimpleNamespace(), model, np.array, 0, 2)  # type: ignore[arg-type]
+    made = Simulations(SimpleNamespace(cfa=Cfa.MONO), model, np.array, 0, 2)  # type: ignore[arg-type]
     made.keep(one, [np.array((one.black_level, 0))])
     made.ready([one, other], 3)
     for own in (one, other):

@@ -3,27 +3,19 @@
 import os
 import time
 from functools import partial
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
 import analysis.mismatch.simulations as module
-from analysis.mismatch.model import each, processes
+from analysis.mismatch.model import Model, each, processes
 from analysis.mismatch.simulations import Simulations
+from dsis.cfa import Cfa
 from mismatch_recordings import camera
 
 CAMERAS = [camera(black=64.0 + i) for i in range(3)]
-
-
-class Model:
-    """A model whose recordings are told by camera and number."""
-
-    def __init__(self, own: Any = None) -> None:
-        self.camera = own
-
-    def with_camera(self, own: Any) -> "Model":
-        return Model(own)
 
 
 @pytest.fixture
@@ -44,9 +36,8 @@ def made(monkeypatch: pytest.MonkeyPatch) -> list[tuple[float, int]]:
 
 
 def simulations(jobs: int) -> Simulations:
-    anything: Any = None
-    model: Any = Model()
-    return Simulations(anything, model, np.array, 1, jobs)
+    layout: Any = SimpleNamespace(cfa=Cfa.MONO)
+    return Simulations(layout, Model(CAMERAS[0], {}), np.array, 1, jobs)
 
 
 @pytest.mark.parametrize("jobs", [1, 2, 3])

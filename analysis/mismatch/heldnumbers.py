@@ -20,6 +20,7 @@ from analysis.mismatch.model import Model, each
 from analysis.mismatch.observe import Observation, observe
 from analysis.mismatch.pictures.album import Album
 from analysis.mismatch.recalibrate import Calibrated
+from analysis.mismatch.relit import relit
 from analysis.mismatch.source import Source
 from analysis.mismatch.split import Split
 from analysis.mismatch.state import Setting, State
@@ -137,7 +138,7 @@ class HeldNumbers:
         if key not in self.kept:
             whole, rest = self.whole[0], self.rest[0]
             count = _FEW if self.setting.large else _SIMULATIONS
-            model, seed = final.calibrated.model.with_camera(camera), self.setting.seed + 3
+            model, seed = relit(final.calibrated.model, camera, whole), self.setting.seed + 3
 
             seen = each(partial(_two, model, whole, rest, seed), range(count), self.setting.jobs)
             made = [

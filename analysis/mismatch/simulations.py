@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from analysis.mismatch.layout import Layout
 from analysis.mismatch.model import Model, each, simulate, simulated
 from analysis.mismatch.observe import Observation
+from analysis.mismatch.relit import relit
 from dsis.camera import Camera
 
 Array = NDArray[np.float64]
@@ -22,7 +23,7 @@ class Simulations:
     Attributes
     ----------
     layout, model
-        What is simulated; the model's signals are every camera's.
+        What is simulated; every camera has the model's levels, see `relit`.
     numbers_of
         Gives the bank's numbers of an observation.
     seed, jobs
@@ -55,7 +56,7 @@ class Simulations:
         if self.jobs < 2 or len(missing) < 2:
             return
 
-        work = [(self.model.with_camera(wanted[key]), number) for key, number in missing]
+        work = [(self._model(wanted[key]), number) for key, number in missing]
         made = each(partial(simulated, self.layout, self.seed), work, self.jobs)
         ahead: dict[str, list[Array]] = {}
         for (key, _), seen in zip(missing, made, strict=True):
@@ -70,11 +71,13 @@ class Simulations:
         known = self.kept.get(key, [])
         missing = range(len(known), replicates)
         if missing:
-            model = self.model.with_camera(camera)
-            made = simulate(model, self.layout, missing, self.seed, self.jobs)
+            made = simulate(self._model(camera), self.layout, missing, self.seed, self.jobs)
             known = [*known, *(self.numbers_of(one) for one in made)]
             self.kept[key] = known
         return np.stack(known[:replicates])
+
+    def _model(self, camera: Camera) -> Model:
+        return relit(self.model, camera, self.layout)
 
 
 def _key(camera: Camera) -> str:

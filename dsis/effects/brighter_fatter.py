@@ -54,6 +54,10 @@ class BrighterFatter(Effect):
     def apply(self, image: Image, exposure: Exposure) -> Image:
         """Exchange charge between neighbouring sites."""
         del exposure
+        return self.exchanged(image)
+
+    def exchanged(self, image: Image) -> Image:
+        """Return what becomes of the charge of neighbouring sites."""
         made, square = image.copy(), np.float32(self.per_dn / 2) * image * image
         for axis in (0, 1):
             flow = np.diff(square, axis=axis)

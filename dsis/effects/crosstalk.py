@@ -53,6 +53,10 @@ class Crosstalk(Effect):
     def apply(self, image: Image, exposure: Exposure) -> Image:
         """Exchange charge between neighbouring sites."""
         del exposure
+        return self.exchanged(image)
+
+    def exchanged(self, image: Image) -> Image:
+        """Return what becomes of the charge of neighbouring sites."""
         made, share = image.copy(), np.float32(self.fraction)
         if self.along != "columns":
             flow = share * (image[:, 1:] - image[:, :-1])

@@ -255,6 +255,13 @@ class Effect(Model, ABC):
         del exposure
         return deviates
 
+    def exchanged(self, image: Image) -> Image:
+        """Return what becomes of charge that neighbours exchange, nothing else of the effect.
+
+        Of a mosaic's mean charge: the levels that its colours then have.
+        """
+        return image
+
     def reach_pixels(self) -> int:
         """Return how far away a pixel may matter to this one: the margin a crop needs."""
         return 0

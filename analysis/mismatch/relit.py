@@ -1,0 +1,79 @@
+"""The light under which another camera has the levels that were recorded.
+
+Where colours exchange charge a mosaic's levels are not its light. The light of a model is such that
+levels are right with the effects that its camera has. A camera with one more, or without it, under
+the same light has levels that nobody recorded: above a switch of the read-out, say, what is below.
+"""
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.mismatch.layout import Layout, sites
+from analysis.mismatch.model import Model, Sites
+from dsis.camera import Camera
+from dsis.cfa import Cfa
+from dsis.effects import Effect
+
+Array = NDArray[np.float64]
+_ROUNDS = 8  # each leaves a share of what the last one changed, no larger than what is exchanged
+_TILES = 6  # of two rows and columns: the middle ones know of no border
+
+
+def relit(model: Model, camera: Camera, layout: Layout) -> Model:
+    """Return the model with another camera, under light that gives the levels of its own one.
+
+    Both greens have one light. Where the light of flats is known, a colour's is off by the same
+    share in all of them; where it is not, by its own in each.
+    """
+    made = model.with_camera(camera)
+    if layout.cfa is Cfa.MONO:
+        return made
+    before, after = _exchanging(model.camera), _exchanging(camera)
+    flats = [e for e in layout.uniform if e.kind == "flat" and (model.signals[e.name] > 0).all()]
+    if before == after or not flats:
+        return made
+    signals = np.stack([model.signals[e.name] for e in flats])
+    wanted = _of_colours(np.stack([exchanged(before, own) for own in signals]), layout.cfa)
+    known = np.array([e.light is not None for e in flats])
+    for _ in range(_ROUNDS):
+        got = _of_colours(np.stack([exchanged(after, own) for own in signals]), layout.cfa)
+        ratio = wanted / got
+        if known.any():
+            ratio[known] = ratio[known].mean(0)
+        signals = signals * ratio
+    names = [e.name for e in flats]
+    return replace(made, signals={**model.signals, **dict(zip(names, signals, strict=True))})
+
+
+def exchanged(effects: Iterable[Effect], signal_dn: Sites) -> Sites:
+    """Return the levels of a mosaic of which effects exchange charge, from those of its light.
+
+    Parameters
+    ----------
+    effects
+        In the order that charge meets them.
+    signal_dn
+        For rows 0, 1 and columns 0, 1: (2, 2), DN above black.
+    """
+    image = np.tile(signal_dn, (_TILES, _TILES)).astype(np.float32)
+    for effect in effects:
+        image = effect.exchanged(image)
+    middle = slice(_TILES, _TILES + 2)
+    return np.asarray(image[middle, middle], np.float64)
+
+
+def _exchanging(camera: Camera) -> list[Effect]:
+    return [e for e in camera.chain() if type(e).exchanged is not Effect.exchanged]
+
+
+def _of_colours(levels: Array, cfa: Cfa) -> Array:
+    """Return levels (exposure, 2, 2) with the mean of both greens for either."""
+    found, where = levels.copy(), sites(cfa)
+    greens = [(slice(None), *where[name]) for name in ("Gr", "Gb")]
+    mean = (levels[greens[0]] + levels[greens[1]]) / 2
+    for at in greens:
+        found[at] = mean
+    return found

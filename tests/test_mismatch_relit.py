@@ -1,0 +1,127 @@
+"""Light under which levels stay what was recorded, against the matrix of the exchange."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from analysis.mismatch.layout import Layout, Taken, sites
+from analysis.mismatch.model import Model
+from analysis.mismatch.relit import exchanged, relit
+from dsis.camera import BaseNoise, Camera, Segment
+from dsis.cfa import Cfa
+from dsis.effects import Effect
+from dsis.effects.brighter_fatter import BrighterFatter
+from dsis.effects.crosstalk import Crosstalk
+from dsis.effects.dsnu import Dsnu
+
+PLAIN = Camera(
+    name="plain",
+    cfa=Cfa.GBRG,
+    black_level=512,
+    white_level=16383,
+    bit_depth=14,
+    noise=BaseNoise(segment=(Segment(slope=0.4, intercept=8.0),)),
+)
+
+
+def having(*effects: Effect) -> Camera:
+    return PLAIN.model_copy(update={"effect": effects})
+
+
+def layout_of(lights: list[float | None], cfa: Cfa = Cfa.GBRG) -> Layout:
+    flats = tuple(Taken(f"flat-{i}", "flat", 0.01, x, (0, 1)) for i, x in enumerate(lights))
+    dark = Taken("dark-0", "dark", 0.01, 0.0, (0, 1))
+    return Layout((dark, *flats), 64, 96, cfa, 512.0, 16383.0, {}, {})
+
+
+def signals_of(lights: list[float], ratios: dict[str, float]) -> dict[str, np.ndarray]:
+    signals = {"dark-0": np.zeros((2, 2))}
+    for i, light in enumerate(lights):
+        values = np.zeros((2, 2))
+        for channel, at in sites(Cfa.GBRG).items():
+            values[at] = light * ratios[channel]
+        signals[f"flat-{i}"] = values
+    return signals
+
+
+COLOURS = {"R": 0.6, "Gr": 1.0, "Gb": 1.0, "B": 0.8}
+
+
+def by_matrix(effect: Crosstalk, levels: np.ndarray) -> np.ndarray:
+    """Return the levels far from all borders: a site has two neighbours alike along each axis."""
+    f, made = effect.fraction, levels.copy()
+    if effect.along != "columns":
+        made += 2 * f * (levels[:, ::-1] - levels)
+    if effect.along != "rows":
+        made += 2 * f * (levels[::-1] - levels)
+    return made
+
+
+@given(
+    st.floats(0.001, 0.1),
+    st.sampled_from(["both", "rows", "columns"]),
+    st.lists(st.floats(0.2, 5.0), min_size=4, max_size=4),
+)
+def test_levels_after_an_exchange_are_those_of_its_matrix(
+    fraction: float, along: str, values: list[float]
+) -> None:
+    effect = Crosstalk.model_validate({"fraction": fraction, "along": along})
+    levels = 1000 * np.reshape(values, (2, 2))
+    np.testing.assert_allclose(exchanged([effect], levels), by_matrix(effect, levels), rtol=1e-5)
+
+
+@pytest.mark.parametrize("along", ["both", "rows", "columns"])
+@pytest.mark.parametrize("lights", [[1.0, 2.0, 4.0], [None, None, None]])
+def test_with_crosstalk_besides_every_colour_keeps_its_level(
+    along: str, lights: list[float | None]
+) -> None:
+    effect = Crosstalk.model_validate({"fraction": 0.02, "along": along})
+    recorded = signals_of([500.0, 1000.0, 2000.0], COLOURS)
+    made = relit(Model(PLAIN, recorded), having(effect), layout_of(lights))
+    where = sites(Cfa.GBRG)
+    for name, signal in recorded.items():
+        light, levels = made.signals[name], by_matrix(effect, made.signals[name])
+        assert light[where["Gr"]] == light[where["Gb"]]  # one filter, one light
+        for channel in ("R", "B"):
+            assert levels[where[channel]] == pytest.approx(signal[where[channel]], rel=1e-5)
+        greens = levels[where["Gr"]] + levels[where["Gb"]]
+        assert greens == pytest.approx(2 * signal[where["Gr"]], rel=1e-5)
+
+
+def test_without_it_the_light_is_what_it_had_been() -> None:
+    light, layout = signals_of([500.0, 1000.0], COLOURS), layout_of([1.0, 2.0])
+    camera = having(Crosstalk(fraction=0.02))
+    # Light whose levels with the effect are those of other light without it, and back.
+    bare = relit(Model(camera, light), PLAIN, layout)
+    again = relit(bare, camera, layout)
+    for name, signal in light.items():
+        np.testing.assert_allclose(bare.signals[name], exchanged(camera.effect, signal), rtol=1e-5)
+        np.testing.assert_allclose(again.signals[name], signal, rtol=1e-5)
+
+
+def test_light_that_is_known_keeps_its_ratios_though_an_exchange_grows() -> None:
+    recorded = signals_of([500.0, 5000.0], COLOURS)
+    camera = having(BrighterFatter(per_dn=5e-6))
+    known = relit(Model(PLAIN, recorded), camera, layout_of([1.0, 10.0])).signals
+    np.testing.assert_allclose(known["flat-1"], 10 * known["flat-0"], rtol=1e-9)
+    unknown = relit(Model(PLAIN, recorded), camera, layout_of([None, None])).signals
+    red = sites(Cfa.GBRG)["R"]
+    for name in ("flat-0", "flat-1"):
+        levels = exchanged(camera.effect, unknown[name])
+        assert levels[red] == pytest.approx(recorded[name][red], rel=1e-5)
+    # Neighbours that are brighter give to what is darker, the more the brighter all is.
+    shares = [unknown[name][red] / recorded[name][red] for name in ("flat-0", "flat-1")]
+    assert shares[1] < shares[0] < 1
+
+
+@pytest.mark.parametrize("cfa", [Cfa.MONO, Cfa.GBRG])
+def test_where_no_colours_exchange_charge_the_light_stays(cfa: Cfa) -> None:
+    signals = signals_of([500.0, 1000.0], COLOURS)
+    effect = Crosstalk(fraction=0.02) if cfa is Cfa.MONO else Dsnu(sigma_dn=2.0)
+    plain = replace(Model(PLAIN, signals))
+    made = relit(plain, having(effect), layout_of([1.0, 2.0], cfa))
+    assert made.signals is signals
+    assert made.camera == having(effect)

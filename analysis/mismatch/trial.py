@@ -189,8 +189,8 @@ class Trial:
             return [vector_of(one) for one in made]
 
         own, before, after = vector_of(seen), simulated(base), simulated(final)
-        null = null_of(layout, after, own)
-        sd = np.where(null.known, null.sd, np.nan)
+        nulls = [null_of(layout, [*after[:i], *after[i + 1 :]], one) for i, one in enumerate(after)]
+        sd = np.stack([np.where(null.known, null.sd, np.nan) for null in nulls])
         return gap_closed(own.values, _values(before), _values(after), sd)
 
 

@@ -162,7 +162,8 @@ class Trial:
         frames = self.split.development, self.split.locked
         seen = hold_seen(self.recording, *frames, self.held)
         models = base.camera, final.camera, signals
-        numbers = prove_held(self.held, *models, seed=self.seed, seen=seen)
+        jobs = self.numbers.setting.jobs
+        numbers = prove_held(self.held, *models, seed=self.seed, jobs=jobs, seen=seen)
         step()
         gap = self._gap(base, final, source) if base.mismatches else None
         locked = dict(self.split.locked)

@@ -9,33 +9,50 @@ import pytest
 import scipy.special
 from numpy.typing import NDArray
 
-from analysis.mismatch.bandgain import gain_of_bands
+from analysis.mismatch.bandgain import foretold, gain_of_bands
+from analysis.mismatch.phaselaw import moving_on
 
 FramesOf = Callable[[str], Iterator[NDArray[np.float64]]]
 ROWS, COLUMNS, SD, LIGHT = 96, 32, 2.0, 400.0
 SIGNAL = {"dark": 0.0, "flat": LIGHT}
-LAYOUT: Any = SimpleNamespace(
-    rows=ROWS,
-    columns=COLUMNS,
-    channels=("MONO",),
-    uniform=tuple(SimpleNamespace(name=name) for name in SIGNAL),
-    variance_dn2={(name, "MONO"): SD**2 for name in SIGNAL},
-    signal_dn={(name, "MONO"): signal for name, signal in SIGNAL.items()},
-)
+
+
+def _layout(frames: int = 8) -> Any:
+    return SimpleNamespace(
+        rows=ROWS,
+        columns=COLUMNS,
+        channels=("MONO",),
+        uniform=tuple(SimpleNamespace(name=n, numbers=tuple(range(frames))) for n in SIGNAL),
+        variance_dn2={(name, "MONO"): SD**2 for name in SIGNAL},
+        signal_dn={(name, "MONO"): signal for name, signal in SIGNAL.items()},
+    )
+
+
+LAYOUT = _layout()
 DEPTH = np.sqrt(4 / (ROWS * COLUMNS)) * SD / LIGHT  # of bands as large as noise at their place
 
 
 def _frames(
-    depth: float, seed: int, *, cycles: float = 7.3, rows_sd: float = 0.0, frames: int = 8
+    depth: float,
+    seed: int,
+    *,
+    cycles: float = 7.3,
+    rows_sd: float = 0.0,
+    frames: int = 8,
+    advance: float | None = None,
 ) -> FramesOf:
-    """Return frames with bands of light, each row of which has an offset of its own."""
+    """Return frames with bands of light, each row of which has an offset of its own.
+
+    `advance`: the share of a turn by which they move on; None: their phase is another in each.
+    """
     y = np.arange(ROWS)[:, np.newaxis]
 
     def of(name: str) -> Iterator[NDArray[np.float64]]:
         rng = np.random.default_rng([seed, name == "dark"])
         fixed = rng.normal(0, SD, (ROWS, COLUMNS))
-        for _ in range(frames):
-            turn = rng.uniform(0, 1)
+        start = rng.uniform(0, 1)
+        for t in range(frames):
+            turn = rng.uniform(0, 1) if advance is None else start + advance * t
             light = SIGNAL[name] * (1 + depth * np.sin(2 * np.pi * (cycles * y / ROWS + turn)))
             offsets = rng.normal(0, rows_sd, (ROWS, 1)) if rows_sd else 0.0
             yield light + offsets + fixed + rng.normal(0, SD, (ROWS, COLUMNS))
@@ -44,15 +61,19 @@ def _frames(
 
 
 def test_bands_gain_their_odds_less_those_of_all_places() -> None:
-    """Of 64 frames of a flat, in the mean of noise and phases: ln I0(2 a |c|) - a^2 each."""
+    """Of 64 frames of a flat, in the mean of noise and phases: ln I0(2 a |c|) - a^2 each.
+
+    Less ln 2: the phase might have moved on steadily.
+    """
     size, frames = 1.2, 64
     rng = np.random.default_rng(1)
     c = size + rng.normal(0, np.sqrt(0.5), (2, 20000)).T @ np.array([1, 1j])
     each = np.log(scipy.special.i0(2 * size * np.abs(c))) - size**2
-    gains = [gain_of_bands(LAYOUT, _frames(size * DEPTH, k, frames=frames), 7.3) for k in range(8)]
+    layout = _layout(frames)
+    gains = [gain_of_bands(layout, _frames(size * DEPTH, k, frames=frames), 7.3) for k in range(8)]
     power = (frames - 1) * size**2
     bins = np.sqrt(2 * np.pi) * np.sqrt(1.5 / power) / np.pi
-    expected = (frames - 1) * each.mean() - np.log(ROWS / 2 / bins)
+    expected = (frames - 1) * each.mean() - np.log(ROWS / 2 / bins) - np.log(2)
     scatter = np.sqrt(frames / len(gains)) * each.std()
     # Twelve bins beside it say how much noise is there, to a twentieth.
     assert np.mean(gains) == pytest.approx(expected, abs=3 * scatter + 3 + 0.05 * power)
@@ -80,13 +101,13 @@ def test_slow_waves_are_no_bands() -> None:
             lines = (np.cos(turns) * parts[0] + np.sin(turns) * parts[1]).sum(1, keepdims=True)
             yield SIGNAL[name] + lines + rng.normal(0, SD, (ROWS, COLUMNS))
 
-    assert gain_of_bands(LAYOUT, of, 3.0) < 2
+    assert gain_of_bands(_layout(24), of, 3.0) < 2
 
 
 def test_in_the_dark_there_are_none() -> None:
     dark = SimpleNamespace(**{**vars(LAYOUT), "uniform": LAYOUT.uniform[:1]})
     assert gain_of_bands(dark, _frames(DEPTH, 1), 7.3) == -np.inf
-    assert gain_of_bands(LAYOUT, _frames(5 * DEPTH, 1, frames=4), 7.3) == -np.inf
+    assert gain_of_bands(_layout(4), _frames(5 * DEPTH, 1, frames=4), 7.3) == -np.inf
     assert gain_of_bands(LAYOUT, _frames(5 * DEPTH, 1), 0.2) == -np.inf
 
 
@@ -96,3 +117,65 @@ def test_the_slowest_waves_have_no_neighbours_to_stand_out_of() -> None:
         of = _frames(5 * DEPTH, 1, cycles=cycles)
         assert gain_of_bands(LAYOUT, of, cycles) == -np.inf
     assert gain_of_bands(LAYOUT, _frames(5 * DEPTH, 1, cycles=3.2), 3.2) > 10
+
+
+@pytest.mark.parametrize("advance", [0.27, 0.81])
+def test_bands_that_move_on_steadily_gain_more(advance: float) -> None:
+    """As all frames of an exposure together do: about a^2 of each, where free phases gain less."""
+    size, layout, more = 1.6, _layout(16), []
+    for k in range(12):
+        steady = _frames(size * DEPTH, k, frames=16, advance=advance)
+        free = _frames(size * DEPTH, k, frames=16)
+        more.append(gain_of_bands(layout, steady, 7.3) - gain_of_bands(layout, free, 7.3))
+    assert np.mean(more) > 4
+
+
+def test_steady_phases_are_likely_as_an_integral_says() -> None:
+    """Over first phases, turns and what frames share, summed by brute force."""
+    rng = np.random.default_rng(3)
+    numbers, a = np.array([0.0, 1.0, 2.0, 4.0, 5.0]), 1.3
+    found = rng.normal(size=(2, 5)).T @ np.array([1, 1j]) * np.sqrt(0.5)
+    found += a * np.exp(2j * np.pi * (0.3 * numbers + 0.1))
+    shared = np.linspace(-5, 5, 81)
+    m = (shared[:, None] + 1j * shared).ravel()
+    starts = np.exp(2j * np.pi * np.arange(24) / 24)
+
+    def total(size: float, turn: float, start: complex) -> float:
+        rest = found - size * start * np.exp(2j * np.pi * turn * numbers) - m[:, None]
+        return float(scipy.special.logsumexp(-(np.abs(rest) ** 2).sum(1)))
+
+    turns = np.arange(48) / 48
+    every = [total(a * s, turn, start)
+             for s in (0.7, 0.9, 1.1, 1.4) for turn in turns for start in starts]  # fmt: skip
+    expected = scipy.special.logsumexp(every) - np.log(len(every)) - total(0.0, 0.0, 1.0)
+    own = moving_on([found - found.mean()], [numbers], [a])
+    assert own == pytest.approx(expected, abs=0.05)
+
+
+LOCKED = dict.fromkeys(SIGNAL, (3, 7, 11, 15))
+
+
+def test_locked_frames_are_foretold_where_the_phase_moves_on() -> None:
+    """The four of a flat gain most of 4 a^2; of free phases much less."""
+    size, layout = 1.6, _layout(16)
+    gains = {}
+    for advance in (0.27, None):
+        made = (_frames(size * DEPTH, k, frames=16, advance=advance) for k in range(16))
+        gains[advance] = np.mean([foretold(layout, of, 7.3, LOCKED).sum() for of in made])
+    assert 2 * size**2 < gains[0.27] < 4 * size**2 + 1
+    assert gains[None] < 0.8 * gains[0.27]
+
+
+def test_noise_foretells_nothing() -> None:
+    """A ratio of likelihoods exceeds 1 / p in a share p of recordings at most (Markov)."""
+    draws, high = 150, 0
+    for k in range(draws):
+        nats = foretold(_layout(16), _frames(0.0, k, frames=16), 7.3, LOCKED)
+        high += nats.sum() > np.log(20)
+    assert high <= 0.05 * draws
+
+
+def test_without_light_or_others_nothing_is_foretold() -> None:
+    assert not foretold(_layout(16), _frames(DEPTH, 1, frames=16), 0.2, LOCKED).size
+    every = {"flat": tuple(range(8))}
+    assert not foretold(LAYOUT, _frames(DEPTH, 1), 7.3, every).size

@@ -9,6 +9,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
 
 import numpy as np
 import pytest
+import scipy.stats
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from planter.light import blots
@@ -20,6 +21,7 @@ from analysis.mismatch.bank.together import TOGETHER, together
 from analysis.mismatch.candidates.fields import CANDIDATES, fields
 from analysis.mismatch.clues import Clues
 from analysis.mismatch.fielded import _along, fielded
+from analysis.mismatch.longwaves import LongWaves
 from dsis.cfa import Cfa
 from dsis.draw import Draw
 from dsis.effects import Effect, Exposure
@@ -255,6 +257,56 @@ def test_a_field_that_is_named_feigns_as_much_light_as_it_was_fitted() -> None:
             setting=Stub(layout=clues.layout),
         )
         assert (fielded(state, one) is not None) == denied
+
+
+def _small_field(rng: np.random.Generator, length: float) -> np.ndarray:
+    """Return a field of variance 1 on 24 rows and 32 columns, by a Cholesky factor."""
+    y, x = (axis.ravel() for axis in np.mgrid[:24, :32])
+    covariance = np.exp(-np.hypot(y - y[:, None], x - x[:, None]) / length)
+    return (
+        np.linalg.cholesky(covariance + 1e-9 * np.eye(y.size)) @ rng.normal(size=y.size)
+    ).reshape(24, 32)
+
+
+def test_chances_of_long_waves_are_uniform_in_their_field() -> None:
+    """Whatever the pattern that is not asked has; more light makes them larger."""
+    rng, draws = np.random.default_rng(11), 300
+    pattern = np.exp(-np.arange(32.0)[::-1] / 4) + np.zeros((24, 32))
+    down = 0.5 * np.linspace(-1, 1, 24)[:, None] + np.zeros((24, 32))
+    own, lit = [], []
+    for _ in range(draws):
+        gain = 0.5 * _small_field(rng, 6.0) + rng.normal(0, 0.3, (24, 32)) + 5 * pattern
+        for found, more in ((own, 0.0), (lit, 1.0)):
+            waves = LongWaves(_clues(10 * (gain + more * down), 3.0), pattern)
+            found.append(waves.chance(0.25, 6.0))
+    assert scipy.stats.kstest(own, "uniform").pvalue > 1e-6
+    assert np.mean(lit) > np.mean(own)
+
+
+def test_the_waves_of_a_short_field_are_few_for_a_long_one() -> None:
+    rng, shape = np.random.default_rng(12), (96, 128)
+    pattern = np.exp(-np.arange(128.0)[::-1] / 8) + np.zeros(shape)
+    found = []
+    for k in range(20):
+        gain = 100 * _field(3.0, shape, k, 0.5) + rng.normal(0, 0.1, shape)
+        waves = LongWaves(_clues(10 * gain, 1.0), pattern)
+        found.append((waves.chance(0.25, 24.0), waves.chance(0.25, 3.0)))
+    long, short = np.median(found, axis=0)
+    assert long < 1e-3
+    assert 0.05 < short < 0.95
+
+
+@pytest.mark.parametrize("shape", [(40, 60), (192, 256)])
+def test_waves_vary_in_a_field_as_in_its_draws(shape: tuple[int, int]) -> None:
+    """Also where a large map is averaged into squares."""
+    pattern = np.linspace(-1, 1, shape[1]) + np.zeros(shape)
+    own = LongWaves(_clues(np.zeros(shape), 1.0), pattern)
+    draws = 200
+    made = [LongWaves(_clues(10 * 100 * _field(8.0, shape, k, 1.0), 1.0), pattern).seen
+            for k in range(draws)]  # fmt: skip
+    expected = np.diag(own._covariance(8.0))
+    ratio = np.var(made, axis=0) / expected
+    assert ratio.mean() == pytest.approx(1, abs=SURE * np.sqrt(2 / draws / ratio.size) + 0.02)
 
 
 @pytest.mark.parametrize("cfa", ["MONO", "RGGB"])

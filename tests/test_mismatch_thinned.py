@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from analysis.mismatch.layout import Layout, Taken
-from analysis.mismatch.thinned import STAGES, stages, thinned
+from analysis.mismatch.thinned import STAGES, stages, thinned, with_all_frames
 from dsis.cfa import Cfa
 
 
@@ -65,3 +65,11 @@ def test_a_stage_that_would_look_at_the_same_is_left_out(
     found = stages(layout)
     assert len(found) == count
     assert found[-1] == (layout, STAGES[-1].least)
+
+
+def test_whole_frames_are_of_the_last_look_and_all_of_them() -> None:
+    """Their numbers are those that are read: a phase that moves on is told by them."""
+    own = {e.name: e.numbers for e in with_all_frames(EMVA).exposures}
+    assert own.keys() == {e.name for e in stages(EMVA)[-1][0].exposures}
+    assert all(own[e.name] == e.numbers for e in EMVA.exposures if e.name in own)
+    assert max(len(numbers) for numbers in own.values()) == 40

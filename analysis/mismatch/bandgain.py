@@ -1,18 +1,24 @@
 """What whole frames gain by bands of light: a wave down the rows, in proportion to the signal.
 
-Its phase is another in every frame. A single number of the bank, the largest power of many, says
+Its phase is another in every frame, and where the lamp and the frames keep their rates moves on
+steadily. A single number of the bank, the largest power of many, says
 less of bands that few exposures show.
 """
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.layout import Layout
+from analysis.mismatch.phaselaw import moving_on
 from analysis.mismatch.projections import LEAST, FramesOf, Power, projections
 
 _BETWEEN = (-1 / 3, 0.0, 1 / 3)  # bins by which a frequency may be off
 _FAR = (-19, -15, -12, -9, -7, -5, 5, 7, 9, 12, 15, 19)  # bins that say what rows have in common
 _NEAR = (-2, -1, 1, 2)  # bins that a band leaves as they are, and slow waves do not
+_LEAST_EACH = 2  # frames of an exposure, that know what is fixed
 _LOWEST = 1.0  # cycles a frame: below, a wave is much like the frame's mean
 
 
@@ -32,25 +38,121 @@ def gain_of_bands(layout: Layout, frames_of: FramesOf, cycles: float) -> float:
     cycles
         Of the bands, in the rows of a frame.
     """
+    found = _found(layout, frames_of, cycles)
+    numbers = [np.array(e.numbers, np.float64) for e in layout.uniform]
+    bands = None if found is None else _bands(found, numbers)
+    if bands is None:
+        return -np.inf
+    share = min(np.sqrt(2 * np.pi) * bands.bins, 1.0)
+    return bands.odds(bands.seen.found) - float(np.log(layout.rows / 2 / share))
+
+
+def foretold(
+    layout: Layout,
+    frames_of: FramesOf,
+    cycles: float,
+    locked: Mapping[str, Sequence[int]],
+) -> NDArray[np.float64]:
+    """Return what locked frames gain by bands that the others show: nats of each exposure.
+
+    Odds of all frames less those of the others, by what these know: place, size, noise, and of a
+    phase that moves on steadily where it will be. Exposures are added one after another. None where
+    the others show no bands.
+
+    Parameters
+    ----------
+    layout, frames_of
+        All frames, of one sensor.
+    cycles
+        Of the bands, in the rows of a frame.
+    locked
+        Numbers of frames, by the exposure's name.
+    """
+    found = _found(layout, frames_of, cycles)
+    numbers = [np.array(e.numbers, np.float64) for e in layout.uniform]
+    rest = [~np.isin(e.numbers, locked.get(e.name, ())) for e in layout.uniform]
+    if found is None or any(own.sum() < _LEAST_EACH for own in rest):
+        return np.zeros(0)
+    others = tuple(
+        own[some] - own[some].mean(0) for own, some in zip(found.power.found, rest, strict=True)
+    )
+    known = _Found(replace(found.power, found=others), found.near, found.far)
+    bands = _bands(known, [n[some] for n, some in zip(numbers, rest, strict=True)])
+    if bands is None:
+        return np.zeros(0)
+    seen, counted = list(bands.seen.found), list(bands.numbers)
+    odds, gains = bands.odds(seen), []
+    for i, (own, noise) in enumerate(zip(found.power.found, bands.noise, strict=True)):
+        if rest[i].all():
+            continue
+        seen[i], counted[i] = own[:, [bands.place]] / np.sqrt(noise), numbers[i]
+        gains.append(replace(bands, numbers=counted).odds(seen) - odds)
+        odds += gains[-1]
+    return np.array(gains)
+
+
+@dataclass(frozen=True)
+class _Found:
+    """Projections at the places tried, at their neighbours, far away: bands in DN of signal 1."""
+
+    power: Power
+    near: slice
+    far: slice
+
+
+@dataclass(frozen=True)
+class _Bands:
+    """Bands at the best place: their projections, power, and the noise of each exposure there."""
+
+    seen: Power
+    power: float
+    place: int
+    noise: Sequence[float]
+    numbers: Sequence[NDArray[np.float64]]
+
+    @property
+    def bins(self) -> float:
+        """Standard error of the place."""
+        return self.seen.bins(self.power)
+
+    def odds(self, found: Sequence[NDArray[np.complex128]]) -> float:
+        """Return the log-likelihood of bands in projections, less that of noise.
+
+        Their phase is another in each frame, or moves on steadily: as likely beforehand.
+        """
+        free = replace(self.seen, found=tuple(found)).there(self.power, kept=False, real=False)
+        amplitudes = [float(np.sqrt(self.power * w)) for w in self.seen.weights]
+        steady = moving_on([own[:, 0] for own in found], self.numbers, amplitudes)
+        return float(np.logaddexp(free, steady) - np.log(2))
+
+
+def _found(layout: Layout, frames_of: FramesOf, cycles: float) -> _Found | None:
+    """Return the projections about a place; None: too few neighbours, frames, or no light."""
     rows = layout.rows
     tried = [cycles + k for k in _BETWEEN]
     near = [cycles + k for k in _NEAR if _LOWEST <= cycles + k <= rows / 2]
     far = [cycles + k for k in _FAR if _LOWEST <= cycles + k <= rows / 2]
     if len(near) < len(_NEAR) or not far:
-        return -np.inf
+        return None
     places = [*tried, *near, *far]
     found = tuple(projections(layout, frames_of, [(0.0, own / rows) for own in places]))
-    seen = Power(found, tuple(_light(layout) ** 2))
-    seen = seen.lifted([slice(len(tried), len(tried) + len(near)), slice(-len(far), None)])
-    if seen.frames < LEAST or not any(seen.weights):
-        return -np.inf
+    power = Power(found, tuple(_light(layout) ** 2))
+    beside = slice(len(tried), len(tried) + len(near))
+    return _Found(power, beside, slice(-len(far), None)) if any(power.weights) else None
+
+
+def _bands(found: _Found, numbers: Sequence[NDArray[np.float64]]) -> _Bands | None:
+    """Return the bands that projections show; None where they show none."""
+    noise = found.power.ground([found.near, found.far])
+    seen = found.power.over(noise)
+    if seen.frames < LEAST:
+        return None
+    tried = range(found.near.start)
     best = int(seen.excess[: len(tried)].argmax())
     power = float(seen.excess[best])
-    if not power > 0 or seen.crowded(range(len(tried), len(tried) + len(near)), power):
-        return -np.inf
-    own = seen.at([best])
-    share = min(np.sqrt(2 * np.pi) * own.bins(power), 1.0)
-    return own.there(power, kept=False, real=False) - float(np.log(rows / 2 / share))
+    if not power > 0 or seen.crowded(range(found.near.start, found.near.stop), power):
+        return None
+    return _Bands(seen.at([best]), power, best, noise, numbers)
 
 
 def _light(layout: Layout) -> NDArray[np.float64]:

@@ -6,6 +6,7 @@ from functools import partial
 
 from analysis.mismatch.allframes import shown_by_all
 from analysis.mismatch.finding import Gain
+from analysis.mismatch.instance import same_place
 from analysis.mismatch.judge import Judge
 from analysis.mismatch.name import Search
 from analysis.mismatch.named import Named, unclear
@@ -108,6 +109,8 @@ def _gained(search: Search, final: State, trial: Trial) -> dict[str, Gained]:
         told = trial.gains(final, cameras)
         for named in some:
             one = told[named.name]
+            if not one.certain:
+                told[named.name] = one = _foretold(named, cameras[named.name], trial) or one
             if one.certain or not exceeds(one.gain):
                 continue
             if shown_by_all(search, final, named, cameras[named.name], trial):
@@ -116,6 +119,20 @@ def _gained(search: Search, final: State, trial: Trial) -> dict[str, Gained]:
         if not all(one.certain for one in found.values()):
             break
     return found
+
+
+def _foretold(named: Named, without: Camera, trial: Trial) -> Gained | None:
+    """Return what locked frames gain by bands that the others foretell; None: by no such effect.
+
+    Pixels know nothing of a phase that moves on. `without` is the camera without the effect: beside
+    bands that it has at the same place nothing is said.
+    """
+    if named.proposal is None:
+        return None
+    effect, layout = named.proposal.effect, trial.numbers.whole[0]
+    if any(same_place(effect, one, layout) for one in without.effect):
+        return None
+    return trial.foretold(effect)
 
 
 def _fitted_without(search: Search, final: State, some: Sequence[Named]) -> dict[str, Camera]:

@@ -38,7 +38,7 @@ from analysis.mismatch.source import Source
 from analysis.mismatch.split import Split
 from analysis.mismatch.state import Setting, State
 from analysis.mismatch.taking import layout_of
-from analysis.mismatch.thinned import stages
+from analysis.mismatch.thinned import stages, with_all_frames
 from analysis.mismatch.trial import Trial
 from analysis.mismatch.wholecells import whole_cells
 from dsis.blas import one_thread
@@ -130,8 +130,8 @@ def _found(
         words,
         step,
         whole=None if large else whole.setting,
-        lines=WholeFrames(stages(layout)[-1][0], frames_of) if large else trial.lines,
-        measuring=WholeFrames(stages(layout)[-1][0] if large else layout, frames_of),
+        lines=WholeFrames(with_all_frames(layout), frames_of) if large else trial.lines,
+        measuring=WholeFrames(with_all_frames(layout) if large else layout, frames_of),
     )
     final = _searched(search, source) if large else search.run()
     known: dict[str, Array] = {}

@@ -3,9 +3,10 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.mismatch.bank.edges import decays, line_square_beside
-from analysis.mismatch.bank.seams import Rest, beyond_smooth, centred
+from analysis.mismatch.bank.edges import decays, line_square, line_square_beside
+from analysis.mismatch.bank.seams import SMOOTH_DEGREE, Rest, beyond_smooth, centred
 from analysis.mismatch.contradicted import Denial
+from analysis.mismatch.rank import TOLD_APART
 from analysis.mismatch.state import State
 from dsis.effects import Effect
 from dsis.effects.line_settling import LineSettling
@@ -65,6 +66,39 @@ def single(state: State, effect: Effect) -> Denial | None:
     if any(share is None for share in shares):
         return None
     return Denial(max(share for share in shares if share is not None), why)
+
+
+def outlined(state: State, effect: Effect) -> bool:
+    """Return whether means of lines tell a decay of the gain from any smooth light.
+
+    A decay over a tenth of the lines and more is nearly a polynomial of the fourth degree: of what
+    is beyond that little is left to see. But it takes two numbers, the polynomial four. The
+    likelihoods of both, less half of the logarithm of the lines' number for each number (Schwarz,
+    1978), decide, at odds of 20: against no light, and light of each degree along the axis.
+    """
+    if not isinstance(effect, LineSettling) or not effect.gain_percent:
+        return False
+    layout, images = state.setting.layout, state.setting.seen.images
+    axis = int(effect.edge in ("left", "right"))
+    size = (layout.rows, layout.columns)[axis]
+    told = np.zeros(SMOOTH_DEGREE + 1)  # of a decay over light of each degree
+    for (channel, name), (image, noise) in images.items():
+        if name != "gain":
+            continue
+        step = 1 if channel == "MONO" else 2
+        line = layout.sites[channel][axis] + step * np.arange(image.shape[axis])
+        distance = line if effect.edge in ("left", "top") else size - 1 - line
+        decay = np.exp(-distance / effect.gain_length)
+        means = image.mean(1 - axis)
+        places = np.linspace(-1, 1, line.size)
+        light = np.asarray(np.polynomial.legendre.legvander(places, SMOOTH_DEGREE), np.float64)
+        left = np.array([_left(means, light[:, : k + 1]) for k in range(SMOOTH_DEGREE + 1)])
+        own = _left(means, np.stack([light[:, 0], decay], 1))
+        # Lines scatter beyond the noise of their pixels, in what neither explains.
+        square = line_square(beyond_smooth(means), noise, image.shape[1 - axis])
+        told += (left - own) / square / 2 + np.log(line.size) / 2 * np.arange(SMOOTH_DEGREE + 1)
+        told -= np.log(line.size)  # of the decay's size and length
+    return bool(told.min() > TOLD_APART)
 
 
 def _of_surface(statistic: str) -> bool:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from analysis.mismatch.candidates import CANDIDATES
 from analysis.mismatch.contradicted import contradicted
+from analysis.mismatch.edged import outlined
 from analysis.mismatch.feigned import of_another
 from analysis.mismatch.instance import LINES
 from analysis.mismatch.named import Named
@@ -150,7 +151,8 @@ class Judge:
         mean = predictor.mean(self.without(named))
         denial = of_another(self.state, named.proposal.effect, mean)
         denial = denial or mirrored(self.state, named.proposal.effect, mean)
-        denial = denial or unmet(self.state, named.kind, mean)
+        shown = outlined(self.state, named.proposal.effect)
+        denial = denial or unmet(self.state, named.kind, mean, shown=shown)
         if denial is None and not (_called(named, first) or locates(self.state, mean)):
             return 1.0, NOTHING
         return None if denial is None else (denial.share, denial.why)

@@ -2,7 +2,8 @@
 
 A frame's projection is m + a s u + noise or m + a exp(i phi) + noise, the noise's mean square 1: m
 is what all frames share, a fixed pattern at the line's frequency, and is known from few frames only
-so badly that it is integrated out; u is one phase, s a random sign, phi a random phase.
+so badly that it is integrated out; u is one phase, s a random sign, phi a random phase, or one that
+moves on from frame to frame by the same share of a turn.
 """
 
 from collections.abc import Iterator, Sequence
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 Complex = NDArray[np.complex128]
 Array = NDArray[np.float64]
 _PHASES = 32  # of half a turn that are tried
+_TURNS = 4  # shares of a turn that are tried, by frame: a quarter of what tells two apart
 _STRENGTHS = np.array([0.7, 0.9, 1.1, 1.4])  # of an amplitude that is not exact
 _WITHIN, _EXACT, _ASIDE = (0.4, 1.6), 2e-3, 0.02  # of an amplitude by its mean square
 _STEP = 0.5  # of m at most, in standard deviations of the noise
@@ -73,6 +75,36 @@ def there(
             one, other = _likelihoods(own * scale, strength * amplitude * scale, phases)
             _, nothing = _likelihoods(own * scale, 0.0, phases[:1])
             line[i] += (one if kept or real else other) - nothing
+    return float(scipy.special.logsumexp(line) - np.log(line.size))
+
+
+def moving_on(
+    found: Sequence[Complex], numbers: Sequence[Array], amplitudes: Sequence[float]
+) -> float:
+    """Return the log-likelihood of a line whose phase moves on steadily, less that of noise alone.
+
+    As lamps on mains do where frames follow one another at one rate. A mean over amplitudes about
+    those given; over the first phase and the share of a turn, of each exposure its own. What frames
+    of an exposure share is integrated out: of the line too, where w are its turns, so that it has
+    a^2 sum |w - mean w|^2 left, and the mean over the first phase is a Bessel function.
+
+    Parameters
+    ----------
+    found, amplitudes
+        As above.
+    numbers
+        Of the frames in their exposure.
+    """
+    line = np.zeros(_STRENGTHS.size)
+    for own, number, amplitude in zip(found, numbers, amplitudes, strict=True):
+        count = _TURNS * int(np.ptp(number) + 1)
+        turns = np.exp(2j * np.pi * np.outer(np.arange(count) / count, number))
+        turns -= turns.mean(1, keepdims=True)
+        size, square = np.abs(np.conj(turns) @ own), (np.abs(turns) ** 2).sum(1)
+        for i, strength in enumerate(_STRENGTHS):
+            a = strength * amplitude
+            each = np.log(scipy.special.i0e(2 * a * size)) + 2 * a * size - a**2 * square
+            line[i] += scipy.special.logsumexp(each) - np.log(count)
     return float(scipy.special.logsumexp(line) - np.log(line.size))
 
 

@@ -54,9 +54,9 @@ class Power:
         `level`: of white noise, of which what makes neighbours alike leaves less at high
         frequencies.
         """
-        return self._over([level + max(ground, 0.0) * w for w in self.weights])
+        return self.over([level + max(ground, 0.0) * w for w in self.weights])
 
-    def _over(self, noise: Sequence[float]) -> "Power":
+    def over(self, noise: Sequence[float]) -> "Power":
         """Return the same beside noise of so much power at a frequency, white noise at 1."""
         return Power(
             tuple(own / np.sqrt(m) for own, m in zip(self.found, noise, strict=True)),
@@ -73,11 +73,15 @@ class Power:
 
         The largest of their medians, where it is more than white.
         """
+        return self.over(self.ground(groups))
+
+    def ground(self, groups: Sequence[slice]) -> list[float]:
+        """Return that noise of each exposure, white noise at 1."""
         noise = []
         for own in self.found:
             power = (np.abs(own) ** 2).sum(0) / max(len(own) - 1, 1)
             noise.append(max(1.0, *(float(np.median(power[group])) for group in groups)))
-        return self._over(noise)
+        return noise
 
     @property
     def level(self) -> NDArray[np.float64]:

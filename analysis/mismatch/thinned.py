@@ -61,6 +61,12 @@ def thinned(layout: Layout, stage: Stage) -> Layout:
     )
 
 
+def with_all_frames(layout: Layout) -> Layout:
+    """Return the exposures that the last look is at, each with all frames."""
+    names = {e.name for e in stages(layout)[-1][0].exposures}
+    return replace(layout, exposures=tuple(e for e in layout.exposures if e.name in names))
+
+
 def _some(exposures: Sequence[Taken], most: int) -> list[str]:
     """Return names of at most so many exposures, the first and the last among them."""
     if len(exposures) <= most:

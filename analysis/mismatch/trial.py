@@ -7,6 +7,7 @@ from functools import cached_property, partial
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.mismatch.bandgain import foretold
 from analysis.mismatch.finding import Change, Gain, Proof
 from analysis.mismatch.given import Ratio
 from analysis.mismatch.heldnumbers import HeldNumbers
@@ -26,6 +27,8 @@ from analysis.mismatch.state import Setting, State
 from analysis.mismatch.taking import layout_of
 from analysis.mismatch.vector import Vector, vector
 from dsis.camera import Camera
+from dsis.effects import Effect
+from dsis.effects.line_flicker import LineFlicker
 from dsis.errors import InputError
 from dsis.recording import Recording
 
@@ -118,6 +121,21 @@ class Trial:
         numbers = {e.name: e.numbers for e in layout.exposures}
         source = self.numbers.source
         return WholeFrames(layout, lambda name: source.frames(name, numbers[name]))
+
+    def foretold(self, effect: Effect) -> Gained | None:
+        """Return what locked frames gain by bands of light that the others foretell; None: nothing.
+
+        Exposures scatter as what they gain does, were it nothing in the mean.
+        """
+        if not isinstance(effect, LineFlicker):
+            return None
+        lines, locked = self.lines, self.split.locked
+        nats = foretold(lines.layout, lines.frames_of, effect.cycles_per_frame, locked)
+        frames = sum(len(locked.get(e.name, ())) for e in lines.layout.uniform)
+        if not (nats.size and frames):
+            return None
+        told = Ratio(float(nats.sum()), float(np.sqrt(nats @ nats)), certain=False)
+        return _of_pixels(_per_frame(told, frames), frames)
 
     def gains(self, final: State, without: Mapping[str, Camera]) -> dict[str, Gained]:
         """Return what the final model gains over cameras without an effect, by effect."""

@@ -18,10 +18,11 @@ _POOLED = "all"
 _LEFT = 0.5  # of what calls for an effect, that may stay where it is explained
 
 
-def unmet(state: State, kind: str, without: Array) -> Denial | None:
+def unmet(state: State, kind: str, without: Array, *, shown: bool = False) -> Denial | None:
     """Return how an effect is denied by what calls for it; None: it is not.
 
-    `without` are the numbers predicted without the effect.
+    `without` are the numbers predicted without the effect; `shown`: maps show what numbers need
+    not.
     """
     if kind not in CANDIDATES:
         return None
@@ -32,7 +33,7 @@ def unmet(state: State, kind: str, without: Array) -> Denial | None:
     change = changed(state, without)
     departures, off = off_without(state, without)
     if not (off & calls).any() and CANDIDATES[kind].hints:
-        return _unseen(state, calls, change)
+        return None if shown else _unseen(state, calls, change)
     return _stays(state, calls, change, departures, off)
 
 

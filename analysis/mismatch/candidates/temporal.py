@@ -2,7 +2,9 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from math import inf, isfinite, pi, sqrt
+from math import inf, isfinite, log, pi, sqrt
+
+import numpy as np
 
 from analysis.mismatch.bank.coherent import RANKS, Peak, line_name
 from analysis.mismatch.bank.scalars import UNKNOWN
@@ -21,6 +23,7 @@ _SLOW = ("row_variance", "slow_row_variance", "row_correlation", "line_correlati
          "frame_variance", "row_spectrum_peak")  # fmt: skip
 _BANDS = {"rows of light": "row_spectrum_peak of light", "rows": "row_spectrum_peak"}
 _TINY = 1e-300
+_WAVES = 64  # a row: means over rows have next to nothing of shorter ones
 _PARABOLA = 1.3  # scatter of a parabola's top on half bins, over the bound (Rife & Boorstyn, 1974)
 _LEAST_POWER = 1.2  # of a line worth a trial, white noise at 1
 
@@ -96,14 +99,34 @@ def _brightness(clues: Clues, channel: str) -> list[tuple[float, float]]:
 
 
 def _pink(clues: Clues) -> Sequence[Proposal]:
-    variance, _ = clues.amplitude("row_variance", alike)
+    """Start from the size that makes rows vary as they do; where they do not, frames.
+
+    In a frame's mean is a single number of each frame, in its rows many: these know the size.
+    """
+    of_row, of_frame = pink_shares(clues.layout.rows, clues.layout.columns)
+    row, _ = clues.amplitude("row_variance", alike)
     frame, _ = clues.amplitude("frame_variance", alike)
-    guess = max(variance * 4, frame * 8, 0.0)
-    if guess <= 0:
+    variance = row / of_row if row > 0 else frame / of_frame
+    if variance <= 0:
         return []
-    # Rows hold a quarter of it where they are long, more where they are few.
-    starts = (sqrt(guess), sqrt(guess / 3))
+    starts = (sqrt(variance), sqrt(variance / 3))  # what else makes rows vary has a part of it
     return [one for s in starts for one in proposals("pink_noise", ["sigma_dn"], sigma_dn=s)]
+
+
+def pink_shares(rows: int, columns: int) -> tuple[float, float]:
+    """Return which shares of the variance of 1/f noise are those of rows, and of frames.
+
+    A mean over n of N samples keeps sinc^2(k n / N) of the wave of k cycles in N; here N are two
+    frames, and waves have 1 / k. Their sum is ln(N / 2) and Euler's constant, nearly. Components
+    are those of the balanced two-way model, in expectation.
+    """
+    k = np.arange(1, _WAVES * rows)
+    total = log(rows * columns) + np.euler_gamma
+    of_row = float((np.sinc(k / (2 * rows)) ** 2 / k).sum()) / total
+    of_frame = float((np.sinc(k / 2) ** 2 / k).sum()) / total
+    moved = rows / max(rows - 1, 1) * (of_row - of_frame)
+    single = (1 - of_row) / max(columns - 1, 1)  # of pixels, over the samples of a row
+    return moved - single, of_frame - moved / rows
 
 
 def _patterns(kind: str) -> Candidate:

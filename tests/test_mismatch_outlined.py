@@ -1,0 +1,73 @@
+"""A decay of the gain that is told from smooth light by the means of lines."""
+
+from types import SimpleNamespace as Stub
+from typing import Any
+
+import numpy as np
+import pytest
+
+from analysis.mismatch.edged import outlined
+from exposing import effect
+
+SHAPE = (96, 64)
+NOISE = 1.0
+LENGTHS = np.geomspace(1.0, 24.0, 16)  # of decays that are sane on 96 rows
+
+
+def _state(means: np.ndarray, rng: np.random.Generator) -> Any:
+    """Return a recording whose map of gains has these row means beside white noise."""
+    image = means[:, None] + rng.normal(0, NOISE, SHAPE)
+    layout = Stub(rows=SHAPE[0], columns=SHAPE[1], sites={"MONO": (0, 0)})
+    return Stub(setting=Stub(layout=layout, seen=Stub(images={("MONO", "gain"): (image, NOISE)})))
+
+
+def _best(state: Any) -> Any:
+    """Return the decay that fits the row means best, of both edges and all lengths."""
+    image = state.setting.seen.images["MONO", "gain"][0]
+    means = image.mean(1) - image.mean()
+    gains = {}
+    for edge, distance in (("top", np.arange(96.0)), ("bottom", np.arange(96.0)[::-1])):
+        for length in LENGTHS:
+            shape = np.exp(-distance / length)
+            shape -= shape.mean()
+            gains[float(shape @ means) ** 2 / float(shape @ shape)] = edge, length
+    edge, length = gains[max(gains)]
+    return effect("line_settling", gain_percent=0.1, length_pixels=float(length), edge=edge)
+
+
+@pytest.mark.parametrize("degree", [2, 3, 4])
+@pytest.mark.parametrize("strength", [10.0, 20.0, 40.0])
+def test_smooth_light_is_rarely_taken_for_a_decay(degree: int, strength: float) -> None:
+    """At odds of 20, in one of 20 at most: light that falls from one edge, and any other."""
+    rng, draws = np.random.default_rng(int(strength) + degree), 100
+    u = np.linspace(-1, 1, SHAPE[0])
+    taken = {"any": 0, "edge": 0}
+    for _ in range(draws):
+        lights = {
+            "any": np.polynomial.legendre.legval(u, [0.0, *rng.normal(size=degree)]),
+            "edge": (1 + u) ** degree,
+        }
+        for name, light in lights.items():
+            own = light - light.mean()
+            own *= strength * NOISE / np.sqrt(SHAPE[1]) / np.linalg.norm(own)
+            state = _state(own, rng)
+            taken[name] += outlined(state, _best(state))
+    assert max(taken.values()) <= 0.05 * draws + 5 * np.sqrt(0.05 * draws)
+
+
+@pytest.mark.parametrize("length", [3.0, 6.0, 10.0])
+def test_a_decay_is_told(length: float) -> None:
+    rng, draws, found = np.random.default_rng(5), 40, 0
+    for _ in range(draws):
+        own = np.exp(-np.arange(96.0)[::-1] / length)
+        own -= own.mean()
+        own *= 15 * NOISE / np.sqrt(SHAPE[1]) / np.linalg.norm(own)
+        state = _state(own, rng)
+        found += outlined(state, _best(state))
+    assert found > 0.7 * draws
+
+
+def test_what_is_no_decay_of_the_gain_is_not_asked() -> None:
+    state = _state(np.zeros(96), np.random.default_rng(0))
+    assert not outlined(state, effect("line_settling", offset_dn=1.0, length_pixels=5.0))
+    assert not outlined(state, effect("prnu", sigma_percent=1.0))

@@ -19,7 +19,6 @@ from analysis.mismatch.bank.patches import SIZES, names
 from analysis.mismatch.bank.together import TOGETHER, together
 from analysis.mismatch.candidates.fields import CANDIDATES, fields
 from analysis.mismatch.clues import Clues
-from analysis.mismatch.fielded import _along, fielded
 from dsis.cfa import Cfa
 from dsis.draw import Draw
 from dsis.effects import Effect, Exposure
@@ -210,51 +209,6 @@ def test_a_field_as_long_as_the_sensor_is_uneven_light(length: float, sane: bool
     layout: Any = Stub(rows=96, columns=128)
     one = effect("smooth_prnu", sigma_percent=1.0, length_pixels=length)
     assert CANDIDATES[0].sane(layout, one) == sane
-
-
-def test_products_with_a_pattern_scatter_as_fields_do() -> None:
-    shape = (40, 60)
-    pattern = np.linspace(-1, 1, 60) + np.zeros(shape)
-    made = [float((pattern * _field(5.0, shape, k, 1.0)).sum()) * 100 for k in range(300)]
-    assert np.var(made) == pytest.approx(_along(pattern, 5.0), rel=SURE * np.sqrt(2 / 300))
-
-
-@pytest.mark.parametrize(
-    ("tilt", "shared", "denied"), [(0.3, 0.4, True), (4.0, 0.4, False), (0.3, 0.0, False)]
-)
-def test_uneven_light_that_a_field_has_by_chance_is_denied(
-    tilt: float, shared: float, denied: bool
-) -> None:
-    """Where neighbours are seen to share gains, and only there."""
-    rng = np.random.default_rng(7)
-    shape = (96, 128)
-    gain = 10 * (_field(8.0, shape, 8, 0.4) * shared / 0.4 * 100 + rng.normal(0, 0.3, shape))
-    one = effect("shading", falloff_percent=0.0, tilt_right_percent=tilt)
-    clues = _clues(gain, 1.0, one)
-    state: Any = Stub(
-        camera=clues.camera,
-        mismatches=[Stub(statistic="fixed_patch_variance")] if shared else [],
-        clues=lambda: clues,
-        setting=Stub(layout=clues.layout),
-    )
-    assert (fielded(state, one) is not None) == denied
-    assert fielded(state, effect("prnu", sigma_percent=1.0)) is None
-
-
-def test_a_field_that_is_named_feigns_as_much_light_as_it_was_fitted() -> None:
-    """Whatever the spectrum says, which other noise that neighbours share makes look short."""
-    gain = 10 * np.random.default_rng(7).normal(0, 0.3, (96, 128))
-    field = effect("smooth_prnu", sigma_percent=0.4, length_pixels=8.0)
-    for tilt, denied in ((0.3, True), (4.0, False)):
-        one = effect("shading", falloff_percent=0.0, tilt_right_percent=tilt)
-        clues = _clues(gain, 1.0, one, field)
-        state: Any = Stub(
-            camera=clues.camera,
-            mismatches=[],
-            clues=lambda clues=clues: clues,
-            setting=Stub(layout=clues.layout),
-        )
-        assert (fielded(state, one) is not None) == denied
 
 
 @pytest.mark.parametrize("cfa", ["MONO", "RGGB"])

@@ -9,7 +9,6 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
 
 import numpy as np
 import pytest
-import scipy.stats
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from planter.light import blots
@@ -20,8 +19,6 @@ from analysis.mismatch.bank.patches import SIZES, names
 from analysis.mismatch.bank.together import TOGETHER, together
 from analysis.mismatch.candidates.fields import CANDIDATES, fields
 from analysis.mismatch.clues import Clues
-from analysis.mismatch.fielded import _along, fielded
-from analysis.mismatch.longwaves import LongWaves
 from dsis.cfa import Cfa
 from dsis.draw import Draw
 from dsis.effects import Effect, Exposure
@@ -212,101 +209,6 @@ def test_a_field_as_long_as_the_sensor_is_uneven_light(length: float, sane: bool
     layout: Any = Stub(rows=96, columns=128)
     one = effect("smooth_prnu", sigma_percent=1.0, length_pixels=length)
     assert CANDIDATES[0].sane(layout, one) == sane
-
-
-def test_products_with_a_pattern_scatter_as_fields_do() -> None:
-    shape = (40, 60)
-    pattern = np.linspace(-1, 1, 60) + np.zeros(shape)
-    made = [float((pattern * _field(5.0, shape, k, 1.0)).sum()) * 100 for k in range(300)]
-    assert np.var(made) == pytest.approx(_along(pattern, 5.0), rel=SURE * np.sqrt(2 / 300))
-
-
-@pytest.mark.parametrize(
-    ("tilt", "shared", "denied"), [(0.3, 0.4, True), (4.0, 0.4, False), (0.3, 0.0, False)]
-)
-def test_uneven_light_that_a_field_has_by_chance_is_denied(
-    tilt: float, shared: float, denied: bool
-) -> None:
-    """Where neighbours are seen to share gains, and only there."""
-    rng = np.random.default_rng(7)
-    shape = (96, 128)
-    gain = 10 * (_field(8.0, shape, 8, 0.4) * shared / 0.4 * 100 + rng.normal(0, 0.3, shape))
-    one = effect("shading", falloff_percent=0.0, tilt_right_percent=tilt)
-    clues = _clues(gain, 1.0, one)
-    state: Any = Stub(
-        camera=clues.camera,
-        mismatches=[Stub(statistic="fixed_patch_variance")] if shared else [],
-        clues=lambda: clues,
-        setting=Stub(layout=clues.layout),
-    )
-    assert (fielded(state, one) is not None) == denied
-    assert fielded(state, effect("prnu", sigma_percent=1.0)) is None
-
-
-def test_a_field_that_is_named_feigns_as_much_light_as_it_was_fitted() -> None:
-    """Whatever the spectrum says, which other noise that neighbours share makes look short."""
-    gain = 10 * np.random.default_rng(7).normal(0, 0.3, (96, 128))
-    field = effect("smooth_prnu", sigma_percent=0.4, length_pixels=8.0)
-    for tilt, denied in ((0.3, True), (4.0, False)):
-        one = effect("shading", falloff_percent=0.0, tilt_right_percent=tilt)
-        clues = _clues(gain, 1.0, one, field)
-        state: Any = Stub(
-            camera=clues.camera,
-            mismatches=[],
-            clues=lambda clues=clues: clues,
-            setting=Stub(layout=clues.layout),
-        )
-        assert (fielded(state, one) is not None) == denied
-
-
-def _small_field(rng: np.random.Generator, length: float) -> np.ndarray:
-    """Return a field of variance 1 on 24 rows and 32 columns, by a Cholesky factor."""
-    y, x = (axis.ravel() for axis in np.mgrid[:24, :32])
-    covariance = np.exp(-np.hypot(y - y[:, None], x - x[:, None]) / length)
-    return (
-        np.linalg.cholesky(covariance + 1e-9 * np.eye(y.size)) @ rng.normal(size=y.size)
-    ).reshape(24, 32)
-
-
-def test_chances_of_long_waves_are_uniform_in_their_field() -> None:
-    """Whatever the pattern that is not asked has; more light makes them larger."""
-    rng, draws = np.random.default_rng(11), 300
-    pattern = np.exp(-np.arange(32.0)[::-1] / 4) + np.zeros((24, 32))
-    down = 0.5 * np.linspace(-1, 1, 24)[:, None] + np.zeros((24, 32))
-    own, lit = [], []
-    for _ in range(draws):
-        gain = 0.5 * _small_field(rng, 6.0) + rng.normal(0, 0.3, (24, 32)) + 5 * pattern
-        for found, more in ((own, 0.0), (lit, 1.0)):
-            waves = LongWaves(_clues(10 * (gain + more * down), 3.0), pattern)
-            found.append(waves.chance(0.25, 6.0))
-    assert scipy.stats.kstest(own, "uniform").pvalue > 1e-6
-    assert np.mean(lit) > np.mean(own)
-
-
-def test_the_waves_of_a_short_field_are_few_for_a_long_one() -> None:
-    rng, shape = np.random.default_rng(12), (96, 128)
-    pattern = np.exp(-np.arange(128.0)[::-1] / 8) + np.zeros(shape)
-    found = []
-    for k in range(20):
-        gain = 100 * _field(3.0, shape, k, 0.5) + rng.normal(0, 0.1, shape)
-        waves = LongWaves(_clues(10 * gain, 1.0), pattern)
-        found.append((waves.chance(0.25, 24.0), waves.chance(0.25, 3.0)))
-    long, short = np.median(found, axis=0)
-    assert long < 1e-3
-    assert 0.05 < short < 0.95
-
-
-@pytest.mark.parametrize("shape", [(40, 60), (192, 256)])
-def test_waves_vary_in_a_field_as_in_its_draws(shape: tuple[int, int]) -> None:
-    """Also where a large map is averaged into squares."""
-    pattern = np.linspace(-1, 1, shape[1]) + np.zeros(shape)
-    own = LongWaves(_clues(np.zeros(shape), 1.0), pattern)
-    draws = 200
-    made = [LongWaves(_clues(10 * 100 * _field(8.0, shape, k, 1.0), 1.0), pattern).seen
-            for k in range(draws)]  # fmt: skip
-    expected = np.diag(own._covariance(8.0))
-    ratio = np.var(made, axis=0) / expected
-    assert ratio.mean() == pytest.approx(1, abs=SURE * np.sqrt(2 / draws / ratio.size) + 0.02)
 
 
 @pytest.mark.parametrize("cfa", ["MONO", "RGGB"])

@@ -7,8 +7,8 @@ from analysis.mismatch.bank.edges import edge_shapes
 from analysis.mismatch.bank.seams import SMOOTH_DEGREE, beyond_smooth, seam_shapes
 from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.edged import STATISTIC, edged, single
-from analysis.mismatch.fielded import fielded
 from analysis.mismatch.recalibrate import code_step
+from analysis.mismatch.rivalled import rivalled
 from analysis.mismatch.state import State
 from analysis.mismatch.uneven import uneven
 from dsis.effects import Effect
@@ -41,7 +41,7 @@ def of_another(state: State, effect: Effect, without: Array) -> Denial | None:
         or stepped(state, kind)
         or edged(state, kind)
         or single(state, effect)
-        or fielded(state, effect)
+        or rivalled(state, effect)
         or heated(state, kind)
         or wandering(state, effect)
         or uneven(state, effect)

@@ -1,9 +1,15 @@
 """Dark current that parts of a sensor do not have: something else grows with exposure time."""
 
+from itertools import product
+from math import exp, log
+
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import logsumexp
 
+from analysis.mismatch.candidates.patterns import EXTENTS, PLACES, glowing
 from analysis.mismatch.contradicted import Denial
+from analysis.mismatch.rank import TOLD_APART
 from analysis.mismatch.state import State
 from dsis.effects import Effect
 from dsis.effects.amp_glow import AmpGlow
@@ -16,6 +22,8 @@ _LEAST_SHARE = 0.5  # of a dark current, that every part of the sensor must show
 _SURE = 3.0  # standard errors: the least of sixteen
 _SEEN = 3.5  # of a surface: chance has that among the map's few numbers in 1 % of recordings
 _SMOOTH = "fixed_smooth"
+_FAR_OUT, _MEDIAN = 5.0, 0.455  # standard deviations; of chi-squared of one degree of freedom
+_LARGEST = 700.0  # of an exponent
 
 
 def uneven(state: State, effect: Effect | None) -> Denial | None:
@@ -24,8 +32,9 @@ def uneven(state: State, effect: Effect | None) -> Denial | None:
     The map of what grows with time has a mean of zero: how much of the mean that grows is a smooth
     surface's - a glow's, say - it does not tell. Where such a surface is left unexplained, the part
     of the sensor that grows least must grow for sure, by half of a dark current; else all may be
-    the surface's. Beside a glow or hot pixels that are named nothing is said: the map has their
-    mean too.
+    the surface's. Where none is certain by itself, a glow of the same mean must be denied by the
+    map, at odds of 20. Beside a glow or hot pixels that are named nothing is said: the map has
+    their mean too.
     """
     if not isinstance(effect, DarkCurrent) or not effect.dn_per_s:
         return None
@@ -36,7 +45,7 @@ def uneven(state: State, effect: Effect | None) -> Denial | None:
         abs(z) > _SEEN and key.scope == "time" and key.statistic.startswith(_SMOOTH)
         for key, z in zip(state.null.keys, left, strict=True)
     ):
-        return None
+        return _glowing(state, effect)
     shares, errors = [], []
     for (channel, name), (image, noise) in state.setting.seen.images.items():
         if name != "time":
@@ -53,6 +62,53 @@ def uneven(state: State, effect: Effect | None) -> Denial | None:
         return None
     least = f"{max(share, 0):.0%} +- {error:.0%}"
     return Denial(share, f"a part of the sensor grows with exposure time by {least} of it")
+
+
+def _glowing(state: State, effect: DarkCurrent) -> Denial | None:
+    """Return how a dark current is denied by a glow of the same mean; None: the map denies one.
+
+    Of a glow of shape g and mean m the map is m (g / mean(g) - 1) and noise: m is known as well as
+    pixels tell, a normal variate, over which the likelihood ratio is integrated in closed form; so
+    it is over all places and extents that a glow is looked for in, each as likely.
+    """
+    maps = {c: own for (c, name), own in state.setting.seen.images.items() if name == "time"}
+    if not maps:
+        return None
+    layout, ratios = state.setting.layout, []
+    pixels = sum(
+        image.size * (effect.dn_per_s * layout.regressors(c).scales["time"] / noise) ** 2
+        for c, (image, noise) in maps.items()
+    )
+    for place, extent in product(PLACES, EXTENTS):
+        square = along = 0.0
+        for channel, (image, noise) in maps.items():
+            glow = glowing(image.shape, place, extent)
+            growth = effect.dn_per_s * layout.regressors(channel).scales["time"]
+            shape = growth * (glow / glow.mean() - 1) / noise
+            square += float((shape**2).sum())
+            along += float((shape * _seen(image / noise)).sum())
+        ratios.append(_ratio(square, along, pixels))
+    behind = float(logsumexp(ratios)) - log(len(ratios))
+    if behind <= -TOLD_APART:
+        return None
+    share = 1 / (1 + exp(min(behind, _LARGEST)))
+    return Denial(share, "of the sensor what grows with exposure time may as well be a glow")
+
+
+def _ratio(square: float, along: float, precision: float) -> float:
+    """Return the log of the mean of exp(a s - a^2 q / 2) over a normal a, of mean 1.
+
+    Of q `square` and s `along`; `precision` is the inverse variance of a.
+    """
+    grown = 1 + square / precision
+    return (along - square / 2 + along**2 / precision / 2) / grown - log(grown) / 2
+
+
+def _seen(image: Array) -> Array:
+    """Return a map, of noise 1, less its mean; pixels far out count as so far."""
+    rest = image - image.mean()
+    limit = _FAR_OUT * (float(np.median(rest**2)) / _MEDIAN) ** 0.5
+    return np.asarray(np.clip(rest, -limit, limit))
 
 
 def _parts(image: Array) -> Array:

@@ -27,10 +27,10 @@ _CLEAR = 3.0  # standard errors from which a tilt is worth a trial
 _JUMP = 0.15  # z of the step where halves meet, of that of their means: some 0.4 of two amplifiers
 _UNEVEN = ("shading", "line_settling", "tap_mismatch")
 _LIGHT_DN = 1000.0  # at which they are looked at: all are in proportion
-_PLACES = (
+PLACES = (
     "top_left", "top_right", "bottom_left", "bottom_right", "top", "bottom", "left", "right"
 )  # fmt: skip
-_EXTENTS = (0.05, 0.1, 0.2, 0.35, 0.6)  # of the sensor's longer side, to start from
+EXTENTS = (0.05, 0.1, 0.2, 0.35, 0.6)  # of the sensor's longer side, to start from
 _WIDEST_GLOW = 1.0  # of it: what falls off by less is as good as the same everywhere
 _OF_EXTENT = 0.01  # of its logarithm
 _SMOOTH = ("fixed_smooth_variance", "fixed_smooth_tilt", "fixed_smooth_falloff")
@@ -217,7 +217,7 @@ def _glow(clues: Clues) -> Sequence[Proposal]:
         """Return what the fit gains, and the glow, DN in a second."""
         gain = rate = weight = 0.0
         for channel, (image, noise) in images.items():
-            shape = _glowing(image.shape, place, extent)
+            shape = glowing(image.shape, place, extent)
             rest = shape - shape.mean()
             size = float((rest**2).sum())
             slope = float((rest * image).sum()) / size
@@ -227,11 +227,11 @@ def _glow(clues: Clues) -> Sequence[Proposal]:
         return gain, rate / weight
 
     most, place, start = max(
-        (fit(place, extent)[0], place, extent) for place in _PLACES for extent in _EXTENTS
+        (fit(place, extent)[0], place, extent) for place in PLACES for extent in EXTENTS
     )
     found = scipy.optimize.minimize_scalar(
         lambda logarithm: -fit(place, exp(logarithm))[0],
-        bounds=(log(max(start / 2, _EXTENTS[0])), log(min(start * 2, _WIDEST_GLOW))),
+        bounds=(log(max(start / 2, EXTENTS[0])), log(min(start * 2, _WIDEST_GLOW))),
         method="bounded",
         options={"xatol": _OF_EXTENT},
     )
@@ -248,10 +248,11 @@ def _is_glow(_: Layout, effect: Effect) -> bool:
 
     What does not fall off is current everywhere; what reaches few pixels is hot pixels.
     """
-    return isinstance(effect, AmpGlow) and _EXTENTS[0] / 2 <= effect.extent <= _WIDEST_GLOW
+    return isinstance(effect, AmpGlow) and EXTENTS[0] / 2 <= effect.extent <= _WIDEST_GLOW
 
 
-def _glowing(shape: tuple[int, ...], place: str, extent: float) -> Array:
+def glowing(shape: tuple[int, ...], place: str, extent: float) -> Array:
+    """Return a glow of height 1, exp(-r / L), in a map of such a shape: (row, column)."""
     n, m = shape
     y, x = np.arange(n)[:, None], np.arange(m)
     down = y if "top" in place else (n - 1 - y if "bottom" in place else np.zeros((n, 1)))

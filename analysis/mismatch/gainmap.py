@@ -1,0 +1,69 @@
+"""The gain's map beside what is known to be uneven: what no effect explains of it."""
+
+from collections.abc import Sequence
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.mismatch.bank.maps import PatternSums
+from analysis.mismatch.clues import Clues
+from analysis.mismatch.layout import Taken
+from dsis.draw import Draw
+from dsis.effects import Effect, Exposure, Image, ReadOut, Stage
+from dsis.grid import PixelGrid
+
+Array = NDArray[np.float64]
+
+
+def gains_beside(clues: Clues, effects: Sequence[Effect]) -> Array | None:
+    """Return the gain's map, %, less what effects make of even light; None: there is no map.
+
+    Of a mosaic it is that of all channels, each less its mean: (row, column). Charge that is shared
+    makes lines at an edge differ, of all that neighbours share there is one side only.
+    """
+    layout, images = clues.layout, clues.image("gain")
+    if set(images) != set(layout.sites):
+        return None
+    grid, step = PixelGrid(layout.rows, layout.columns, layout.cfa), 1 + (len(layout.sites) > 1)
+    made = {}
+    for taken in layout.uniform:
+        even = np.zeros(grid.shape, np.float32)
+        for channel, (y, x) in layout.sites.items():
+            even[y::step, x::step] = max(layout.signal_dn[taken.name, channel], 0.0)
+        made[taken.name] = mean_frame(even, effects, grid, clues.camera.read_out, taken)
+    whole = np.zeros(grid.shape)
+    for channel, (image, _) in images.items():
+        y, x = layout.sites[channel]
+        sums = PatternSums(layout.regressors(channel), (image.shape[0], image.shape[1]))
+        for name in sums.regressors.rows:
+            frame = np.ascontiguousarray(made[name][y::step, x::step], np.float64)
+            sums.add(name, frame, 1.0, 1)
+        own = image - sums.maps()["gain"][0]
+        whole[y::step, x::step] = (own - own.mean()) * 100 / clues.scale("gain", channel)
+    return whole
+
+
+def mean_frame(
+    light: Image, effects: Sequence[Effect], grid: PixelGrid, read_out: ReadOut, taken: Taken
+) -> Image:
+    """Return what effects make of light without noise, DN: float32 (row, column).
+
+    What is drawn at random has no expected shape, and codes hide small ones. Light is steady.
+    """
+    image = light
+    for own in sorted(effects, key=lambda one: (one.stage, one.rank, one.kind)):
+        if own.draws or own.stage is Stage.CODE:
+            continue
+        exposure = Exposure(
+            grid, 0, Draw(0), Draw(0), light, read_out, partial(_alike, image),
+            taken.exposure_time_s,
+        )  # fmt: skip
+        image = own.apply(image, exposure)
+        light = image if own.stage is Stage.LIGHT else light
+    return image
+
+
+def _alike(image: Image, _: int) -> Image:
+    """Return the frame before, which is as this one."""
+    return image

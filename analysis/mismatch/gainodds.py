@@ -1,0 +1,193 @@
+"""Which cause makes a gain uneven over a sensor: odds of the map itself, of all causes known.
+
+Light that falls off or leans, halves that differ and decays from an edge are sums of a shape along
+rows and one along columns: of the map's cosine transform they have the first column and row. Gains
+that neighbours share lie at all low frequencies. Each cause is a Gaussian covariance beside white
+noise of unknown size, so that its evidence is known in closed form: what has more shapes to choose
+from explains by chance more, and pays for it.
+"""
+
+from collections.abc import Iterator, Mapping
+from enum import StrEnum
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+from scipy.special import logsumexp
+
+from analysis.mismatch.bank.seams import beyond_smooth
+from dsis.measures.median import median
+
+Array = NDArray[np.float64]
+_LOWEST = 1 / 8  # cycles a pixel: noise that neighbours share is white below
+_STRENGTHS = 4.0 ** np.arange(1, 11)  # squares, in those of noise: from next to nothing to all
+_LENGTHS = 8
+_SHORTEST, _LONGEST = 2.5, 1 / 3  # pixels, of the shorter side: shorter fields are white there
+_DECAYS, _REACH = 10, 1 / 8  # lengths, and the longest of the sensor
+_MEDIAN = 0.455  # of chi-squared of one degree of freedom
+_FAR_OUT = 5.0  # standard deviations of pixels, beyond which they count as so far out
+_MOST_LINES = 128  # of the shorter side
+_LEAST = 4  # lines, fewer of which hold no frequency of a field
+
+
+class Cause(StrEnum):
+    """What makes a gain uneven."""
+
+    LIGHT = "light that falls off or leans"
+    HALVES_OF_ROWS = "upper and lower halves"
+    HALVES_OF_COLUMNS = "left and right halves"
+    LEFT = "a decay from the left"
+    RIGHT = "a decay from the right"
+    TOP = "a decay from the top"
+    BOTTOM = "a decay from the bottom"
+    FIELD = "gains that neighbours share"
+
+
+def evidences(image: Array) -> dict[Cause, float]:
+    """Return the log evidence of each cause of a map's unevenness, relative to none.
+
+    Nothing is said of a map that is too small, or without noise. A field may be there beside each
+    of the others, or not, as likely beforehand; so may noise of lines beyond that of pixels.
+    Strengths are uniform in their logarithm.
+
+    Parameters
+    ----------
+    image
+        A map of gains (row, column), in any unit.
+
+    References
+    ----------
+    O'Hagan & Forster, Bayesian Inference, 2nd ed., 2004, section 11 (the normal linear model with
+    unknown variance); Ahmed et al., IEEE Transactions on Computers 23, 1974 (the cosine transform
+    of a stationary field).
+    """
+    clipped = image - image.mean()
+    limit = _FAR_OUT * (median(clipped.ravel() ** 2) / _MEDIAN) ** 0.5
+    clipped = _coarse(np.clip(clipped, -limit, limit))
+    rows, columns = clipped.shape
+    low, lines = _low(rows, columns), rows + columns - 2
+    modes = fft.dctn(clipped, norm="ortho")
+    noise = float(median(modes[low] ** 2)) / _MEDIAN if low.any() else 0.0
+    if noise == 0:
+        return {}
+    seen = np.concatenate([modes[1:, 0], modes[0, 1:], modes[low]])
+    whites = np.array(list(_whites(clipped, noise, seen.size)))
+    fields = np.array(_fields(rows, columns))
+    sizes = fields[:, :lines].sum(1)
+    grown = _STRENGTHS[:, None] * (fields / sizes[:, None])[:, None]
+    beside = whites[:, None, None] + grown
+    variances = np.concatenate([whites, beside.reshape(-1, seen.size)])
+    prior = np.repeat([-np.log(2 * len(whites)), -np.log(2 * len(variances) - 2 * len(whites))],
+                      [len(whites), len(variances) - len(whites)])  # fmt: skip
+    base = prior - np.log(variances).sum(1) / 2
+    squares = (seen**2 / variances).sum(1)
+    by_noise = base - seen.size / 2 * np.log(squares)
+    none, of_fields = float(logsumexp(by_noise[: len(whites)])), by_noise[len(whites) :]
+    evidence = {Cause.FIELD: float(logsumexp(of_fields)) - none}
+    inverse, along = 1 / variances[:, :lines], seen[:lines] / variances[:, :lines]
+    for cause, some in _shapes(rows, columns).items():
+        terms = [base[:, None] + _with(one, inverse, along, squares, seen.size) for one in some]
+        evidence[cause] = float(logsumexp(terms)) - np.log(len(some) * len(_STRENGTHS)) - none
+    return evidence
+
+
+def _with(shapes: Array, inverse: Array, along: Array, squares: Array, count: int) -> Array:
+    """Return the log evidence of shapes beside each noise, less its own: (noise, strength).
+
+    C = D + t F F', of which determinant and inverse follow from the few shapes (Woodbury); the
+    size of all noise is integrated over, uniform in its logarithm.
+    """
+    gram = np.einsum("ki,bi,li->bkl", shapes, inverse, shapes, optimize=True)
+    values, vectors = np.linalg.eigh(gram)
+    parts = np.einsum("bkl,bk->bl", vectors, along @ shapes.T) ** 2
+    grown = 1 + _STRENGTHS[:, None] * values[:, None]
+    left = squares[:, None] - (_STRENGTHS[:, None] * parts[:, None] / grown).sum(2)
+    return np.asarray(-np.log(grown).sum(2) / 2 - count / 2 * np.log(left))
+
+
+def _coarse(image: Array) -> Array:
+    """Return a large map in means over squares: what is smooth is seen in them, and noise white."""
+    side = max(min(image.shape) // _MOST_LINES, 1)
+    rows, columns = (size // side for size in image.shape)
+    squares = image[: rows * side, : columns * side].reshape(rows, side, columns, side)
+    return np.asarray(squares.mean((1, 3)))
+
+
+def _whites(image: Array, noise: float, count: int) -> Iterator[Array]:
+    """Yield the variance of each mode without a field, in that of pixels: lines may have more."""
+    rows, columns = image.shape
+    extra = []
+    for axis, across in ((1, columns), (0, rows)):
+        rest = beyond_smooth(image.mean(axis))
+        extra.append(max(float(median(rest**2)) / _MEDIAN * across / noise, 1.0))
+    for down in sorted({1.0, extra[0]}):
+        for along in sorted({1.0, extra[1]}):
+            own = np.ones(count)
+            own[: rows - 1] = down
+            own[rows - 1 : rows + columns - 2] = along
+            yield own
+
+
+@lru_cache(maxsize=4)
+def _low(rows: int, columns: int) -> NDArray[np.bool_]:
+    """Return which modes are of low frequency, but for those of rows and columns: (row, column)."""
+    down, across = np.arange(rows)[:, None] / (2 * rows), np.arange(columns) / (2 * columns)
+    enough = min(rows, columns) >= _LEAST
+    return (np.hypot(down, across) < _LOWEST) & (down > 0) & (across > 0) & enough
+
+
+@lru_cache(maxsize=4)
+def _fields(rows: int, columns: int) -> list[Array]:
+    """Return the power of each mode in fields of several lengths, of rows, columns and others."""
+    around = 2 * rows, 2 * columns
+    y, x = (np.minimum(np.arange(size), size - np.arange(size)) for size in around)
+    distance, low = np.hypot(y[:, None], x), _low(rows, columns)
+    found = []
+    for length in np.geomspace(_SHORTEST, min(rows, columns) * _LONGEST, _LENGTHS):
+        power = np.maximum(fft.rfft2(np.exp(-distance / length)).real, 0.0)[:rows, :columns]
+        found.append(np.concatenate([power[1:, 0], power[0, 1:], power[low]]))
+    return found
+
+
+@lru_cache(maxsize=4)
+def _shapes(rows: int, columns: int) -> Mapping[Cause, tuple[Array, ...]]:
+    """Return what each cause may make of rows and columns: shapes of norm 1 (shape, mode) each."""
+    down, along = (_Lines(size) for size in (rows, columns))
+    none = np.zeros(rows - 1), np.zeros(columns - 1)
+
+    def of_rows(line: NDArray[Any]) -> Array:
+        return np.concatenate([fft.dct(line, norm="ortho")[1:] * columns**0.5, none[1]])
+
+    def of_columns(line: NDArray[Any]) -> Array:
+        return np.concatenate([none[0], fft.dct(line, norm="ortho")[1:] * rows**0.5])
+
+    bow = [of_rows(np.square(down.place)), of_columns(np.square(along.place))]
+    fall = rows**2 * bow[0] + columns**2 * bow[1]
+    lean = [of_rows(down.place), of_columns(along.place)]
+    light = [[one] for one in (fall, *lean, *bow)]
+    light += [lean, [fall, lean[0]], [fall, lean[1]], [fall, *lean], [*lean, *bow]]
+    made: dict[Cause, list[list[Array]]] = {
+        Cause.LIGHT: light,
+        Cause.HALVES_OF_ROWS: [[of_rows(down.halves)]],
+        Cause.HALVES_OF_COLUMNS: [[of_columns(along.halves)]],
+        Cause.TOP: [[of_rows(own)] for own in down.decays],
+        Cause.BOTTOM: [[of_rows(own[::-1])] for own in down.decays],
+        Cause.LEFT: [[of_columns(own)] for own in along.decays],
+        Cause.RIGHT: [[of_columns(own[::-1])] for own in along.decays],
+    }
+    return {
+        cause: tuple(np.stack([own / np.linalg.norm(own) for own in one]) for one in some)
+        for cause, some in made.items()
+    }
+
+
+class _Lines:
+    """Shapes along an axis of so many lines."""
+
+    def __init__(self, size: int) -> None:
+        lengths: Array = np.geomspace(1.0, max(size * _REACH, 2.0), _DECAYS)
+        self.place = (np.arange(size) - (size - 1) / 2) / (size / 2)
+        self.halves = np.where(np.arange(size) < size / 2, -1.0, 1.0)
+        self.decays = np.exp(np.arange(size, dtype=np.float64) / -lengths[:, None])

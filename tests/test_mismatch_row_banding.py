@@ -160,7 +160,7 @@ def test_of_few_rows_far_lags_are_unknown() -> None:
 def test_a_band_is_no_row_noise_and_no_drift() -> None:
     (candidate,) = CANDIDATES
     layout: Any = Stub(rows=96)
-    for length, sane in ((0.6, False), (1.0, True), (9.0, True), (30.0, False)):
+    for length, sane in ((0.6, False), (1.0, True), (3.5, True), (9.0, False)):
         one = registry()["row_banding"](sigma_dn=1.0, length_rows=length)
         assert candidate.sane(layout, one) == sane
     for other in ("row_noise", "pink_noise", "line_flicker"):
@@ -232,10 +232,8 @@ def test_it_takes_no_place_of_what_has_no_word(kind: str) -> None:
     assert found.unexplained
 
 
-@pytest.mark.parametrize("length", [3.0, 8.0])
-def test_without_its_word_its_correlation_stays_unexplained(length: float) -> None:
-    """Bands of many rows are no 1/f noise either, which has waves of all lengths."""
-    true = camera(effect("row_banding", sigma_dn=0.8, length_rows=length))
+def test_without_its_word_its_correlation_stays_unexplained() -> None:
+    true = camera(effect("row_banding", sigma_dn=0.8, length_rows=3.0))
     found = _named(true, camera(), 9, WORDS - {"row_banding"})
     assert {one.effect for one in found.omitted_physics} <= {"row_noise"}
     assert any(m.statistic in ("row_correlation", "slow_row_variance") for m in found.unexplained)

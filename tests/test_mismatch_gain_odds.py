@@ -16,7 +16,7 @@ from scipy.stats import binom
 from analysis.mismatch import find_mismatch
 from analysis.mismatch.clues import Clues
 from analysis.mismatch.gainmap import gains_beside
-from analysis.mismatch.gainodds import _STRENGTHS, Cause, _with, evidences
+from analysis.mismatch.gainodds import _STRENGTHS, Cause, _Modes, _with, evidence_beside, evidences
 from analysis.mismatch.observe import observe
 from analysis.mismatch.rivalled import rivalled
 from analysis.mismatch.source import Source
@@ -56,20 +56,16 @@ def test_shapes_beside_noise_are_as_likely_as_dense_matrices_say() -> None:
     count, lines = 14, 9
     shapes, variances = rng.normal(size=(2, lines)), rng.uniform(0.5, 3, (3, count))
     seen = rng.normal(size=count)
-    found = _with(
-        shapes,
-        1 / variances[:, :lines],
-        seen[:lines] / variances[:, :lines],
-        (seen**2 / variances).sum(1),
-        count,
-    )
+    own = _Modes((5, 6), seen, variances, np.zeros(3), 3)
+    found, beside = _with(shapes, own), _with(shapes[:1], own, shapes[1:] * 3)
     padded = np.hstack([shapes, np.zeros((2, count - lines))])
-    for i, own in enumerate(variances):
+    for i, noise in enumerate(variances):
         for j, strength in enumerate(_STRENGTHS):
-            whole = np.diag(own) + strength * padded.T @ padded
-            square = seen @ np.linalg.solve(whole, seen)
-            expected = -np.linalg.slogdet(whole)[1] / 2 - count / 2 * np.log(square)
-            assert found[i, j] == pytest.approx(expected + np.log(own).sum() / 2)
+            for made, second in ((found, strength), (beside, 9.0)):
+                whole = np.diag(noise) + padded.T @ np.diag([strength, second]) @ padded
+                square = seen @ np.linalg.solve(whole, seen)
+                expected = -np.linalg.slogdet(whole)[1] / 2 - count / 2 * np.log(square)
+                assert made[i, j] == pytest.approx(expected + np.log(noise).sum() / 2)
 
 
 @pytest.mark.parametrize("cause", Cause)
@@ -109,6 +105,17 @@ def test_a_wrong_cause_is_believed_no_oftener_than_its_odds(right: Cause, z: flo
         others = max(value for one, value in found.items() if one is not best)
         often += best is not right and found[best] - others > ODDS and found[best] > ODDS
     assert often <= binom.isf(1e-3, tries, 1 / 20)
+
+
+@pytest.mark.parametrize("z", [10.0, 40.0])
+@pytest.mark.parametrize("sign", [-1, 1])
+def test_two_causes_at_once_are_no_rivals(z: float, sign: int) -> None:
+    """However strong the other is; and of two that are one nothing is left beside it."""
+    tilt = MADE[Cause.LIGHT] / np.linalg.norm(MADE[Cause.LIGHT])
+    both = _shaped(Cause.TOP, z, 5) + sign * 14 * tilt
+    assert evidence_beside(both, Cause.LIGHT, Cause.TOP) > ODDS
+    assert evidence_beside(both, Cause.TOP, Cause.LIGHT) > ODDS
+    assert evidence_beside(_shaped(Cause.TOP, z, 7), Cause.LIGHT, Cause.TOP) < ODDS
 
 
 def test_pixels_far_out_and_large_maps_change_little() -> None:

@@ -8,12 +8,13 @@ from numpy.typing import NDArray
 
 from analysis.mismatch.bank.maps import PatternSums
 from analysis.mismatch.clues import Clues
-from analysis.mismatch.layout import Taken
+from analysis.mismatch.layout import Layout, Taken
 from dsis.draw import Draw
 from dsis.effects import Effect, Exposure, Image, ReadOut, Stage
 from dsis.grid import PixelGrid
 
 Array = NDArray[np.float64]
+_MOST = 8  # levels, of which a line and what bends it are as well known as of more
 
 
 def gains_beside(clues: Clues, effects: Sequence[Effect]) -> Array | None:
@@ -27,7 +28,7 @@ def gains_beside(clues: Clues, effects: Sequence[Effect]) -> Array | None:
         return None
     grid, step = PixelGrid(layout.rows, layout.columns, layout.cfa), 1 + (len(layout.sites) > 1)
     made = {}
-    for taken in layout.uniform:
+    for taken in _some(layout):
         even = np.zeros(grid.shape, np.float32)
         for channel, (y, x) in layout.sites.items():
             even[y::step, x::step] = max(layout.signal_dn[taken.name, channel], 0.0)
@@ -36,12 +37,20 @@ def gains_beside(clues: Clues, effects: Sequence[Effect]) -> Array | None:
     for channel, (image, _) in images.items():
         y, x = layout.sites[channel]
         sums = PatternSums(layout.regressors(channel), (image.shape[0], image.shape[1]))
-        for name in sums.regressors.rows:
+        for name in sorted(sums.regressors.rows.keys() & made.keys()):
             frame = np.ascontiguousarray(made[name][y::step, x::step], np.float64)
             sums.add(name, frame, 1.0, 1)
         own = image - sums.maps()["gain"][0]
         whole[y::step, x::step] = (own - own.mean()) * 100 / clues.scale("gain", channel)
     return whole
+
+
+def _some(layout: Layout) -> list[Taken]:
+    """Return the exposures that tell what effects make of light: all darks, and flats of many."""
+    darks = [own for own in layout.uniform if own.kind == "dark"]
+    flats = [own for own in layout.uniform if own.kind != "dark"]
+    flats.sort(key=lambda own: layout.signal_dn[own.name, layout.channels[0]])
+    return darks + flats[:: max(len(flats) // _MOST, 1)]
 
 
 def mean_frame(

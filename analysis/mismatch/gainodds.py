@@ -8,8 +8,9 @@ from explains by chance more, and pays for it.
 """
 
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from enum import StrEnum
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -23,9 +24,11 @@ from dsis.measures.median import median
 Array = NDArray[np.float64]
 _LOWEST = 1 / 8  # cycles a pixel: noise that neighbours share is white below
 _STRENGTHS = 4.0 ** np.arange(1, 11)  # squares, in those of noise: from next to nothing to all
+_COUNT = len(_STRENGTHS)
 _LENGTHS = 8
-_SHORTEST, _LONGEST = 2.5, 1 / 3  # pixels, of the shorter side: shorter fields are white there
-_DECAYS, _REACH = 10, 1 / 8  # lengths, and the longest of the sensor
+_SHORTEST = 2.5  # pixels: fields that are shorter are white there
+_DECAYS = 10  # lengths
+_REACH = 1 / 8  # of the sensor: what is longer, of decays and fields, is a smooth surface
 _MEDIAN = 0.455  # of chi-squared of one degree of freedom
 _FAR_OUT = 5.0  # standard deviations of pixels, beyond which they count as so far out
 _MOST_LINES = 128  # of the shorter side
@@ -63,6 +66,77 @@ def evidences(image: Array) -> dict[Cause, float]:
     unknown variance); Ahmed et al., IEEE Transactions on Computers 23, 1974 (the cosine transform
     of a stationary field).
     """
+    own = _modes(image)
+    if own is None:
+        return {}
+    by_noise = own.base - own.seen.size / 2 * np.log(own.squares)
+    none = float(logsumexp(by_noise[: own.whites]))
+    found = {Cause.FIELD: float(logsumexp(by_noise[own.whites :])) - none}
+    for cause, some in _shapes(*own.shape).items():
+        terms = [own.base[:, None] + _with(one, own) for one in some]
+        found[cause] = float(logsumexp(terms)) - np.log(len(some) * len(_STRENGTHS)) - none
+    return found
+
+
+def evidence_beside(image: Array, cause: Cause, other: Cause) -> float:
+    """Return the log evidence of a cause beside another one, relative to that other alone.
+
+    Of the other its likeliest shape and strength. A field may be beside every cause anyway: it is
+    none of the two.
+    """
+    own = _modes(image)
+    if own is None:
+        return -np.inf
+    shapes = _shapes(*own.shape)
+    of_other = [own.base[:, None] + _with(one, own) for one in shapes[other]]
+    by_strength = [logsumexp(one, axis=0) for one in of_other]
+    which, strength = np.unravel_index(int(np.argmax(by_strength)), (len(of_other), _COUNT))
+    fixed = shapes[other][which] * _STRENGTHS[strength] ** 0.5
+    terms = [own.base[:, None] + _with(one, own, fixed) for one in shapes[cause]]
+    both = float(logsumexp(terms)) - np.log(len(terms) * _COUNT)
+    return float(both - by_strength[which][strength])
+
+
+@dataclass(frozen=True)
+class _Modes:
+    """Modes of a map, those of rows and columns first, and what noise and fields make of them.
+
+    Attributes
+    ----------
+    shape
+        Rows and columns of the map.
+    seen
+        (mode,).
+    variances
+        (noise, mode): white ones first, so many as `whites`; then with fields.
+    base
+        (noise,): log of what is likely beforehand, less half of the log determinant.
+    """
+
+    shape: tuple[int, int]
+    seen: Array
+    variances: Array
+    base: Array
+    whites: int
+
+    @cached_property
+    def squares(self) -> Array:
+        """Sum of squares of all modes by each noise."""
+        return np.asarray((self.seen**2 / self.variances).sum(1))
+
+    @cached_property
+    def inverse(self) -> Array:
+        """Inverse variances of rows and columns, (noise, mode)."""
+        return 1 / self.variances[:, : sum(self.shape) - 2]
+
+    @cached_property
+    def along(self) -> Array:
+        """Modes of rows and columns by their variances, (noise, mode)."""
+        return self.seen[: sum(self.shape) - 2] * self.inverse
+
+
+def _modes(image: Array) -> _Modes | None:
+    """Return the modes of a map; None: it is too small, or has no noise."""
     clipped = image - image.mean()
     limit = _FAR_OUT * (median(clipped.ravel() ** 2) / _MEDIAN) ** 0.5
     clipped = _coarse(np.clip(clipped, -limit, limit))
@@ -71,40 +145,37 @@ def evidences(image: Array) -> dict[Cause, float]:
     modes = fft.dctn(clipped, norm="ortho")
     noise = float(median(modes[low] ** 2)) / _MEDIAN if low.any() else 0.0
     if noise == 0:
-        return {}
+        return None
     seen = np.concatenate([modes[1:, 0], modes[0, 1:], modes[low]])
     whites = np.array(list(_whites(clipped, noise, seen.size)))
     fields = np.array(_fields(rows, columns))
     sizes = fields[:, :lines].sum(1)
     grown = _STRENGTHS[:, None] * (fields / sizes[:, None])[:, None]
-    beside = whites[:, None, None] + grown
-    variances = np.concatenate([whites, beside.reshape(-1, seen.size)])
-    prior = np.repeat([-np.log(2 * len(whites)), -np.log(2 * len(variances) - 2 * len(whites))],
-                      [len(whites), len(variances) - len(whites)])  # fmt: skip
+    beside = (whites[:, None, None] + grown).reshape(-1, seen.size)
+    variances = np.concatenate([whites, beside])
+    prior = np.repeat([-np.log(2 * len(own)) for own in (whites, beside)],
+                      [len(whites), len(beside)])  # fmt: skip
     base = prior - np.log(variances).sum(1) / 2
-    squares = (seen**2 / variances).sum(1)
-    by_noise = base - seen.size / 2 * np.log(squares)
-    none, of_fields = float(logsumexp(by_noise[: len(whites)])), by_noise[len(whites) :]
-    evidence = {Cause.FIELD: float(logsumexp(of_fields)) - none}
-    inverse, along = 1 / variances[:, :lines], seen[:lines] / variances[:, :lines]
-    for cause, some in _shapes(rows, columns).items():
-        terms = [base[:, None] + _with(one, inverse, along, squares, seen.size) for one in some]
-        evidence[cause] = float(logsumexp(terms)) - np.log(len(some) * len(_STRENGTHS)) - none
-    return evidence
+    return _Modes((rows, columns), seen, variances, base, len(whites))
 
 
-def _with(shapes: Array, inverse: Array, along: Array, squares: Array, count: int) -> Array:
+def _with(shapes: Array, own: _Modes, fixed: Array | None = None) -> Array:
     """Return the log evidence of shapes beside each noise, less its own: (noise, strength).
 
     C = D + t F F', of which determinant and inverse follow from the few shapes (Woodbury); the
-    size of all noise is integrated over, uniform in its logarithm.
+    size of all noise is integrated over, uniform in its logarithm. `fixed` are further shapes, of
+    a strength that is theirs.
     """
-    gram = np.einsum("ki,bi,li->bkl", shapes, inverse, shapes, optimize=True)
-    values, vectors = np.linalg.eigh(gram)
-    parts = np.einsum("bkl,bk->bl", vectors, along @ shapes.T) ** 2
-    grown = 1 + _STRENGTHS[:, None] * values[:, None]
-    left = squares[:, None] - (_STRENGTHS[:, None] * parts[:, None] / grown).sum(2)
-    return np.asarray(-np.log(grown).sum(2) / 2 - count / 2 * np.log(left))
+    count = len(shapes)
+    every = shapes if fixed is None else np.concatenate([shapes, fixed])
+    gram = np.einsum("ki,bi,li->bkl", every, own.inverse, every, optimize=True)
+    parts = own.along @ every.T
+    scale = np.ones((_COUNT, len(every)))
+    scale[:, :count] = _STRENGTHS[:, None] ** 0.5
+    whole = np.eye(len(every)) + gram[:, None] * scale[:, :, None] * scale[:, None]
+    part = parts[:, None] * scale
+    left = own.squares[:, None] - (part * np.linalg.solve(whole, part[..., None])[..., 0]).sum(2)
+    return np.asarray(-np.linalg.slogdet(whole)[1] / 2 - own.seen.size / 2 * np.log(left))
 
 
 def _coarse(image: Array) -> Array:
@@ -144,8 +215,8 @@ def _fields(rows: int, columns: int) -> list[Array]:
     around = 2 * rows, 2 * columns
     y, x = (np.minimum(np.arange(size), size - np.arange(size)) for size in around)
     distance, low = np.hypot(y[:, None], x), _low(rows, columns)
-    found = []
-    for length in np.geomspace(_SHORTEST, min(rows, columns) * _LONGEST, _LENGTHS):
+    found, longest = [], max(min(rows, columns) * _REACH, 2 * _SHORTEST)
+    for length in np.geomspace(_SHORTEST, longest, _LENGTHS):
         power = np.maximum(fft.rfft2(np.exp(-distance / length)).real, 0.0)[:rows, :columns]
         found.append(np.concatenate([power[1:, 0], power[0, 1:], power[low]]))
     return found

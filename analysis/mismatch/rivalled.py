@@ -1,10 +1,10 @@
 """Uneven light, halves and decays that another cause of an uneven gain explains as well."""
 
-import numpy as np
+from math import exp
 
 from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.gainmap import gains_beside
-from analysis.mismatch.gainodds import Cause, evidences
+from analysis.mismatch.gainodds import Cause, evidence_beside, evidences
 from analysis.mismatch.rank import TOLD_APART
 from analysis.mismatch.state import State
 from dsis.effects import Effect
@@ -13,6 +13,7 @@ from dsis.effects.shading import Shading
 from dsis.effects.tap_mismatch import TapMismatch
 
 _HALVES = {"top_bottom": Cause.HALVES_OF_ROWS, "left_right": Cause.HALVES_OF_COLUMNS}
+_LARGEST = 700.0  # of an exponent
 _EDGES = {"top": Cause.TOP, "bottom": Cause.BOTTOM, "left": Cause.LEFT, "right": Cause.RIGHT}
 
 
@@ -21,22 +22,26 @@ def rivalled(state: State, effect: Effect) -> Denial | None:
 
     Asked is the gain's map less what the camera's other effects make of it, whatever statistic is
     certain by itself, and whatever may be named: where another cause is as likely, at odds below
-    20, the effect is not told from it.
+    20, and beside it the effect is no likelier than nothing, it is not told from that.
     """
     cause = _cause(effect)
     if cause is None:
         return None
     others = [own for own in state.camera.effect if own != effect]
     image = gains_beside(state.clues(), others)
-    found = {} if image is None else evidences(image)
-    if not found:
+    if image is None:
         return None
-    rival = max((one for one in found if one is not cause), key=lambda one: found[one])
-    behind = found[rival] - found[cause]
-    if behind <= -TOLD_APART:
-        return None
-    share = 1 / (1 + np.exp(np.clip(behind, -TOLD_APART, 700.0)))
-    return Denial(float(share), f"its map of gains may as well be {rival.value}")
+    found = evidences(image)
+    for rival in sorted(found, key=lambda one: -found[one]):
+        behind = found[rival] - found[cause]
+        if rival is cause or behind <= -TOLD_APART:
+            continue
+        if rival is not Cause.FIELD:  # which may be beside the effect as it is
+            behind = -evidence_beside(image, cause, rival)
+        if behind > -TOLD_APART:
+            share = 1 / (1 + exp(min(behind, _LARGEST)))
+            return Denial(share, f"its map of gains may as well be {rival.value}")
+    return None
 
 
 def _cause(effect: Effect) -> Cause | None:

@@ -17,6 +17,7 @@ from analysis.mismatch import find_mismatch
 from analysis.mismatch.clues import Clues
 from analysis.mismatch.gainmap import gains_beside
 from analysis.mismatch.gainodds import _STRENGTHS, Cause, _Modes, _with, evidence_beside, evidences
+from analysis.mismatch.layout import Layout, Taken
 from analysis.mismatch.observe import observe
 from analysis.mismatch.rivalled import rivalled
 from analysis.mismatch.source import Source
@@ -155,6 +156,41 @@ def test_edges_of_shared_charge_are_no_decays(cfa: str) -> None:
     assert max(evidences(image).values()) < ODDS
 
 
+def _of_levels(times: tuple[float, float], dark: bool) -> Layout:
+    """Return flats of eight levels, each at two exposure times in turn."""
+    flats = [
+        Taken(f"flat-{i}-{j}", "flat", time, None, (0, 1))
+        for i in range(8)
+        for j, time in enumerate(times)
+    ]
+    darks = [Taken("dark", "dark", times[0], 0.0, (0, 1))] if dark else []
+    signal = {(own.name, "MONO"): 200.0 * (k // 2 + 1) + k % 2 for k, own in enumerate(flats)}
+    signal |= {(own.name, "MONO"): 0.0 for own in darks}
+    variance = {place: 4 + 0.1 * value for place, value in signal.items()}
+    return Layout((*darks, *flats), *SHAPE, Cfa.MONO, 0.0, 4095.0, signal, variance)
+
+
+@pytest.mark.parametrize("dark", [True, False])
+@pytest.mark.parametrize("times", [(0.01, 0.02), (0.01, 0.0100001)])
+def test_levels_at_two_exposure_times_tell_what_grows_with_light(
+    times: tuple[float, float], dark: bool
+) -> None:
+    """Every second of them has one time alone: what grows with it would be told from nothing."""
+    layout, flat = _of_levels(times, dark), np.zeros(SHAPE)
+    clues: Any = Stub(
+        layout=layout,
+        image=lambda _: {"MONO": (flat, 1.0)},
+        camera=camera(),
+        scale=lambda name, channel: layout.regressors(channel).scales[name],
+    )
+    lean = effect("shading", falloff_percent=0.0, tilt_down_percent=2.0)
+    image = gains_beside(clues, [lean])
+    assert image is not None
+    # A tilt from 2 % less to 2 % more at the edges, taken off even gains.
+    assert np.ptp(image) == pytest.approx(4 * (SHAPE[0] - 1) / SHAPE[0], rel=1e-3)
+    assert abs(np.corrcoef(image.mean(1), Y[:, 0])[0, 1]) > 0.999
+
+
 def _state(image: np.ndarray, *effects: Any) -> Any:
     clues: Any = Stub(
         layout=Stub(
@@ -183,6 +219,25 @@ def test_uneven_light_is_denied_by_what_is_as_likely(
     if said is not None:
         assert said.share < 0.5
         assert cause.value in said.why
+
+
+@pytest.mark.parametrize(("offset", "denied"), [(0.0, True), (0.001, True), (8.0, False)])
+def test_a_decay_with_an_offset_is_asked_unless_that_is_sure(
+    monkeypatch: pytest.MonkeyPatch, offset: float, denied: bool
+) -> None:
+    """The map of gains leans, and no more: a decay of it may be light as well."""
+    image = _shaped(Cause.LIGHT, 14.0, 3)
+    monkeypatch.setattr("analysis.mismatch.rivalled.gains_beside", lambda *_: image)
+    one = effect(
+        "line_settling", offset_dn=offset, gain_percent=0.3, length_pixels=20.0, edge="bottom"
+    )
+    state = _state(image, one)
+    rng = np.random.default_rng(4)
+    dark = offset * np.exp(-LINE[::-1] / 20.0) + rng.normal(0, 1.0, SHAPE)
+    state.setting = Stub(
+        layout=state.clues().layout, seen=Stub(images={("MONO", "offset"): (dark, 1.0)})
+    )
+    assert (rivalled(state, one) is not None) == denied
 
 
 def test_only_uneven_gains_are_asked_of_the_map() -> None:

@@ -5,7 +5,7 @@ import pytest
 
 from analysis.mismatch.finding import Gain
 from analysis.mismatch.prove import Loglik, gap_closed, heldout_gain
-from analysis.mismatch.trial import _denied
+from analysis.mismatch.trial import denied
 
 
 def test_intervals_cover() -> None:
@@ -104,7 +104,7 @@ def test_gap_is_not_that_of_numbers_nearly_without_spread() -> None:
 
 def test_pixels_deny_an_effect_only_where_they_are_a_hundred_times_against_it() -> None:
     """Parameters were fitted to other frames: what hardly shows costs a nat or two in all."""
-    assert not _denied(Gain(-0.2, (-0.25, -0.15)), 14)
-    assert _denied(Gain(-0.5, (-0.6, -0.4)), 14)
-    assert not _denied(Gain(-0.5, (-1.2, 0.2)), 14)
-    assert _denied(Gain(float("nan"), (float("nan"), float("nan"))), 14)
+    assert not denied(Gain(-0.2, (-0.25, -0.15)), 14)
+    assert denied(Gain(-0.5, (-0.6, -0.4)), 14)
+    assert not denied(Gain(-0.5, (-1.2, 0.2)), 14)
+    assert denied(Gain(float("nan"), (float("nan"), float("nan"))), 14)

@@ -11,20 +11,36 @@ from exposing import effect
 
 SHAPE = (96, 64)
 NOISE = 1.0
-LENGTHS = np.geomspace(1.0, 24.0, 16)  # of decays that are sane on 96 rows
+LENGTHS = np.geomspace(1.0, 24.0, 16)  # of decays, up to a quarter of the rows
+SITES = {
+    "mono": {"MONO": (0, 0)},
+    "mosaic": {"R": (0, 0), "Gr": (0, 1), "Gb": (1, 0), "B": (1, 1)},
+}
 
 
-def _state(means: np.ndarray, rng: np.random.Generator) -> Any:
-    """Return a recording whose map of gains has these row means beside white noise."""
-    image = means[:, None] + rng.normal(0, NOISE, SHAPE)
-    layout = Stub(rows=SHAPE[0], columns=SHAPE[1], sites={"MONO": (0, 0)})
-    return Stub(setting=Stub(layout=layout, seen=Stub(images={("MONO", "gain"): (image, NOISE)})))
+def _state(means: np.ndarray, rng: np.random.Generator, sites: str = "mono") -> Any:
+    """Return a recording whose map of gains has these row means beside white noise.
+
+    Channels of a mosaic have signals of different size.
+    """
+    image, step = means[:, None] + rng.normal(0, NOISE, SHAPE), 1 + (sites == "mosaic")
+    scales = dict(zip(SITES[sites], (500.0, 1000.0, 1000.0, 700.0), strict=False))
+    layout = Stub(
+        rows=SHAPE[0],
+        columns=SHAPE[1],
+        sites=SITES[sites],
+        regressors=lambda channel: Stub(scales={"gain": scales[channel]}),
+    )
+    images = {
+        (channel, "gain"): (image[y::step, x::step] * scales[channel], NOISE * scales[channel])
+        for channel, (y, x) in SITES[sites].items()
+    }
+    return Stub(setting=Stub(layout=layout, seen=Stub(images=images)), image=image)
 
 
 def _best(state: Any) -> Any:
     """Return the decay that fits the row means best, of both edges and all lengths."""
-    image = state.setting.seen.images["MONO", "gain"][0]
-    means = image.mean(1) - image.mean()
+    means = state.image.mean(1) - state.image.mean()
     gains = {}
     for edge, distance in (("top", np.arange(96.0)), ("bottom", np.arange(96.0)[::-1])):
         for length in LENGTHS:
@@ -37,7 +53,8 @@ def _best(state: Any) -> Any:
 
 @pytest.mark.parametrize("degree", [2, 3, 4])
 @pytest.mark.parametrize("strength", [10.0, 20.0, 40.0])
-def test_smooth_light_is_rarely_taken_for_a_decay(degree: int, strength: float) -> None:
+@pytest.mark.parametrize("sites", SITES)
+def test_smooth_light_is_rarely_taken_for_a_decay(sites: str, degree: int, strength: float) -> None:
     """At odds of 20, in one of 20 at most: light that falls from one edge, and any other."""
     rng, draws = np.random.default_rng(int(strength) + degree), 100
     u = np.linspace(-1, 1, SHAPE[0])
@@ -50,19 +67,20 @@ def test_smooth_light_is_rarely_taken_for_a_decay(degree: int, strength: float) 
         for name, light in lights.items():
             own = light - light.mean()
             own *= strength * NOISE / np.sqrt(SHAPE[1]) / np.linalg.norm(own)
-            state = _state(own, rng)
+            state = _state(own, rng, sites)
             taken[name] += outlined(state, _best(state))
     assert max(taken.values()) <= 0.05 * draws + 5 * np.sqrt(0.05 * draws)
 
 
 @pytest.mark.parametrize("length", [3.0, 6.0, 10.0])
-def test_a_decay_is_told(length: float) -> None:
+@pytest.mark.parametrize("sites", SITES)
+def test_a_decay_is_told(sites: str, length: float) -> None:
     rng, draws, found = np.random.default_rng(5), 40, 0
     for _ in range(draws):
         own = np.exp(-np.arange(96.0)[::-1] / length)
         own -= own.mean()
         own *= 15 * NOISE / np.sqrt(SHAPE[1]) / np.linalg.norm(own)
-        state = _state(own, rng)
+        state = _state(own, rng, sites)
         found += outlined(state, _best(state))
     assert found > 0.7 * draws
 

@@ -5,7 +5,7 @@ import pytest
 from numpy.typing import NDArray
 
 from analysis.mismatch import phaselaw
-from analysis.mismatch.phaselaw import kept_rather_than_free
+from analysis.mismatch.phaselaw import kept_rather_than_free, moving_on, there
 
 Complex = NDArray[np.complex128]
 
@@ -80,3 +80,19 @@ def test_of_many_frames_what_they_share_is_integrated_as_finely_as_it_is_known(
     monkeypatch.setattr(phaselaw, "_STEP", 0.05)
     fine, finer = phaselaw._likelihoods(found, 1.5)
     assert one.max() - other == pytest.approx(fine.max() - finer, abs=0.3)
+
+
+@pytest.mark.parametrize("amplitude", [3.0, 10.0, 20.0, 100.0])
+def test_phases_at_random_are_not_taken_for_ones_that_move_on(amplitude: float) -> None:
+    """However strong the line is: some share of a turn fits six phases within some tenths."""
+    rng, frames = np.random.default_rng(int(amplitude)), np.arange(6.0)
+    told, steady = [], []
+    for _ in range(60):
+        phases = np.exp(2j * np.pi * rng.random(6))
+        moving = np.exp(2j * np.pi * (rng.random() * frames + rng.random()))
+        for found, some in ((phases, told), (moving, steady)):
+            own = [amplitude * found + _noise(rng, 6)]
+            free = there(own, [amplitude], kept=False, real=False)
+            some.append(moving_on(own, [frames], [amplitude]) - free)
+    assert np.mean(np.array(told) > np.log(20)) <= 0.1
+    assert np.median(told) < 0 < np.median(steady)

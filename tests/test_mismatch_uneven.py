@@ -109,6 +109,22 @@ def test_a_dark_current_is_told_as_soon_as_a_glow_would_show() -> None:
     assert sum(_weak(2.0, np.ones((64, 96)), seed) is None for seed in range(40)) <= 4
 
 
+@pytest.mark.parametrize("scatter", [1.5, 3.0])
+def test_pixels_that_differ_in_dark_current_are_its_noise(scatter: float) -> None:
+    """Of a dark current that is as sure beside them: as often believed as without.
+
+    Both maps differ alike: they tell what one does.
+    """
+    told = 0
+    for seed in range(40):
+        own = np.random.default_rng([seed, 9]).normal(size=(64, 96))
+        growth = scatter * 12 * NOISE_DN / (64 * 96) ** 0.5
+        differing = NOISE_DN * (scatter**2 - 1) ** 0.5 * own
+        one = registry()["dark_current"](dn_per_s=growth / TIME_S)
+        told += uneven(_state(growth + differing, left=(2.0, 2.0), seed=seed), one) is None
+    assert told >= 34
+
+
 @pytest.mark.parametrize(
     ("square", "along", "precision"), [(3.0, 1.0, 30.0), (20.0, 24.0, 8.0), (0.5, -3.0, 100.0)]
 )

@@ -11,7 +11,7 @@ from analysis.mismatch.judge import Judge
 from analysis.mismatch.name import Search
 from analysis.mismatch.named import Named, unclear
 from analysis.mismatch.state import State
-from analysis.mismatch.trial import Gained, Trial, exceeds
+from analysis.mismatch.trial import Gained, Trial, denied, exceeds
 from dsis.camera import Camera
 
 _DOUBTFUL = 30.0  # gain of log-likelihood below which locked frames may not confirm an effect
@@ -109,9 +109,13 @@ def _gained(search: Search, final: State, trial: Trial) -> dict[str, Gained]:
         told = trial.gains(final, cameras)
         for named in some:
             one = told[named.name]
-            if not one.certain:
-                told[named.name] = one = _foretold(named, cameras[named.name], trial) or one
-            if one.certain or not exceeds(one.gain):
+            if one.certain or denied(one.gain, trial.numbers.frames):
+                continue
+            other = _foretold(named, cameras[named.name], trial)
+            if other is not None and other.certain:
+                told[named.name] = other
+                continue
+            if not any(exceeds(gained.gain) for gained in (one, other) if gained is not None):
                 continue
             if shown_by_all(search, final, named, cameras[named.name], trial):
                 told[named.name] = replace(one, certain=True)

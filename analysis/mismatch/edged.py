@@ -81,23 +81,27 @@ def outlined(state: State, effect: Effect) -> bool:
     layout, images = state.setting.layout, state.setting.seen.images
     axis = int(effect.edge in ("left", "right"))
     size = (layout.rows, layout.columns)[axis]
-    told = np.zeros(SMOOTH_DEGREE + 1)  # of a decay over light of each degree
+    parts: list[tuple[Array, Array]] = []  # means, and light of each degree and the decay
     for (channel, name), (image, noise) in images.items():
         if name != "gain":
             continue
         step = 1 if channel == "MONO" else 2
         line = layout.sites[channel][axis] + step * np.arange(image.shape[axis])
         distance = line if effect.edge in ("left", "top") else size - 1 - line
-        decay = np.exp(-distance / effect.gain_length)
-        means = image.mean(1 - axis)
-        places = np.linspace(-1, 1, line.size)
-        light = np.asarray(np.polynomial.legendre.legvander(places, SMOOTH_DEGREE), np.float64)
-        left = np.array([_left(means, light[:, : k + 1]) for k in range(SMOOTH_DEGREE + 1)])
-        own = _left(means, np.stack([light[:, 0], decay], 1))
-        # Lines scatter beyond the noise of their pixels, in what neither explains.
-        square = line_square(beyond_smooth(means), noise, image.shape[1 - axis])
-        told += (left - own) / square / 2 + np.log(line.size) / 2 * np.arange(SMOOTH_DEGREE + 1)
-        told -= np.log(line.size)  # of the decay's size and length
+        light = np.polynomial.legendre.legvander(2 * line / (size - 1) - 1, SMOOTH_DEGREE)[:, 1:]
+        shapes = np.column_stack([light, np.exp(-distance / effect.gain_length)])
+        means, scale = image.mean(1 - axis), layout.regressors(channel).scales["gain"]
+        # Lines scatter beyond the noise of their pixels, in what neither explains. All channels
+        # have one light and one decay, and each its own mean.
+        error = line_square(beyond_smooth(means), noise, image.shape[1 - axis]) ** 0.5
+        parts.append(((means - means.mean()) / error, (shapes - shapes.mean(0)) * scale / error))
+    if not parts:
+        return False
+    values, design = (np.concatenate(own) for own in zip(*parts, strict=True))
+    degrees = range(SMOOTH_DEGREE + 1)
+    left = np.array([_left(values, design[:, :k]) for k in degrees])
+    told = (left - _left(values, design[:, -1:])) / 2 + np.log(len(values)) * np.array(degrees) / 2
+    told -= np.log(len(values))  # of the decay's size and length
     return bool(told.min() > TOLD_APART)
 
 

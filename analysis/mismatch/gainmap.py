@@ -1,6 +1,7 @@
 """The gain's map beside what is known to be uneven: what no effect explains of it."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -27,30 +28,53 @@ def gains_beside(clues: Clues, effects: Sequence[Effect]) -> Array | None:
     if set(images) != set(layout.sites):
         return None
     grid, step = PixelGrid(layout.rows, layout.columns, layout.cfa), 1 + (len(layout.sites) > 1)
+    if not any(_moves(own) for own in effects):
+        return _whole(clues, images, {})
     made = {}
     for taken in _some(layout):
         even = np.zeros(grid.shape, np.float32)
         for channel, (y, x) in layout.sites.items():
             even[y::step, x::step] = max(layout.signal_dn[taken.name, channel], 0.0)
         made[taken.name] = mean_frame(even, effects, grid, clues.camera.read_out, taken)
-    whole = np.zeros(grid.shape)
+    return _whole(clues, images, made)
+
+
+def _whole(
+    clues: Clues, images: Mapping[str, tuple[Array, float]], made: Mapping[str, Image]
+) -> Array:
+    """Return the map of all channels, %, less that of noiseless frames that were made."""
+    layout, step = clues.layout, 1 + (len(clues.layout.sites) > 1)
+    whole = np.zeros((layout.rows, layout.columns))
     for channel, (image, _) in images.items():
         y, x = layout.sites[channel]
-        sums = PatternSums(layout.regressors(channel), (image.shape[0], image.shape[1]))
-        for name in sorted(sums.regressors.rows.keys() & made.keys()):
-            frame = np.ascontiguousarray(made[name][y::step, x::step], np.float64)
-            sums.add(name, frame, 1.0, 1)
-        own = image - sums.maps()["gain"][0]
+        own = image
+        if made:
+            sums = PatternSums(layout.regressors(channel), (image.shape[0], image.shape[1]))
+            for name in sorted(sums.regressors.rows.keys() & made.keys()):
+                frame = np.ascontiguousarray(made[name][y::step, x::step], np.float64)
+                sums.add(name, frame, 1.0, 1)
+            own = image - sums.maps()["gain"][0]
         whole[y::step, x::step] = (own - own.mean()) * 100 / clues.scale("gain", channel)
     return whole
 
 
-def _some(layout: Layout) -> list[Taken]:
-    """Return the exposures that tell what effects make of light: all darks, and flats of many."""
+def _some(layout: Layout) -> Sequence[Taken]:
+    """Return the exposures that tell what effects make of light: all darks, and flats of many.
+
+    All, where fewer do not tell what grows with light from what grows with exposure time.
+    """
     darks = [own for own in layout.uniform if own.kind == "dark"]
     flats = [own for own in layout.uniform if own.kind != "dark"]
     flats.sort(key=lambda own: layout.signal_dn[own.name, layout.channels[0]])
-    return darks + flats[:: max(len(flats) // _MOST, 1)]
+    some = darks + flats[:: max(len(flats) // _MOST, 1)]
+    of_some = replace(layout, exposures=tuple(some))
+    tell = all(of_some.regressors(c).names == layout.regressors(c).names for c in layout.channels)
+    return some if tell else layout.uniform
+
+
+def _moves(effect: Effect) -> bool:
+    """Return whether an effect may make something of even light that has an expected shape."""
+    return not effect.draws and effect.stage is not Stage.CODE
 
 
 def mean_frame(
@@ -62,7 +86,7 @@ def mean_frame(
     """
     image = light
     for own in sorted(effects, key=lambda one: (one.stage, one.rank, one.kind)):
-        if own.draws or own.stage is Stage.CODE:
+        if not _moves(own):
             continue
         exposure = Exposure(
             grid, 0, Draw(0), Draw(0), light, read_out, partial(_alike, image),

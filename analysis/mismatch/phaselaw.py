@@ -86,7 +86,8 @@ def moving_on(
     As lamps on mains do where frames follow one another at one rate. A mean over amplitudes about
     those given; over the first phase and the share of a turn, of each exposure its own. What frames
     of an exposure share is integrated out: of the line too, where w are its turns, so that it has
-    a^2 sum |w - mean w|^2 left, and the mean over the first phase is a Bessel function.
+    a^2 sum |w - mean w|^2 left, and the mean over the first phase is a Bessel function. Of strong
+    lines less is returned, as by `there`: some turn fits few phases of any line that is strong.
 
     Parameters
     ----------
@@ -102,8 +103,9 @@ def moving_on(
         turns -= turns.mean(1, keepdims=True)
         size, square = np.abs(np.conj(turns) @ own), (np.abs(turns) ** 2).sum(1)
         for i, strength in enumerate(_STRENGTHS):
-            a = strength * amplitude
-            each = np.log(scipy.special.i0e(2 * a * size)) + 2 * a * size - a**2 * square
+            scale = _MOST / max(strength * amplitude, _MOST)
+            a, seen = strength * amplitude * scale, size * scale
+            each = np.log(scipy.special.i0e(2 * a * seen)) + 2 * a * seen - a**2 * square
             line[i] += scipy.special.logsumexp(each) - np.log(count)
     return float(scipy.special.logsumexp(line) - np.log(line.size))
 

@@ -18,7 +18,8 @@ from dsis.cfa import Cfa
 from dsis.effects import Effect
 
 Array = NDArray[np.float64]
-_ROUNDS = 8  # each leaves a share of what the last one changed, no larger than what is exchanged
+_ROUNDS = 60  # each leaves a share of what the last one changed: more, the more is exchanged
+_SAME, _NEAR = 1e-6, 1e-3  # of a level: as good as recorded, and near enough
 _TILES = 6  # of two rows and columns: the middle ones know of no border
 
 
@@ -26,7 +27,8 @@ def relit(model: Model, camera: Camera, layout: Layout) -> Model:
     """Return the model with another camera, under light that gives the levels of its own one.
 
     Both greens have one light. Where the light of flats is known, a colour's is off by the same
-    share in all of them; where it is not, by its own in each.
+    share in all of them; where it is not, by its own in each. Where no light gives these levels, it
+    stays as it is. So does that of scenes.
     """
     made = model.with_camera(camera)
     if layout.cfa is Cfa.MONO:
@@ -38,12 +40,20 @@ def relit(model: Model, camera: Camera, layout: Layout) -> Model:
     signals = np.stack([model.signals[e.name] for e in flats])
     wanted = _of_colours(np.stack([exchanged(before, own) for own in signals]), layout.cfa)
     known = np.array([e.light is not None for e in flats])
+    off = np.inf
     for _ in range(_ROUNDS):
         got = _of_colours(np.stack([exchanged(after, own) for own in signals]), layout.cfa)
+        if not (got > 0).all():
+            return made
         ratio = wanted / got
         if known.any():
             ratio[known] = ratio[known].mean(0)
+        off = float(np.abs(ratio - 1).max())
+        if off < _SAME:
+            break
         signals = signals * ratio
+    if off > _NEAR:
+        return made
     names = [e.name for e in flats]
     return replace(made, signals={**model.signals, **dict(zip(names, signals, strict=True))})
 

@@ -63,7 +63,7 @@ def _of_pixels(gain: Gain, frames: int) -> Gained:
     return Gained(gain, exceeds(gain) and (gain.ci95[0] > 0 or total > _TOTAL))
 
 
-def _denied(gain: Gain, frames: int) -> bool:
+def denied(gain: Gain, frames: int) -> bool:
     """Return whether the pixels of the locked frames are sure that an effect makes it worse.
 
     Intervals tell how frames scatter. They do not know that parameters were fitted to others: of an
@@ -151,7 +151,7 @@ class Trial:
             frames = sum(whole.frames[name].size for name in telling(less, whole))
             found[kind] = _of_pixels(heldout_gain(less, whole, seed=self.seed), frames)
             # Where the pixels are sure that it is worse, sums of numbers do not overrule them.
-            if not found[kind].certain and not _denied(found[kind].gain, frames):
+            if not found[kind].certain and not denied(found[kind].gain, frames):
                 told = self.numbers.gain(final, camera)
                 if told is not None and told.certain:
                     found[kind] = Gained(_per_frame(told, self.numbers.frames), certain=True)

@@ -1,7 +1,7 @@
 """Dark current that parts of a sensor do not have: something else grows with exposure time."""
 
 from itertools import product
-from math import exp, log
+from math import exp, log, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,9 +69,14 @@ def _glowing(state: State, effect: DarkCurrent) -> Denial | None:
 
     Of a glow of shape g and mean m the map is m (g / mean(g) - 1) and noise: m is known as well as
     pixels tell, a normal variate, over which the likelihood ratio is integrated in closed form; so
-    it is over all places and extents that a glow is looked for in, each as likely.
+    it is over all places and extents that a glow is looked for in, each as likely. Noise is that of
+    the map's pixels where they scatter more than frames alone make them.
     """
-    maps = {c: own for (c, name), own in state.setting.seen.images.items() if name == "time"}
+    maps = {
+        c: (image, max(noise, _scatter(image)))
+        for (c, name), (image, noise) in state.setting.seen.images.items()
+        if name == "time"
+    }
     if not maps:
         return None
     layout, ratios = state.setting.layout, []
@@ -106,9 +111,14 @@ def _ratio(square: float, along: float, precision: float) -> float:
 
 def _seen(image: Array) -> Array:
     """Return a map, of noise 1, less its mean; pixels far out count as so far."""
-    rest = image - image.mean()
-    limit = _FAR_OUT * (float(np.median(rest**2)) / _MEDIAN) ** 0.5
-    return np.asarray(np.clip(rest, -limit, limit))
+    limit = _FAR_OUT * _scatter(image)
+    return np.asarray(np.clip(image - image.mean(), -limit, limit))
+
+
+def _scatter(image: Array) -> float:
+    """Return the standard deviation of a map about its mean, of the many."""
+    square = float(np.median((image - image.mean()) ** 2)) / _MEDIAN
+    return sqrt(square)
 
 
 def _parts(image: Array) -> Array:

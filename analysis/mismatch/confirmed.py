@@ -109,9 +109,11 @@ def _gained(search: Search, final: State, trial: Trial) -> dict[str, Gained]:
         told = trial.gains(final, cameras)
         for named in some:
             one = told[named.name]
-            if one.certain or denied(one.gain, trial.numbers.frames):
+            if one.certain:
                 continue
             other = _foretold(named, cameras[named.name], trial)
+            if other is not None and denied(one.gain, trial.numbers.frames):
+                continue  # pixels are sure that it is worse
             if other is not None and other.certain:
                 told[named.name] = other
                 continue

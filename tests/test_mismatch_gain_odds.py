@@ -24,6 +24,7 @@ from analysis.mismatch.source import Source
 from analysis.mismatch.split import Split
 from analysis.mismatch.taking import layout_of
 from dsis.cfa import Cfa
+from dsis.effects import Effect
 from exposing import effect
 from mismatch_recordings import InMemory, camera, recorded
 
@@ -191,15 +192,12 @@ def test_levels_at_two_exposure_times_tell_what_grows_with_light(
     assert abs(np.corrcoef(image.mean(1), Y[:, 0])[0, 1]) > 0.999
 
 
-def _state(image: np.ndarray, *effects: Any) -> Any:
-    clues: Any = Stub(
-        layout=Stub(
-            sites={"MONO": (0, 0)}, rows=SHAPE[0], columns=SHAPE[1], cfa=Cfa.MONO, uniform=(),
-            regressors=lambda _: Stub(rows={}),
-        ),
-        image=lambda _: {"MONO": (image, 1.0)},
-    )  # fmt: skip
-    return Stub(clues=lambda: clues, camera=camera(*effects))
+def _state(own: Effect, **images: np.ndarray) -> Any:
+    """Return the state of a camera with an effect, whose maps are of noise 1."""
+    layout = Layout((), *SHAPE, Cfa.MONO, 0.0, 4095.0, {}, {})
+    seen = Stub(images={("MONO", name): (image, 1.0) for name, image in images.items()})
+    setting = Stub(layout=layout, seen=seen)
+    return Stub(clues=lambda: None, camera=camera(own), setting=setting)
 
 
 LEANING = {"falloff_percent": 0.0, "tilt_right_percent": 0.3}
@@ -214,7 +212,7 @@ def test_uneven_light_is_denied_by_what_is_as_likely(
     image = _shaped(cause, 12.0, 3)
     monkeypatch.setattr("analysis.mismatch.rivalled.gains_beside", lambda *_: image)
     one = effect("shading", **LEANING)
-    said = rivalled(_state(image, one), one)
+    said = rivalled(_state(one), one)
     assert (said is not None) == denied
     if said is not None:
         assert said.share < 0.5
@@ -231,23 +229,18 @@ def test_a_decay_with_an_offset_is_asked_unless_that_is_sure(
     one = effect(
         "line_settling", offset_dn=offset, gain_percent=0.3, length_pixels=20.0, edge="bottom"
     )
-    state = _state(image, one)
     rng = np.random.default_rng(4)
     dark = offset * np.exp(-LINE[::-1] / 20.0) + rng.normal(0, 1.0, SHAPE)
-    state.setting = Stub(
-        layout=state.clues().layout, seen=Stub(images={("MONO", "offset"): (dark, 1.0)})
-    )
-    assert (rivalled(state, one) is not None) == denied
+    assert (rivalled(_state(one, offset=dark), one) is not None) == denied
 
 
 def test_only_uneven_gains_are_asked_of_the_map() -> None:
-    state = _state(np.random.default_rng(1).normal(size=SHAPE))
     for one in (
         effect("prnu", sigma_percent=1.0),
         effect("tap_mismatch", gain_percent=1.0, regions="even_odd_rows"),
         effect("line_settling", offset_dn=2.0, gain_percent=0.0, length_pixels=4.0, edge="left"),
     ):
-        assert rivalled(state, one) is None
+        assert rivalled(_state(one), one) is None
 
 
 def test_a_decay_without_its_word_is_no_uneven_light() -> None:

@@ -10,25 +10,19 @@ from hypothesis import strategies as st
 from analysis.mismatch.layout import Layout, Taken, sites
 from analysis.mismatch.model import Model
 from analysis.mismatch.relit import exchanged, relit
-from dsis.camera import BaseNoise, Camera, Segment
+from dsis.camera import Camera
 from dsis.cfa import Cfa
 from dsis.effects import Effect
 from dsis.effects.brighter_fatter import BrighterFatter
 from dsis.effects.crosstalk import Crosstalk
 from dsis.effects.dsnu import Dsnu
-
-PLAIN = Camera(
-    name="plain",
-    cfa=Cfa.GBRG,
-    black_level=512,
-    white_level=16383,
-    bit_depth=14,
-    noise=BaseNoise(segment=(Segment(slope=0.4, intercept=8.0),)),
-)
+from mismatch_recordings import camera
 
 
 def having(*effects: Effect) -> Camera:
-    return PLAIN.model_copy(update={"effect": effects})
+    """Return a camera whose highest code levels stay far below."""
+    deep = {"black_level": 512, "white_level": 16383, "bit_depth": 14}
+    return camera(*effects, cfa="GBRG").model_copy(update=deep)
 
 
 def layout_of(lights: list[float | None], cfa: Cfa = Cfa.GBRG) -> Layout:
@@ -81,7 +75,7 @@ def test_with_crosstalk_besides_every_colour_keeps_its_level(
 ) -> None:
     effect = Crosstalk.model_validate({"fraction": fraction, "along": along})
     recorded = signals_of([500.0, 1000.0, 2000.0], COLOURS | {"R": red})
-    made = relit(Model(PLAIN, recorded), having(effect), layout_of(lights))
+    made = relit(Model(having(), recorded), having(effect), layout_of(lights))
     where = sites(Cfa.GBRG)
     for name, signal in recorded.items():
         light, levels = made.signals[name], by_matrix(effect, made.signals[name])
@@ -95,30 +89,30 @@ def test_with_crosstalk_besides_every_colour_keeps_its_level(
 def test_where_no_light_gives_the_levels_it_stays() -> None:
     """Red alone has less than its neighbours give it."""
     recorded = signals_of([500.0, 1000.0], COLOURS | {"R": 0.05})
-    made = relit(Model(PLAIN, recorded), having(Crosstalk(fraction=0.2)), layout_of([1.0, 2.0]))
+    made = relit(Model(having(), recorded), having(Crosstalk(fraction=0.2)), layout_of([1.0, 2.0]))
     assert made.signals is recorded
 
 
 def test_without_it_the_light_is_what_it_had_been() -> None:
     light, layout = signals_of([500.0, 1000.0], COLOURS), layout_of([1.0, 2.0])
-    camera = having(Crosstalk(fraction=0.02))
+    own = having(Crosstalk(fraction=0.02))
     # Light whose levels with the effect are those of other light without it, and back.
-    bare = relit(Model(camera, light), PLAIN, layout)
-    again = relit(bare, camera, layout)
+    bare = relit(Model(own, light), having(), layout)
+    again = relit(bare, own, layout)
     for name, signal in light.items():
-        np.testing.assert_allclose(bare.signals[name], exchanged(camera.effect, signal), rtol=1e-5)
+        np.testing.assert_allclose(bare.signals[name], exchanged(own.effect, signal), rtol=1e-5)
         np.testing.assert_allclose(again.signals[name], signal, rtol=1e-5)
 
 
 def test_light_that_is_known_keeps_its_ratios_though_an_exchange_grows() -> None:
     recorded = signals_of([500.0, 5000.0], COLOURS)
-    camera = having(BrighterFatter(per_dn=5e-6))
-    known = relit(Model(PLAIN, recorded), camera, layout_of([1.0, 10.0])).signals
+    own = having(BrighterFatter(per_dn=5e-6))
+    known = relit(Model(having(), recorded), own, layout_of([1.0, 10.0])).signals
     np.testing.assert_allclose(known["flat-1"], 10 * known["flat-0"], rtol=1e-9)
-    unknown = relit(Model(PLAIN, recorded), camera, layout_of([None, None])).signals
+    unknown = relit(Model(having(), recorded), own, layout_of([None, None])).signals
     red = sites(Cfa.GBRG)["R"]
     for name in ("flat-0", "flat-1"):
-        levels = exchanged(camera.effect, unknown[name])
+        levels = exchanged(own.effect, unknown[name])
         assert levels[red] == pytest.approx(recorded[name][red], rel=1e-5)
     # Neighbours that are brighter give to what is darker, the more the brighter all is.
     shares = [unknown[name][red] / recorded[name][red] for name in ("flat-0", "flat-1")]
@@ -129,7 +123,7 @@ def test_light_that_is_known_keeps_its_ratios_though_an_exchange_grows() -> None
 def test_where_no_colours_exchange_charge_the_light_stays(cfa: Cfa) -> None:
     signals = signals_of([500.0, 1000.0], COLOURS)
     effect = Crosstalk(fraction=0.02) if cfa is Cfa.MONO else Dsnu(sigma_dn=2.0)
-    plain = replace(Model(PLAIN, signals))
+    plain = replace(Model(having(), signals))
     made = relit(plain, having(effect), layout_of([1.0, 2.0], cfa))
     assert made.signals is signals
     assert made.camera == having(effect)

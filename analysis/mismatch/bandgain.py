@@ -1,8 +1,8 @@
 """What whole frames gain by bands of light: a wave down the rows, in proportion to the signal.
 
 Its phase is another in every frame, and where the lamp and the frames keep their rates moves on
-steadily. A single number of the bank, the largest power of many, says
-less of bands that few exposures show.
+steadily. A single number of the bank, the largest power of many, says less of bands that few
+exposures show.
 """
 
 from collections.abc import Mapping, Sequence

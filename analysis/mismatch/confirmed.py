@@ -111,15 +111,12 @@ def _gained(search: Search, final: State, trial: Trial) -> dict[str, Gained]:
             one = told[named.name]
             if one.certain:
                 continue
-            other = _foretold(named, cameras[named.name], trial)
-            if other is not None and denied(one.gain, trial.numbers.frames):
-                continue  # pixels are sure that it is worse
-            if other is not None and other.certain:
+            other = _foretold(named, cameras[named.name], trial, one)
+            if other.certain:
                 told[named.name] = other
-                continue
-            if not any(exceeds(gained.gain) for gained in (one, other) if gained is not None):
-                continue
-            if shown_by_all(search, final, named, cameras[named.name], trial):
+            elif (exceeds(one.gain) or exceeds(other.gain)) and shown_by_all(
+                search, final, named, cameras[named.name], trial
+            ):
                 told[named.name] = replace(one, certain=True)
         found |= told
         if not all(one.certain for one in found.values()):
@@ -127,18 +124,19 @@ def _gained(search: Search, final: State, trial: Trial) -> dict[str, Gained]:
     return found
 
 
-def _foretold(named: Named, without: Camera, trial: Trial) -> Gained | None:
-    """Return what locked frames gain by bands that the others foretell; None: by no such effect.
+def _foretold(named: Named, without: Camera, trial: Trial, told: Gained) -> Gained:
+    """Return what locked frames gain by bands that the others foretell; of no such effect: `told`.
 
-    Pixels know nothing of a phase that moves on. `without` is the camera without the effect: beside
-    bands that it has at the same place nothing is said.
+    Pixels know nothing of a phase that moves on; but what they are sure of is not asked again.
+    `without` is the camera without the effect: beside bands that it has at the same place nothing
+    is said.
     """
-    if named.proposal is None:
-        return None
+    if named.proposal is None or denied(told.gain, trial.numbers.frames):
+        return told
     effect, layout = named.proposal.effect, trial.numbers.whole[0]
     if any(same_place(effect, one, layout) for one in without.effect):
-        return None
-    return trial.foretold(effect)
+        return told
+    return trial.foretold(effect) or told
 
 
 def _fitted_without(search: Search, final: State, some: Sequence[Named]) -> dict[str, Camera]:

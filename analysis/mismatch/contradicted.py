@@ -1,6 +1,7 @@
 """Effects that the very statistics which call for them deny."""
 
 from dataclasses import dataclass, replace
+from math import exp
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +10,7 @@ from analysis.mismatch.candidates import CANDIDATES
 from analysis.mismatch.credited import joined
 from analysis.mismatch.polish import Polished
 from analysis.mismatch.predict import Predictor
+from analysis.mismatch.rank import TOLD_APART
 from analysis.mismatch.state import State
 from analysis.mismatch.words import statistic_words
 from dsis.camera import Camera
@@ -18,6 +20,7 @@ _LEAST_SHARE = 0.5  # of what an effect predicts, that a recording must show
 _SURE = 2.0  # standard errors below it: 3.5 below what the right effect shows
 _ALONE = " alone"
 _CLEAR = 3.0  # standard deviations: a predicted change that can be seen at all
+_LARGEST = 700.0  # of an exponent
 
 
 @dataclass(frozen=True)
@@ -26,6 +29,14 @@ class Denial:
 
     share: float
     why: str
+
+
+def rival(behind: float, why: str) -> Denial | None:
+    """Return how an effect is denied that is `behind` another cause, in log-likelihood.
+
+    None: it is likelier at odds of 20. The share is the probability that it is the cause.
+    """
+    return None if behind <= -TOLD_APART else Denial(1 / (1 + exp(min(behind, _LARGEST))), why)
 
 
 def contradicted(

@@ -85,10 +85,9 @@ def outlined(state: State, effect: Effect) -> bool:
     for (channel, name), (image, noise) in images.items():
         if name != "gain":
             continue
-        step = 1 if channel == "MONO" else 2
-        line = layout.sites[channel][axis] + step * np.arange(image.shape[axis])
-        distance = line if effect.edge in ("left", "top") else size - 1 - line
-        light = np.polynomial.legendre.legvander(2 * line / (size - 1) - 1, SMOOTH_DEGREE)[:, 1:]
+        distance = layout.from_edge(channel, effect.edge)
+        place = 2 * distance / (size - 1) - 1
+        light = np.polynomial.legendre.legvander(place, SMOOTH_DEGREE)[:, 1:]
         shapes = np.column_stack([light, np.exp(-distance / effect.gain_length)])
         means, scale = image.mean(1 - axis), layout.regressors(channel).scales["gain"]
         # Lines scatter beyond the noise of their pixels, in what neither explains. All channels
@@ -103,6 +102,26 @@ def outlined(state: State, effect: Effect) -> bool:
     told = (left - _left(values, design[:, -1:])) / 2 + np.log(len(values)) * np.array(degrees) / 2
     told -= np.log(len(values))  # of the decay's size and length
     return bool(told.min() > TOLD_APART)
+
+
+def settles(state: State, effect: LineSettling) -> bool:
+    """Return whether a decay has no gain, or an offset that is surely one: at odds of 20.
+
+    Of its size and length, less half of the logarithm of the lines' number for each (Schwarz 1978).
+    """
+    if not (effect.gain_percent and effect.offset_dn):
+        return not effect.gain_percent
+    layout, images = state.setting.layout, state.setting.seen.images
+    axis = int(effect.edge in ("left", "right"))
+    square = 0.0
+    for (channel, name), (image, noise) in images.items():
+        if name == "offset":
+            shape = np.exp(-layout.from_edge(channel, effect.edge) / effect.length_pixels)
+            means = image.mean(1 - axis)
+            error = line_square(beyond_smooth(means), noise, image.shape[1 - axis])
+            square += effect.offset_dn**2 * float(((shape - shape.mean()) ** 2).sum()) / error
+    lines = (layout.rows, layout.columns)[axis]
+    return bool(square / 2 - np.log(lines) > TOLD_APART)
 
 
 def _of_surface(statistic: str) -> bool:
@@ -126,7 +145,6 @@ def _shown(state: State, effect: LineSettling, rest: Rest) -> float | None:
     """Return the share of a decay that lines beyond the first show; None: enough of it."""
     layout, images = state.setting.layout, state.setting.seen.images
     axis = int(effect.edge in ("left", "right"))
-    size = (layout.rows, layout.columns)[axis]
     top = bottom = 0.0
     for (channel, name), (image, noise) in images.items():
         amplitude, length = {
@@ -136,10 +154,8 @@ def _shown(state: State, effect: LineSettling, rest: Rest) -> float | None:
         if not amplitude:
             continue
         scale = layout.regressors(channel).scales[name] if name == "gain" else 1.0
-        step = 1 if channel == "MONO" else 2
-        line = layout.sites[channel][axis] + step * np.arange(image.shape[axis])
-        distance = line if effect.edge in ("left", "top") else size - 1 - line
-        beyond = distance >= step
+        distance = layout.from_edge(channel, effect.edge)
+        beyond = distance >= 1 + (channel != "MONO")
         means = rest(image.mean(1 - axis)[beyond])
         shape = rest(np.exp(-distance[beyond] / length))
         square = line_square_beside(means, shape, noise, image.shape[1 - axis])

@@ -35,7 +35,8 @@ def gains_beside(clues: Clues, effects: Sequence[Effect]) -> Array | None:
         even = np.zeros(grid.shape, np.float32)
         for channel, (y, x) in layout.sites.items():
             even[y::step, x::step] = max(layout.signal_dn[taken.name, channel], 0.0)
-        made[taken.name] = mean_frame(even, effects, grid, clues.camera.read_out, taken)
+        time_s, read_out = taken.exposure_time_s, clues.camera.read_out
+        made[taken.name] = mean_frame(even, effects, grid, read_out, time_s)
     return _whole(clues, images, made)
 
 
@@ -78,7 +79,7 @@ def _moves(effect: Effect) -> bool:
 
 
 def mean_frame(
-    light: Image, effects: Sequence[Effect], grid: PixelGrid, read_out: ReadOut, taken: Taken
+    light: Image, effects: Sequence[Effect], grid: PixelGrid, read_out: ReadOut, time_s: float
 ) -> Image:
     """Return what effects make of light without noise, DN: float32 (row, column).
 
@@ -88,10 +89,8 @@ def mean_frame(
     for own in sorted(effects, key=lambda one: (one.stage, one.rank, one.kind)):
         if not _moves(own):
             continue
-        exposure = Exposure(
-            grid, 0, Draw(0), Draw(0), light, read_out, partial(_alike, image),
-            taken.exposure_time_s,
-        )  # fmt: skip
+        alike = partial(_alike, image)
+        exposure = Exposure(grid, 0, Draw(0), Draw(0), light, read_out, alike, time_s)
         image = own.apply(image, exposure)
         light = image if own.stage is Stage.LIGHT else light
     return image

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from scipy import fft
 from scipy.special import logsumexp
 
+from analysis.mismatch.bank.robust import drawn_in, typical_square
 from analysis.mismatch.bank.seams import beyond_smooth
-from dsis.measures.median import median
 
 Array = NDArray[np.float64]
 _LOWEST = 1 / 8  # cycles a pixel: noise that neighbours share is white below
@@ -29,8 +29,6 @@ _LENGTHS = 8
 _SHORTEST = 2.5  # pixels: fields that are shorter are white there
 _DECAYS = 10  # lengths
 _REACH = 1 / 8  # of the sensor: what is longer, of decays and fields, is a smooth surface
-_MEDIAN = 0.455  # of chi-squared of one degree of freedom
-_FAR_OUT = 5.0  # standard deviations of pixels, beyond which they count as so far out
 _MOST_LINES = 128  # of the shorter side
 _LEAST = 4  # lines, fewer of which hold no frequency of a field
 
@@ -137,13 +135,11 @@ class _Modes:
 
 def _modes(image: Array) -> _Modes | None:
     """Return the modes of a map; None: it is too small, or has no noise."""
-    clipped = image - image.mean()
-    limit = _FAR_OUT * (median(clipped.ravel() ** 2) / _MEDIAN) ** 0.5
-    clipped = _coarse(np.clip(clipped, -limit, limit))
+    clipped = _coarse(drawn_in(image))
     rows, columns = clipped.shape
     low, lines = _low(rows, columns), rows + columns - 2
     modes = fft.dctn(clipped, norm="ortho")
-    noise = float(median(modes[low] ** 2)) / _MEDIAN if low.any() else 0.0
+    noise = typical_square(modes[low]) if low.any() else 0.0
     if noise == 0:
         return None
     seen = np.concatenate([modes[1:, 0], modes[0, 1:], modes[low]])
@@ -192,7 +188,7 @@ def _whites(image: Array, noise: float, count: int) -> Iterator[Array]:
     extra = []
     for axis, across in ((1, columns), (0, rows)):
         rest = beyond_smooth(image.mean(axis))
-        extra.append(max(float(median(rest**2)) / _MEDIAN * across / noise, 1.0))
+        extra.append(max(typical_square(rest) * across / noise, 1.0))
     for down in sorted({1.0, extra[0]}):
         for along in sorted({1.0, extra[1]}):
             own = np.ones(count)

@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+import numpy as np
+from numpy.typing import NDArray
+
 from analysis.mismatch.bank.maps import Regressors
 from analysis.mismatch.scenes import SCENE, Local, Scene
 from dsis.cfa import Cfa, pattern
@@ -90,6 +93,17 @@ class Layout:
     def sites(self) -> dict[str, tuple[int, int]]:
         """First row and column of each channel."""
         return sites(self.cfa)
+
+    def from_edge(self, channel: str, edge: str) -> NDArray[np.float64]:
+        """Return how far a channel's lines are from an edge, pixels: (line,), the first one first.
+
+        `edge` is "left", "right", "top" or "bottom".
+        """
+        axis = int(edge in ("left", "right"))
+        size = (self.rows, self.columns)[axis]
+        line = np.arange(self.sites[channel][axis], size, 1 + (len(self.sites) > 1))
+        distance = line if edge in ("left", "top") else size - 1 - line
+        return distance.astype(np.float64)
 
     @property
     def uniform(self) -> tuple[Taken, ...]:

@@ -1,15 +1,15 @@
 """Dark current that parts of a sensor do not have: something else grows with exposure time."""
 
 from itertools import product
-from math import exp, log, sqrt
+from math import log
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
+from analysis.mismatch.bank.robust import drawn_in, typical_square
 from analysis.mismatch.candidates.patterns import EXTENTS, PLACES, glowing
-from analysis.mismatch.contradicted import Denial
-from analysis.mismatch.rank import TOLD_APART
+from analysis.mismatch.contradicted import Denial, rival
 from analysis.mismatch.state import State
 from dsis.effects import Effect
 from dsis.effects.amp_glow import AmpGlow
@@ -22,8 +22,6 @@ _LEAST_SHARE = 0.5  # of a dark current, that every part of the sensor must show
 _SURE = 3.0  # standard errors: the least of sixteen
 _SEEN = 3.5  # of a surface: chance has that among the map's few numbers in 1 % of recordings
 _SMOOTH = "fixed_smooth"
-_FAR_OUT, _MEDIAN = 5.0, 0.455  # standard deviations; of chi-squared of one degree of freedom
-_LARGEST = 700.0  # of an exponent
 
 
 def uneven(state: State, effect: Effect | None) -> Denial | None:
@@ -73,7 +71,7 @@ def _glowing(state: State, effect: DarkCurrent) -> Denial | None:
     the map's pixels where they scatter more than frames alone make them.
     """
     maps = {
-        c: (image, max(noise, _scatter(image)))
+        c: (image, max(noise, typical_square(image - image.mean()) ** 0.5))
         for (c, name), (image, noise) in state.setting.seen.images.items()
         if name == "time"
     }
@@ -91,13 +89,10 @@ def _glowing(state: State, effect: DarkCurrent) -> Denial | None:
             growth = effect.dn_per_s * layout.regressors(channel).scales["time"]
             shape = growth * (glow / glow.mean() - 1) / noise
             square += float((shape**2).sum())
-            along += float((shape * _seen(image / noise)).sum())
+            along += float((shape * drawn_in(image / noise)).sum())
         ratios.append(_ratio(square, along, pixels))
     behind = float(logsumexp(ratios)) - log(len(ratios))
-    if behind <= -TOLD_APART:
-        return None
-    share = 1 / (1 + exp(min(behind, _LARGEST)))
-    return Denial(share, "of the sensor what grows with exposure time may as well be a glow")
+    return rival(behind, "of the sensor what grows with exposure time may as well be a glow")
 
 
 def _ratio(square: float, along: float, precision: float) -> float:
@@ -107,18 +102,6 @@ def _ratio(square: float, along: float, precision: float) -> float:
     """
     grown = 1 + square / precision
     return (along - square / 2 + along**2 / precision / 2) / grown - log(grown) / 2
-
-
-def _seen(image: Array) -> Array:
-    """Return a map, of noise 1, less its mean; pixels far out count as so far."""
-    limit = _FAR_OUT * _scatter(image)
-    return np.asarray(np.clip(image - image.mean(), -limit, limit))
-
-
-def _scatter(image: Array) -> float:
-    """Return the standard deviation of a map about its mean, of the many."""
-    square = float(np.median((image - image.mean()) ** 2)) / _MEDIAN
-    return sqrt(square)
 
 
 def _parts(image: Array) -> Array:

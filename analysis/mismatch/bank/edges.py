@@ -7,14 +7,13 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.mismatch.bank.robust import typical_square
 from analysis.mismatch.bank.scalars import UNKNOWN, Number
 from analysis.mismatch.bank.seams import beyond_smooth
-from dsis.measures.median import median
 
 Array = NDArray[np.float64]
 ENDS = ("first", "last")
 REACHES = {"near": 2.5, "far": 10.0}  # pixels of the plane after which 1 / e is left
-_MEDIAN = 0.455  # of chi-squared of one degree of freedom
 _LEAST_LINES = 24  # fewer are a smooth surface
 
 
@@ -47,7 +46,7 @@ def line_square(means: Array, noise: float, across: int) -> float:
 
     `means` are less what is smooth; each is over so many pixels `across`.
     """
-    return max(noise**2 / across, median(means**2) / _MEDIAN)
+    return max(noise**2 / across, typical_square(means))
 
 
 def line_square_beside(means: Array, shape: Array, noise: float, across: int) -> float:

@@ -15,8 +15,7 @@ from dsis.effects import Effect
 from dsis.effects.line_settling import LineSettling
 
 Array = NDArray[np.float64]
-_EDGES = {"left": ("columns", "first"), "right": ("columns", "last"),
-          "top": ("rows", "first"), "bottom": ("rows", "last")}  # fmt: skip
+_EDGES = {"left": "columns", "right": "columns", "top": "rows", "bottom": "rows"}
 _LENGTHS = tuple(np.geomspace(1.0, 48.0, 24).tolist())  # pixels of the sensor
 _LONGEST = 1 / 8  # of the sensor
 _CLEAR = 3.0  # standard errors of a decay that is worth a trial
@@ -87,7 +86,7 @@ def _decays(clues: Clues, edge: str, name: str, rest: Rest) -> list[_Fit]:
 
 def _lengths(clues: Clues, edge: str) -> list[float]:
     """Return the lengths that are tried, pixels: longer ones are smooth surfaces."""
-    lines = clues.layout.columns if _EDGES[edge][0] == "columns" else clues.layout.rows
+    lines = clues.layout.columns if _EDGES[edge] == "columns" else clues.layout.rows
     return [own for own in _LENGTHS if own < _longest(lines)]
 
 
@@ -103,15 +102,13 @@ def _clear(fit: _Fit) -> float:
 
 def _fitted(clues: Clues, edge: str, name: str, length: float, rest: Rest) -> _Fit | None:
     """Return the decay of a length that fits a map best; None where there is no such map."""
-    axis, end = _EDGES[edge]
+    axis = _EDGES[edge]
     top = bottom = 0.0
     for channel, (image, noise) in clues.image(name).items():
         scale = clues.scale(name, channel) / (100 if name == "gain" else 1)
-        line = _places(clues, channel, axis)
-        size = clues.layout.columns if axis == "columns" else clues.layout.rows
-        distance = line if end == "first" else size - 1 - line
+        distance = clues.layout.from_edge(channel, edge)
         own = rest(image.mean(0 if axis == "columns" else 1))
-        own -= rest(_had(clues, axis, name, line, size)) * scale
+        own -= rest(_had(clues, axis, name, channel)) * scale
         shape = rest(np.exp(-distance / length))
         # Lines scatter beyond the noise of their pixels: a decay must stand out of that.
         square = line_square_beside(own, shape, noise, image.size // own.size)
@@ -120,19 +117,12 @@ def _fitted(clues: Clues, edge: str, name: str, length: float, rest: Rest) -> _F
     return _Fit(length, top / bottom, top / bottom**0.5) if bottom > 0 else None
 
 
-def _places(clues: Clues, channel: str, axis: str) -> Array:
-    """Return which lines of the sensor a channel's lines are."""
-    site = clues.layout.sites[channel][axis == "columns"]
-    count = clues.shape(channel)[axis == "columns"]
-    return site + (1 if channel == "MONO" else 2) * np.arange(count, dtype=np.float64)
-
-
-def _had(clues: Clues, axis: str, name: str, line: Array, size: int) -> Array:
+def _had(clues: Clues, axis: str, name: str, channel: str) -> Array:
     """Return the decays that the camera has already along an axis: DN, or per cent."""
-    total = np.zeros(line.size)
+    total = np.zeros(clues.shape(channel)[axis == "columns"])
     for own in clues.camera.effect:
-        if isinstance(own, LineSettling) and _EDGES[own.edge][0] == axis:
-            distance = line if _EDGES[own.edge][1] == "first" else size - 1 - line
+        if isinstance(own, LineSettling) and _EDGES[own.edge] == axis:
+            distance = clues.layout.from_edge(channel, own.edge)
             offset = (own.offset_dn, own.length_pixels)
             amplitude, length = offset if name == "offset" else (own.gain_percent, own.gain_length)
             total += amplitude * np.exp(-distance / length)
@@ -146,7 +136,7 @@ def _short(layout: Layout, effect: Effect) -> bool:
     """Return whether a decay is short beside the sensor: long ones are uneven light."""
     if not isinstance(effect, LineSettling):
         return True
-    lines = layout.columns if _EDGES[effect.edge][0] == "columns" else layout.rows
+    lines = layout.columns if _EDGES[effect.edge] == "columns" else layout.rows
     return max(effect.length_pixels, effect.gain_length) < 2 * _longest(lines)
 
 

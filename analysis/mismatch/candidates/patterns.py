@@ -11,9 +11,9 @@ from analysis.mismatch.bank.seams import WHOLE
 from analysis.mismatch.bank.together import TOGETHER
 from analysis.mismatch.candidates.candidate import Candidate, Proposal, proposals
 from analysis.mismatch.clues import Clues, alike
+from analysis.mismatch.gainmap import mean_frame
 from analysis.mismatch.layout import Layout, Place
-from dsis.draw import Draw
-from dsis.effects import Effect, Exposure, Image, ReadOut
+from dsis.effects import Effect
 from dsis.effects.amp_glow import AmpGlow
 from dsis.grid import PixelGrid
 
@@ -104,28 +104,16 @@ def had(clues: Clues, channel: str) -> Array:
 
     Those of uneven light, and those whose lines feign it: (pixel,).
     """
-    uneven = [e for e in clues.camera.effect if e.kind in _UNEVEN]
-    y, x = clues.layout.sites[channel]
-    step = 1 if len(clues.layout.sites) == 1 else 2
-    gain = gain_of(uneven, clues.layout, clues.camera.read_out)[y::step, x::step].ravel()
-    return np.asarray(gain - gain.mean())
-
-
-def gain_of(effects: Sequence[Effect], layout: Layout, read_out: ReadOut) -> Array:
-    """Return the gains, per cent beyond none, that effects without draws make: (row, column)."""
+    layout, uneven = clues.layout, [e for e in clues.camera.effect if e.kind in _UNEVEN]
+    y, x = layout.sites[channel]
+    step = 1 if len(layout.sites) == 1 else 2
     grid = PixelGrid(layout.rows, layout.columns, layout.cfa)
-    made = []
-    for signal in (0.0, _LIGHT_DN):
-        image: Image = np.full(grid.shape, signal, np.float32)
-        exposure = Exposure(grid, 0, Draw(0), Draw(0), image, read_out, _nothing)
-        for effect in effects:
-            image = effect.apply(image, exposure)
-        made.append(image.astype(np.float64))
-    return np.asarray(100 * ((made[1] - made[0]) / _LIGHT_DN - 1))
-
-
-def _nothing(_: int) -> Image:
-    raise AssertionError("uneven light remembers no frame")
+    dark, lit = (
+        mean_frame(np.full(grid.shape, light, np.float32), uneven, grid, clues.camera.read_out, 0.0)
+        for light in (0.0, _LIGHT_DN)
+    )
+    gain = 100 * (lit.astype(np.float64) - dark)[y::step, x::step].ravel() / _LIGHT_DN
+    return np.asarray(gain - gain.mean())
 
 
 def _of_light(own: Mapping[str, float], names: Sequence[str]) -> list[Proposal]:

@@ -63,7 +63,7 @@ def test_amplitudes_are_what_was_planted(kind: str, at: tuple[float, float], off
     planted = 0.35
     true = (at[0] + off / COLUMNS, at[1] - off / ROWS)
     effect = registry()[kind](amplitude_dn=planted, frequency=at)
-    found = [_seen(effect, true, seed).measured(effect) for seed in range(DRAWS)]
+    found = [_seen(effect, true, seed).line(effect) for seed in range(DRAWS)]
     known = [one for one in found if one is not None]
     assert len(known) > 0.8 * DRAWS
     z = np.array([(one.amplitude_dn - planted) / one.amplitude_error_dn for one in known])

@@ -99,13 +99,14 @@ class Judge:
         """Return the effect that is denied most by what is left, and why; None: none is.
 
         By what looks like it, by what calls for it, and where nothing did that differed at `first`.
-        Lines are seen in whole frames besides.
+        Lines, and telegraphs that were told so, are seen in whole frames besides.
         """
         left = {m.statistic for m in self.state.mismatches}
         asked = [
             one
             for one in some
-            if one.proposal is not None and one.kind in CANDIDATES and one.kind not in LINES
+            if one.proposal is not None and one.kind in CANDIDATES
+            if one.kind not in LINES and not one.measured
             if left or CANDIDATES[one.kind].hints or one.kind in _OF_TIME or not _called(one, first)
         ]
         return self._worst(partial(self._left_open, first), asked)
@@ -164,7 +165,9 @@ class Judge:
         share = resolved(predictor, self.state, mean)
         if not named.measured and predictor.worth(mean) < LEAST_GAIN:
             return share, NEEDLESS
-        if share < _RESOLVED and not (named.measured or named.of_pixels):
+        # Where others have pixels that stand out, too, counts of them say whose they are.
+        alone = named.of_pixels and predictor.counts.normal(mean)
+        if share < _RESOLVED and not (named.measured or alone):
             return share, f"{LITTLE} {max(share, 0):.0%} of what it changes"
         if named.kind not in LINES and not locates(self.state, mean):  # frames show lines
             return 1.0, NOTHING

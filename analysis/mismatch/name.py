@@ -243,11 +243,9 @@ class Search(Fitted):
             rivals = (*rivals, ("dual_gain", best.gain - path.gain))
         proposal = replace(best.proposal, effect=best.polished.effects[0])
         errors = best.polished.errors[0]
-        line = None if self.measuring is None else self.measuring.measured(proposal.effect)
-        if line is not None:  # better known than from the heights of peaks
-            values = {"amplitude_dn": line.amplitude_dn, "frequency": line.frequency}
-            known = {"amplitude_dn": line.amplitude_error_dn, "frequency": line.frequency_error}
-            proposal = measured(proposal, values, known)
+        known = None if self.measuring is None else self.measuring.measured(proposal.effect)
+        if known is not None:  # better than from the heights of peaks, or sums over pixels
+            proposal = measured(proposal, *known)
             errors = dict(proposal.errors)
             camera = with_effects(state.camera, [proposal.effect])
         if camera is None:

@@ -9,6 +9,7 @@ from analysis.mismatch.instance import LINES, instance
 from dsis.camera import Camera
 from dsis.effects import Effect
 
+_OF_FRAMES = LINES | {"rts"}
 _CLEAR = 3.0  # standard errors of an effect's size that is no chance
 SHAPES = frozenset(
     {
@@ -55,8 +56,9 @@ class Named:
 
     @property
     def measured(self) -> bool:
-        """Whether it is a line that whole frames show, with an amplitude of their own."""
-        return self.kind in LINES and self.proposal is not None and not self.proposal.free
+        """Whether it is a line or a telegraph that frames show, with an amplitude of their own."""
+        own = self.proposal
+        return self.kind in _OF_FRAMES and own is not None and not own.free
 
     @property
     def of_pixels(self) -> bool:

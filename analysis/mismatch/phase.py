@@ -6,7 +6,7 @@ Where noise hides that, the likelihoods of both decide. In white noise |c|^2 is 
 the chance of the largest of all frequencies is known.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -16,9 +16,13 @@ from analysis.mismatch.bandgain import gain_of_bands
 from analysis.mismatch.instance import Frequency, frequency_of, same_line
 from analysis.mismatch.layout import Layout
 from analysis.mismatch.projections import LEAST, SURE, FramesOf, Power, projections
+from analysis.mismatch.telegraph import Telegraph, telegraph
 from dsis.effects import Effect
 from dsis.effects.line_flicker import LineFlicker
+from dsis.effects.rts import Rts
 
+Measured = tuple[Mapping[str, object], Mapping[str, float]]
+"""Parameters, and their standard errors."""
 _CLEAR_POWER = 3.0  # standard errors of a line's power from which its amplitude is known
 _ASIDE = 3  # bins to the neighbours that say what is around
 _NEAR = (-2, -1, 1, 2)  # bins to those that a line leaves as they are
@@ -53,6 +57,7 @@ class WholeFrames:
     _looks: dict[Frequency, "Look"] = field(default_factory=dict)
     _gains: dict[tuple[Frequency, bool], float] = field(default_factory=dict)
     _bands: dict[float, float] = field(default_factory=dict)
+    _telegraphs: list[Telegraph | None] = field(default_factory=list)
 
     def shown(self, effect: Effect) -> bool:
         """Return whether an effect is no line of a mosaic, or the one that whole frames show."""
@@ -90,7 +95,26 @@ class WholeFrames:
             return _BY_CHANCE if odds > SURE else None
         return None
 
-    def measured(self, effect: Effect) -> "Line | None":
+    def measured(self, effect: Effect) -> Measured | None:
+        """Return what frames tell of a line or of pixels that jump; None: too little is seen.
+
+        The parameters that are so known, and their errors.
+        """
+        if isinstance(effect, Rts):
+            seen = self._telegraph
+            return None if seen is None or seen.gain <= 0 else (seen.values, seen.errors)
+        line = self.line(effect)
+        return None if line is None else (line.values, line.errors)
+
+    @property
+    def _telegraph(self) -> Telegraph | None:
+        """The pixels that jump; of a large recording nothing is asked."""
+        if not self._telegraphs:
+            large = self.layout.large
+            self._telegraphs.append(None if large else telegraph(self.layout, self.frames_of))
+        return self._telegraphs[0]
+
+    def line(self, effect: Effect) -> "Line | None":
         """Return amplitude and frequency of a line; None: too little is seen.
 
         What frames of an exposure have in common is taken off: free phases that agree by chance are
@@ -121,6 +145,8 @@ class WholeFrames:
         have few. Interference, which knows nothing of pixels, may be at any: it pays for all of
         them there too. Minus infinity where frames deny the line, or cannot tell.
         """
+        if isinstance(effect, Rts):
+            return -np.inf if self._telegraph is None else self._telegraph.gain
         if isinstance(effect, LineFlicker):
             at = effect.cycles_per_frame
             if at not in self._bands:
@@ -161,6 +187,16 @@ class Line:
     amplitude_error_dn: float
     frequency: Frequency
     frequency_error: float
+
+    @property
+    def values(self) -> Mapping[str, object]:
+        """Its parameters."""
+        return {"amplitude_dn": self.amplitude_dn, "frequency": self.frequency}
+
+    @property
+    def errors(self) -> Mapping[str, float]:
+        """Their standard errors."""
+        return {"amplitude_dn": self.amplitude_error_dn, "frequency": self.frequency_error}
 
 
 @dataclass(frozen=True)

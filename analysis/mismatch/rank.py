@@ -38,6 +38,7 @@ TOLD_APART = 3.0  # of log-likelihood: odds below 20 do not tell two effects apa
 _COSINE = 0.5  # of what two predictions change, from which they change the same
 _SPARSE = 4  # times as many simulations
 _BY_FRAME = frozenset({"frame_variance"})
+_BY_JUMPS = frozenset({"rts"})
 # A sign: half of the pairs of frames show nothing, half show it twice. A band: one bin's phase.
 # Pink noise and bands of rows: most of it in a frame's mean and in the first few bins. Gains that
 # neighbours share: in few patches. Hot pixels: the few brightest ones.
@@ -106,6 +107,11 @@ def ranked(
     predictor = state.predictor()
     before = predictor.loglik(state.null.mean)
     tried = _tried(state, kinds, memory, step, settled, apart, possible)
+    tried = [  # frames tell jumps of few pixels from what has the same sums
+        (max(value, before + shown(own.effect)) if kind in _BY_JUMPS else value, kind, own)
+        for value, kind, own in tried
+    ]
+    tried.sort(key=lambda one: -one[0])
     best = max((value for value, _, _ in tried), default=0.0)
     far = max(_FAR, _SHARE * (best - before))
     likely = _likely(tried, best - far)
@@ -147,11 +153,12 @@ def _in_order(state: State, found: Sequence[Fit], shown: Callable[[Effect], floa
     judged = ~_others(state, [own.mean for _, _, own in found])
     fitted, there = [], state.camera.effect
     for kind, start, own in found:
-        gain = predictor.gain(own.mean, start.of_pixels, judged)
+        gain = predictor.gain(own.mean, start.of_pixels, judged) - start.numbers
         # Frames tell a wave from noise, and not from one that the camera has there already.
         if not any(same_place(start.effect, one, state.setting.layout) for one in there):
-            gain = max(gain, shown(start.effect))
-        fitted.append(Ranked(gain - start.numbers, kind, start, own))
+            paid = 0 if kind in _BY_JUMPS else start.numbers  # odds of all sizes have paid for them
+            gain = max(gain, shown(start.effect) - paid)
+        fitted.append(Ranked(gain, kind, start, own))
     return sorted(fitted, key=lambda one: -one.gain)
 
 

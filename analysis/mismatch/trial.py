@@ -34,6 +34,7 @@ from dsis.recording import Recording
 
 Array = NDArray[np.float64]
 _REPLICATES = 8
+_BARE = 1.0  # nats
 _TOTAL = 4.6  # nats: chance gains as much in 1 % of recordings at most, whatever the frames
 _NORMAL = 1.96
 _ERRORS = 2.2  # standard errors from a gain to the end of its interval, of few frames
@@ -57,10 +58,11 @@ def _of_pixels(gain: Gain, frames: int) -> Gained:
 
     Chance is ruled out where the gain exceeds its own uncertainty, and either its interval is above
     zero or the ratio of likelihoods is above 100: of a model fixed before, chance exceeds that in
-    1 % of recordings at most (Markov's inequality).
+    1 % of recordings at most (Markov's inequality). A nat in all is not worth more than a bare
+    mention (Kass & Raftery, Journal of the American Statistical Association 90, 1995).
     """
     total = gain.nats_per_frame * frames
-    return Gained(gain, exceeds(gain) and (gain.ci95[0] > 0 or total > _TOTAL))
+    return Gained(gain, exceeds(gain) and total > _BARE and (gain.ci95[0] > 0 or total > _TOTAL))
 
 
 def denied(gain: Gain, frames: int) -> bool:

@@ -1,0 +1,277 @@
+"""Pixels that jump between two levels, told by their own frames from pixels noisy otherwise.
+
+Some pixels are random telegraphs, whose jumps are exponentially distributed over the pixels. All
+others have one of the laws that noise of single pixels may have besides: alike, of variances that
+spread, that grow with time, or with noisier frames now and then. What telegraphs gain is counted
+from the best of these laws, and beside the best of them.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from math import exp, isfinite, log, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import logsumexp, ndtr
+from scipy.stats import chi2
+
+from analysis.mismatch.layout import Layout
+from analysis.mismatch.pixellaw import MOST_FRAMES, of_jumps, of_spikes, of_variances
+from analysis.mismatch.projections import FramesOf
+
+Array = NDArray[np.float64]
+_LEAST_FRAMES = 3  # of which a median pixel tells the noise
+_COARSE = 1.0  # step between codes, in standard deviations, from which on codes jump by themselves
+_NOISY, _OTHERS = 2.5, 1024  # standard deviations: all such pixels, and so many of the others
+_HEIGHTS: Array = np.geomspace(0.7, 120.0, 24)  # in standard deviations of the least noise
+_SWITCHING = np.array([0.02, 0.05, 0.1, 0.15, 0.2, 0.27, 0.35, 0.5])
+_RATIOS: Array = np.exp(np.arange(-1.4, 4.3, 0.2))  # of a pixel's variance to that noise
+_SPREADS = np.geomspace(0.05, 1.5, 18).tolist()  # of the logarithm of such ratios
+_ADDED: Array = np.power(2.0, np.arange(-2, 9), dtype=np.float64)
+_SPIKES: Array = np.power(4.0, np.arange(6), dtype=np.float64)
+_SPIKY = np.array([1e-3, 0.01, 0.05, 0.15])  # shares of frames
+_PARTS: Array = np.geomspace(1e-4, 0.05, 32)  # of pixels: jumps of more are told by sums
+_GRID = 32  # amplitudes
+_STEPS = 200
+
+
+@dataclass(frozen=True)
+class Telegraph:
+    """Pixels that jump.
+
+    Attributes
+    ----------
+    share, amplitude_dn, switching
+        Share of the pixels, mean height of the jump, and its probability from frame to frame.
+    share_error, amplitude_error_dn, switching_error
+        Their standard errors.
+    gain
+        By how much frames are likelier, in the mean over all telegraphs, than under the best law
+        without, nats.
+    """
+
+    share: float
+    share_error: float
+    amplitude_dn: float
+    amplitude_error_dn: float
+    switching: float
+    switching_error: float
+    gain: float
+
+    @property
+    def values(self) -> Mapping[str, object]:
+        """Parameters of the effect."""
+        return {
+            "pixel_fraction": self.share,
+            "amplitude_dn": self.amplitude_dn,
+            "switch_probability": self.switching,
+        }
+
+    @property
+    def errors(self) -> Mapping[str, float]:
+        """Their standard errors."""
+        return {
+            "pixel_fraction": self.share_error,
+            "amplitude_dn": self.amplitude_error_dn,
+            "switch_probability": self.switching_error,
+        }
+
+
+@dataclass(frozen=True)
+class _Others:
+    """Log-likelihoods of pixels that do not jump, relative to Gaussian noise of the many.
+
+    Attributes
+    ----------
+    own
+        Of another variance: (pixel, ratio).
+    grown
+        Of a variance that grows with exposure time: (pixel, added).
+    spikes
+        Of single noisy frames: (pixel, added, share).
+    """
+
+    own: Array
+    grown: Array
+    spikes: Array
+
+    @property
+    def most(self) -> Array:
+        """The largest of each pixel: (pixel,)."""
+        every = [own.reshape(len(own), -1).max(1) for own in (self.own, self.grown, self.spikes)]
+        return np.asarray(np.maximum(np.max(every, 0), 0.0))
+
+    def laws(self, top: Array, weight: Array) -> Iterator[Array]:
+        """Yield the likelihood of each pixel, over exp(top), under laws of all pixels: (pixel,).
+
+        All alike; of a read noise that spreads log-normally; few that grow noisier with time;
+        frames that are noisier now and then.
+        """
+        alike = np.exp(-top)
+        yield alike
+        spread = np.exp(self.own - top[:, None])
+        yield max((spread @ _log_normal(s) for s in _SPREADS), key=lambda own: _sum(own, weight))
+        for some in (self.grown, *np.moveaxis(self.spikes, 2, 0)):
+            classes = np.column_stack([alike, np.exp(some - top[:, None])])
+            yield classes @ _shares(classes, weight)
+
+
+def _sum(own: Array, weight: Array) -> float:
+    """Return the log-likelihood of all pixels."""
+    return float(weight @ np.log(np.maximum(own, 1e-300)))
+
+
+def _log_normal(spread: float) -> Array:
+    """Return the share of pixels at each ratio of variances."""
+    edges = np.concatenate([[-np.inf], (np.log(_RATIOS[1:]) + np.log(_RATIOS[:-1])) / 2, [np.inf]])
+    return np.asarray(np.diff(ndtr(edges / spread)))
+
+
+def telegraph(layout: Layout, frames_of: FramesOf) -> Telegraph | None:
+    """Return the pixels that jump, a small share of all; None: too few frames tell.
+
+    Parameters
+    ----------
+    layout, frames_of
+        The frames: of darks and flats all are asked.
+
+    References
+    ----------
+    Kirton & Uren, Advances in Physics 38, 1989 (random telegraphs); Kiefer & Wolfowitz, Annals of
+    Mathematical Statistics 27, 1956 (shares of classes that make observations most likely).
+    """
+    blocks = list(_blocks(layout, frames_of))
+    if not blocks:
+        return None
+    least = min(float(noise.min()) for _, noise, _ in blocks)
+    chosen, weight = _chosen(blocks, least)
+    longest = max(time for *_, time in blocks)
+    heights = _HEIGHTS * sqrt(least)
+    jumps = np.zeros((chosen.size, heights.size, _SWITCHING.size))
+    own = np.zeros((chosen.size, _RATIOS.size))
+    grown = np.zeros((chosen.size, _ADDED.size))
+    spikes = np.zeros((chosen.size, _SPIKES.size, _SPIKY.size))
+    for x, noise, time in blocks:
+        some, dn2 = x[chosen], noise[chosen]
+        jumps += of_jumps(some, dn2, heights, _SWITCHING)
+        own += of_variances(some, dn2, (_RATIOS - 1) * least)
+        part = time / longest if longest > 0 else 1.0
+        grown += of_variances(some, dn2, _ADDED * least * part)
+        spikes += of_spikes(some, dn2, _SPIKES * least, _SPIKY)
+    return _fitted(jumps, _Others(own, grown, spikes), weight, heights)
+
+
+def _blocks(layout: Layout, frames_of: FramesOf) -> Iterator[tuple[Array, Array, float]]:
+    """Yield frames of each exposure, a few at a time: (pixel, frame), their noise, DN^2, and time.
+
+    Less what rows and columns of a frame have in common. Noise is that of the median pixel.
+    """
+    for exposure in layout.uniform:
+        if any((exposure.name, channel) in layout.still for channel in layout.channels):
+            continue
+        stack = np.stack([np.asarray(own, np.float64) for own in frames_of(exposure.name)])
+        parts = -(-len(stack) // MOST_FRAMES)
+        for some in np.array_split(stack, parts):
+            block = _noise(layout, some) if len(some) >= _LEAST_FRAMES else None
+            if block is not None:
+                yield *block, exposure.exposure_time_s
+
+
+def _noise(layout: Layout, stack: Array) -> tuple[Array, Array] | None:
+    """Return a stack about its mean (pixel, frame), and the noise of each pixel; None: coarse."""
+    rest = stack - stack.mean(0)
+    noise = np.empty(rest.shape[1:])
+    step = 1 + (len(layout.sites) > 1)
+    dof = len(stack) - 1
+    for y, x in layout.sites.values():
+        plane = rest[:, y::step, x::step]
+        plane -= plane.mean(2, keepdims=True)
+        plane -= plane.mean(1, keepdims=True)
+        square = float(np.median((plane**2).sum(0))) / chi2.median(dof)
+        step_dn = float(np.median(np.diff(np.unique(stack[:, y::step, x::step]))))
+        if square < (_COARSE * step_dn) ** 2:
+            return None
+        noise[y::step, x::step] = square
+    return rest.reshape(len(rest), -1).T, noise.reshape(-1)
+
+
+def _chosen(
+    blocks: list[tuple[Array, Array, float]], least: float
+) -> tuple[NDArray[np.intp], Array]:
+    """Return the noisy pixels and some of the others, and for how many each stands."""
+    score, norm = np.zeros(len(blocks[0][0])), 0.0
+    for x, noise, _ in blocks:
+        dof, trust = x.shape[1] - 1, least / noise
+        score += trust * ((x**2).sum(1) / noise - dof)
+        norm += 2 * dof * float((trust**2).mean())
+    noisy = score > _NOISY * sqrt(norm)
+    others = np.flatnonzero(~noisy)
+    some = others[:: max(others.size // _OTHERS, 1)]
+    chosen = np.concatenate([np.flatnonzero(noisy), some])
+    weight = np.ones(chosen.size)
+    weight[chosen.size - some.size :] = others.size / max(some.size, 1)
+    return chosen, weight
+
+
+def _fitted(jumps: Array, others: _Others, weight: Array, heights: Array) -> Telegraph | None:
+    """Return the telegraphs that are likely beside the likeliest law of all other pixels."""
+    top = np.maximum(others.most, jumps.max((1, 2)))
+    jumping = np.exp(jumps - top[:, None, None])
+    amplitudes = np.geomspace(heights[0], heights[-1] / 2, _GRID)
+    best, alone = np.empty(0), -np.inf
+    for beside in others.laws(top, weight):
+        alone = max(alone, _sum(beside, weight))
+        own = np.array(
+            [[_of_shares(_of_heights(jumping[:, :, w], heights, a), beside, weight)
+              for a in amplitudes] for w in range(_SWITCHING.size)]
+        )  # fmt: skip
+        if not best.size or own.max() > best.max():
+            best = own
+    return _told(best, amplitudes, alone)
+
+
+def _of_shares(own: Array, beside: Array, weight: Array) -> Array:
+    """Return the log-likelihood of each share of pixels that jump: (share,)."""
+    likely = beside + _PARTS[:, None] * (own - beside)
+    return np.asarray(np.log(np.maximum(likely, 1e-300)) @ weight)
+
+
+def _told(likely: Array, amplitudes: Array, alone: float) -> Telegraph | None:
+    """Return the mean telegraph, from log-likelihoods (switching, amplitude, share).
+
+    All three are as likely beforehand in their logarithms.
+    """
+    gain = float(logsumexp(likely)) - log(likely.size) - alone
+    if not isfinite(gain):
+        return None
+    chance = np.exp(likely - logsumexp(likely))
+    found = []
+    for axis, places in enumerate((_SWITCHING, amplitudes, _PARTS)):
+        own = chance.sum(tuple(k for k in range(chance.ndim) if k != axis))
+        mean = float(own @ np.log(places))
+        # No better than where between two places.
+        step = float(np.diff(np.log(places)).mean())
+        found.append((exp(mean), sqrt(float(own @ (np.log(places) - mean) ** 2) + step**2 / 12)))
+    (switching, a), (amplitude, b), (share, c) = found
+    return Telegraph(share, share * c, amplitude, amplitude * b, switching, switching * a, gain)
+
+
+def _of_heights(jumping: Array, heights: Array, amplitude: float) -> Array:
+    """Return the likelihood of exponential heights of a mean: (pixel,).
+
+    Jumps that are too small to be seen are Gaussian noise, as the lowest of the heights nearly is.
+    """
+    edges = np.concatenate([[0.0], np.sqrt(heights[1:] * heights[:-1]), [np.inf]])
+    return np.asarray(jumping @ -np.diff(np.exp(-edges / amplitude)))
+
+
+def _shares(classes: Array, weight: Array) -> Array:
+    """Return the shares of classes that make all pixels most likely, by expectation-maximisation.
+
+    (class,), from likelihoods (pixel, class).
+    """
+    shares = np.full(classes.shape[1], 1 / classes.shape[1])
+    for _ in range(_STEPS):
+        each = classes * shares
+        shares = weight @ (each / np.maximum(each.sum(1, keepdims=True), 1e-300)) / weight.sum()
+    return np.asarray(shares)

@@ -1,0 +1,135 @@
+"""Pixels that jump: laws of single pixels against dense algebra, and populations of the test's."""
+
+from itertools import pairwise, product
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.special import logsumexp
+from scipy.stats import multivariate_normal
+
+from analysis.mismatch.layout import Layout, Taken
+from analysis.mismatch.phase import WholeFrames
+from analysis.mismatch.pixellaw import of_jumps, of_spikes, of_variances
+from analysis.mismatch.telegraph import Telegraph, telegraph
+from dsis.cfa import Cfa
+from dsis.effects.rts import Rts
+
+FRAMES = 5
+# What is left of frames about their mean: an orthonormal basis.
+BASIS = np.linalg.qr(np.column_stack([np.ones(FRAMES), np.eye(FRAMES)[:, 1:]]))[0][:, 1:].T
+SAMPLES = st.lists(st.floats(-20, 20), min_size=FRAMES, max_size=FRAMES)
+
+
+def _likely(x: np.ndarray, mean: np.ndarray, variances: np.ndarray) -> float:
+    """Return the log-likelihood of frames about their mean."""
+    covariance = BASIS @ np.diag(variances) @ BASIS.T
+    return float(multivariate_normal.logpdf(BASIS @ x, BASIS @ mean, covariance))
+
+
+@given(SAMPLES, st.floats(0.5, 4), st.floats(0.5, 15), st.floats(0.02, 0.5))
+def test_jumps_are_as_likely_as_all_sequences_say(
+    samples: list[float], noise: float, height: float, switching: float
+) -> None:
+    x, even = np.array(samples), np.full(FRAMES, noise)
+    terms = []
+    for states in product((0, 1), repeat=FRAMES):
+        switches = sum(a != b for a, b in pairwise(states))
+        chance = 0.5 * switching**switches * (1 - switching) ** (FRAMES - 1 - switches)
+        terms.append(np.log(chance) + _likely(x, height * np.array(states), even))
+    wanted = logsumexp(terms) - _likely(x, np.zeros(FRAMES), even)
+    found = of_jumps(x[None], np.array([noise]), np.array([height]), np.array([switching]))
+    assert found[0, 0, 0] == pytest.approx(wanted, rel=1e-6, abs=1e-6)
+
+
+@given(SAMPLES, st.floats(0.5, 4), st.floats(0.5, 200), st.floats(1e-3, 0.3))
+def test_noisy_frames_are_as_likely_as_all_sequences_say(
+    samples: list[float], noise: float, added: float, share: float
+) -> None:
+    x = np.array(samples)
+    terms = []
+    for states in product((0, 1), repeat=FRAMES):
+        own = np.array(states)
+        chance = share ** own.sum() * (1 - share) ** (FRAMES - own.sum())
+        terms.append(np.log(chance) + _likely(x, np.zeros(FRAMES), noise + added * own))
+    plain, one = _likely(x, np.zeros(FRAMES), np.full(FRAMES, noise)), np.array([noise])
+    found = of_spikes(x[None], one, np.array([added]), np.array([share]))
+    assert found[0, 0, 0] == pytest.approx(logsumexp(terms) - plain, rel=1e-6, abs=1e-6)
+    other = _likely(x, np.zeros(FRAMES), np.full(FRAMES, noise + added))
+    varied = of_variances(x[None], one, np.array([added]))
+    assert varied[0, 0] == pytest.approx(other - plain, rel=1e-6, abs=1e-6)
+
+
+SHAPE, STACK = (72, 96), 8
+NOISE = (2.0, 2.0, 3.0, 6.0)  # DN, of four exposures: two darks, two flats
+
+
+def _recorded(seed: int, kind: str, **how: float) -> Telegraph | None:
+    """Return what is told of frames whose single pixels are noisy in one way."""
+    rng = np.random.default_rng(seed)
+    pixels = SHAPE[0] * SHAPE[1]
+    stacks = {}
+    taken = []
+    height = np.zeros(pixels)
+    some = rng.random(pixels) < how.get("share", 0.0)
+    height[some] = rng.exponential(how.get("amplitude", 0.0), int(some.sum()))
+    spread = np.exp(how.get("log_sigma", 0.0) * rng.normal(size=pixels))
+    for i, sd in enumerate(NOISE):
+        shot = np.sqrt(sd**2 - NOISE[0] ** 2)
+        state = rng.random(pixels) < 0.5
+        frames = []
+        for _ in range(STACK):
+            state ^= rng.random(pixels) < how.get("switching", 0.5)
+            read = NOISE[0] * spread * rng.normal(size=pixels)
+            if kind == "tails":
+                read = NOISE[0] * rng.standard_t(5, pixels) * np.sqrt(3 / 5)
+            if kind == "spikes":
+                hit = rng.random(pixels) < 2e-3
+                read[hit] += rng.exponential(20.0, int(hit.sum()))
+            signal = 100.0 * i + height * state + read + shot * rng.normal(size=pixels)
+            frames.append(np.rint(signal + 64).reshape(SHAPE))
+        stacks[f"e{i}"] = frames
+        taken.append(Taken(f"e{i}", "flat" if i > 1 else "dark", 0.01 * (1 + i), None,
+                           tuple(range(STACK))))  # fmt: skip
+    layout = Layout(tuple(taken), *SHAPE, Cfa.MONO, 64.0, 4095.0, {}, {})
+    return telegraph(layout, stacks.__getitem__)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_population_that_jumps_is_told_with_its_numbers(seed: int) -> None:
+    how = {"share": 0.008, "amplitude": 12.0, "switching": 0.15}
+    told = _recorded(seed, "telegraph", **how)
+    assert told is not None
+    assert told.gain > 10
+    assert abs(told.share - how["share"]) < 3.5 * told.share_error
+    assert abs(told.amplitude_dn - how["amplitude"]) < 3.5 * told.amplitude_error_dn
+    assert abs(told.switching - how["switching"]) < 3.5 * told.switching_error
+    assert told.share_error < how["share"]
+    assert told.amplitude_error_dn < how["amplitude"] / 2
+
+
+@pytest.mark.parametrize(
+    ("kind", "how"),
+    [("alike", {}), ("tails", {}), ("spikes", {}), ("spread", {"log_sigma": 0.3}),
+     ("spread", {"log_sigma": 0.8})],
+)  # fmt: skip
+@pytest.mark.parametrize("seed", range(3))
+def test_pixels_that_are_noisy_otherwise_do_not_jump(
+    kind: str, how: dict[str, float], seed: int
+) -> None:
+    told = _recorded(seed, kind, **how)
+    assert told is not None
+    assert told.gain < np.log(20)
+
+
+def test_coarse_codes_tell_nothing() -> None:
+    rng = np.random.default_rng(1)
+    frames = [np.rint(rng.normal(64, 0.4, SHAPE)) for _ in range(STACK)]
+    taken = Taken("dark", "dark", 0.01, 0.0, tuple(range(STACK)))
+    layout = Layout((taken,), *SHAPE, Cfa.MONO, 64.0, 4095.0, {}, {})
+    assert telegraph(layout, lambda _: frames) is None
+    whole = WholeFrames(layout, lambda _: frames)
+    effect = Rts(pixel_fraction=0.01, amplitude_dn=3.0)
+    assert whole.gain(effect) == -np.inf
+    assert whole.measured(effect) is None

@@ -239,7 +239,8 @@ def _of_shares(own: Array, beside: Array, weight: Array) -> Array:
 def _told(likely: Array, amplitudes: Array, alone: float) -> Telegraph | None:
     """Return the mean telegraph, from log-likelihoods (switching, amplitude, share).
 
-    All three are as likely beforehand in their logarithms.
+    All three are as likely beforehand in their logarithms, and so are means; errors are the root
+    mean squares about them.
     """
     gain = float(logsumexp(likely)) - log(likely.size) - alone
     if not isfinite(gain):
@@ -248,12 +249,12 @@ def _told(likely: Array, amplitudes: Array, alone: float) -> Telegraph | None:
     found = []
     for axis, places in enumerate((_SWITCHING, amplitudes, _PARTS)):
         own = chance.sum(tuple(k for k in range(chance.ndim) if k != axis))
-        mean = float(own @ np.log(places))
+        mean = exp(float(own @ np.log(places)))
         # No better than where between two places.
-        step = float(np.diff(np.log(places)).mean())
-        found.append((exp(mean), sqrt(float(own @ (np.log(places) - mean) ** 2) + step**2 / 12)))
+        step = mean * float(np.diff(np.log(places)).mean())
+        found.append((mean, sqrt(float(own @ (places - mean) ** 2) + step**2 / 12)))
     (switching, a), (amplitude, b), (share, c) = found
-    return Telegraph(share, share * c, amplitude, amplitude * b, switching, switching * a, gain)
+    return Telegraph(share, c, amplitude, b, switching, a, gain)
 
 
 def _of_heights(jumping: Array, heights: Array, amplitude: float) -> Array:

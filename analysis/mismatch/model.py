@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from analysis.mismatch.layout import Layout
 from analysis.mismatch.observe import Observation, observe
 from analysis.mismatch.scenes import without_picture
+from analysis.mismatch.touches import ALL_SUMS
 from dsis.camera import Camera
 from dsis.draw import Draw, keep_fields
 from dsis.effects import Image
@@ -81,16 +82,27 @@ class Model:
 
 
 def simulate(
-    model: Model, layout: Layout, replicates: Sequence[int], seed: int, jobs: int
+    model: Model,
+    layout: Layout,
+    replicates: Sequence[int],
+    seed: int,
+    jobs: int,
+    made: frozenset[str] = ALL_SUMS,
 ) -> list[Observation]:
-    """Return the observations of simulated recordings, one for each replicate number."""
-    return each(partial(simulated, layout, seed), [(model, one) for one in replicates], jobs)
+    """Return the observations of simulated recordings, one for each replicate number.
+
+    `made` as of `observe`.
+    """
+    return each(partial(simulated, layout, seed), [(model, one, made) for one in replicates], jobs)
 
 
-def simulated(layout: Layout, seed: int, which: tuple[Model, int]) -> Observation:
-    """Return the observation of one simulated recording, of a model and replicate number."""
-    model, replicate = which
-    return observe(layout, model.frames(layout, replicate, seed), places=False)
+def simulated(layout: Layout, seed: int, which: tuple[Model, int, frozenset[str]]) -> Observation:
+    """Return the observation of one simulated recording, of a model and replicate number.
+
+    Last what of it is made: see `observe`.
+    """
+    model, replicate, made = which
+    return observe(layout, model.frames(layout, replicate, seed), places=False, made=made)
 
 
 @contextmanager

@@ -23,6 +23,7 @@ from analysis.mismatch.bank.together import together
 from analysis.mismatch.bank.waves import Waves, WaveSums
 from analysis.mismatch.layout import Layout, Place
 from analysis.mismatch.scenes import Local
+from analysis.mismatch.touches import ALL_SUMS, CARRY_OVER, NEIGHBOURS, SPECTRA
 from dsis.measures import Accumulator, Channel, Measured
 from dsis.measures.accumulator import LAGS
 from dsis.measures.plane import Transforms
@@ -116,11 +117,23 @@ def measure(
     layout: Layout,
     frames: Iterable[NDArray[np.generic]],
     spectra: Callable[[Transforms], None] | None = None,
+    made: frozenset[str] = ALL_SUMS,
 ) -> Measured:
-    """Return the measures of one exposure's frames; `spectra` as an `Accumulator` has it."""
+    """Return the measures of one exposure's frames; `spectra` as an `Accumulator` has it.
+
+    `made` are those of `ALL_SUMS` that are.
+    """
     size, codes = (layout.rows, layout.columns), (layout.black_dn, layout.white_dn)
     lags = _FEW_LAGS if layout.rows * layout.columns > _MANY_PIXELS else LAGS
-    sums = Accumulator(*size, layout.cfa, *codes, lags=lags, spectra=spectra)
+    sums = Accumulator(
+        *size,
+        layout.cfa,
+        *codes,
+        lags=lags,
+        spectra=spectra,
+        power=SPECTRA in made,
+        neighbours=NEIGHBOURS in made,
+    )
     for frame in frames:
         sums.add(frame)
     return sums.result()
@@ -129,10 +142,10 @@ def measure(
 class _Channel:
     """Sums over exposures of one channel."""
 
-    def __init__(self, regressors: Regressors, shape: tuple[int, int]) -> None:
+    def __init__(self, regressors: Regressors, shape: tuple[int, int], *, waves: bool) -> None:
         self.patterns = PatternSums(regressors, shape)
         self.variances = VarianceSums(shape)
-        self.spectra = SpectrumSums(shape)
+        self.spectra = SpectrumSums(shape, waves=waves)
 
     def add(
         self,
@@ -153,13 +166,13 @@ class _Channel:
 class _Whole:
     """Sums over exposures of what all channels of the sensor show together."""
 
-    def __init__(self, layout: Layout, *, samples: bool) -> None:
-        self.layout, self.samples = layout, samples
+    def __init__(self, layout: Layout, *, samples: bool, made: frozenset[str]) -> None:
+        self.layout, self.samples, self.made = layout, samples, made
         self.mosaic = len(layout.sites) > 1
         self.shape = (layout.rows, layout.columns)
         self.common: dict[str, Mapping[str, Number]] = {}
         self.bands = Bands(layout.rows, layout.sites)
-        self.waves = WaveSums(self.shape, 1 + self.mosaic)
+        self.waves = WaveSums(self.shape, 1 + self.mosaic, taken=SPECTRA in made)
         self.memory = CarryOverSums()
 
     def measured(
@@ -167,10 +180,14 @@ class _Whole:
     ) -> Measured:
         """Return the measures of an exposure's frames; take what moves in them, unless `still`."""
         lines, after = Waves(self.shape), CarryOver(keep=self.samples)
-        if self.mosaic:
-            found = measure(self.layout, after.watching(lines.watching(seen)))
-        else:  # its transforms are at hand
-            found = measure(self.layout, after.watching(seen), lambda one: lines.take(one[0]))
+        if SPECTRA not in self.made:
+            lines.frames = frames
+        elif self.mosaic:
+            seen = lines.watching(seen)
+        watched = after.watching(seen) if CARRY_OVER in self.made else seen
+        # The transforms of a sensor without colours are at hand.
+        take = None if self.mosaic else lambda one: lines.take(one[0])
+        found = measure(self.layout, watched, take, self.made)
         self.memory.add(after, still=still)
         if not still:
             places = {name: (exposure, name) for name in found.channels}
@@ -204,6 +221,7 @@ def observe(
     keep: bool = False,
     samples: bool = True,
     places: bool = True,
+    made: frozenset[str] = ALL_SUMS,
 ) -> Observation:
     """Return the observation of a recording.
 
@@ -221,11 +239,13 @@ def observe(
         Whether to keep the latter, if anything.
     places
         Whether to look where spectra are largest: of simulations only numbers are asked for.
+    made
+        Those of `ALL_SUMS` that are made: without one its numbers are unknown, all others the same.
     """
     levels: dict[Place, Level] = {}
     found: dict[Place, Mapping[str, Number]] = {}
     sums: dict[str, _Channel] = {}
-    whole = _Whole(layout, samples=keep and samples)
+    whole = _Whole(layout, samples=keep and samples, made=made)
     for exposure in layout.uniform:
         many, frames = Bulk.of(layout, exposure.name), len(exposure.numbers)
         still = {name for name in layout.channels if (exposure.name, name) in layout.still}
@@ -244,14 +264,14 @@ def observe(
             )
             if name not in sums:
                 n, m = channel.mean_frame.shape
-                sums[name] = _Channel(layout.regressors(name), (n, m))
+                sums[name] = _Channel(layout.regressors(name), (n, m), waves=SPECTRA in made)
             if name in still:
                 found[place] = dict.fromkeys(NAMES, UNKNOWN)
                 continue
             found[place] = scalars(channel, frames)
             variance, signal = layout.variance_dn2[place], layout.signal_dn[place]
             sums[name].add(exposure.name, channel, frames, variance, signal)
-    local = _scenes(layout, frames_of, watch, found, whole.common)
+    local = _scenes(layout, frames_of, watch, found, whole.common, made)
     maps, images = _maps(layout, sums)
     pooled, peaks = _pooled(sums, whole, places=places)
     return Observation(
@@ -292,12 +312,13 @@ def _scenes(
     watch: Watcher | None,
     found: dict[Place, Mapping[str, Number]],
     shared: dict[str, Mapping[str, Number]],
+    made: frozenset[str],
 ) -> dict[Place, Level]:
     """Add what scenes show to what was found; return their variances by signal."""
     local: dict[Place, Level] = {}
     for exposure in layout.pictures:
         scene = layout.scenes[exposure.name]
-        measured = measure(layout, map(scene.steadied, frames_of(exposure.name)))
+        measured = measure(layout, map(scene.steadied, frames_of(exposure.name)), made=made)
         if watch is not None:
             watch(exposure.name, measured)
         frames, parts = len(exposure.numbers), scene.channels

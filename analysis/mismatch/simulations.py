@@ -11,6 +11,7 @@ from analysis.mismatch.layout import Layout
 from analysis.mismatch.model import Model, each, simulate, simulated
 from analysis.mismatch.observe import Observation
 from analysis.mismatch.relit import relit
+from analysis.mismatch.touches import ALL_SUMS, differing, sums_for
 from dsis.camera import Camera
 
 Array = NDArray[np.float64]
@@ -29,7 +30,8 @@ class Simulations:
     seed, jobs
         Of the simulations.
     kept
-        Numbers by camera, in the order of the replicates.
+        Numbers by camera, in the order of the replicates. Those that need sums which the effects in
+        which it differs from the model's cannot change are unknown.
     """
 
     layout: Layout
@@ -56,7 +58,7 @@ class Simulations:
         if self.jobs < 2 or len(missing) < 2:
             return
 
-        work = [(self._model(wanted[key]), number) for key, number in missing]
+        work = [(self._model(own := wanted[key]), i, self._made(own)) for key, i in missing]
         made = each(partial(simulated, self.layout, self.seed), work, self.jobs)
         ahead: dict[str, list[Array]] = {}
         for (key, _), seen in zip(missing, made, strict=True):
@@ -71,13 +73,22 @@ class Simulations:
         known = self.kept.get(key, [])
         missing = range(len(known), replicates)
         if missing:
-            made = simulate(self._model(camera), self.layout, missing, self.seed, self.jobs)
-            known = [*known, *(self.numbers_of(one) for one in made)]
+            which = self._model(camera), self.layout, missing, self.seed, self.jobs
+            made = self._made(camera)
+            some = simulate(*which) if made == ALL_SUMS else simulate(*which, made=made)
+            known = [*known, *(self.numbers_of(one) for one in some)]
             self.kept[key] = known
         return np.stack(known[:replicates])
 
     def _model(self, camera: Camera) -> Model:
         return relit(self.model, camera, self.layout)
+
+    def _made(self, camera: Camera) -> frozenset[str]:
+        """Return the sums that a camera's numbers need: all, unless it differs by few effects."""
+        own = self.model.camera
+        effects = differing(camera, own)
+        alike = camera.model_copy(update={"effect": own.effect}) == own
+        return sums_for(effects) if effects and alike else ALL_SUMS
 
 
 def _key(camera: Camera) -> str:

@@ -52,6 +52,9 @@ class Accumulator:
     spectra
         Sees the transforms of each frame but the first, less the first and its own mean, of the
         planes of one size: complex64 (plane, row, column // 2 + 1).
+    power, neighbours
+        Whether to take transforms of frames, and products of neighbouring pixels: most of the time
+        goes there. Without them spectral_peak, and the correlations, are unknown.
     """
 
     def __init__(
@@ -67,8 +70,11 @@ class Accumulator:
         lags: int = LAGS,
         threads: int = 1,
         spectra: Callable[[Transforms], None] | None = None,
+        power: bool = True,
+        neighbours: bool = True,
     ) -> None:
         self.spectra = spectra
+        self.power, self.neighbours = power, neighbours
         self.frame_shape = (rows, columns)
         self.cfa, self.black_level, self.threads = cfa, black_level, threads
         self.white_level, self.lowest_code = white_level, lowest_code
@@ -139,7 +145,10 @@ class Accumulator:
             self.pair_squares.append(found.squares)
         for sheet in self.sheets:
             if self.frames:
-                transforms = sheet.add(self.difference, means, self.threads)
+                sheet.add(self.difference, means)
+                if not self.power:
+                    continue
+                transforms = sheet.transformed(self.threads)
                 if self.spectra is not None:
                     self.spectra(transforms)
             else:
@@ -162,7 +171,8 @@ class Accumulator:
                 self.moments,
                 self.threads,
             )
-        self.lag_sums += lag_products(self.centred, self.reach, self.threads)
+        if self.neighbours:
+            self.lag_sums += lag_products(self.centred, self.reach, self.threads)
 
 
 def measure_exposure(

@@ -16,7 +16,7 @@ from dsis.cfa import Cfa
 from dsis.measures import kernels
 from dsis.measures.assembly import measured
 from dsis.measures.codes import CodeCounts
-from dsis.measures.first_pass import Passed, first_pass
+from dsis.measures.first_pass import Passed, first_pass, no_change
 from dsis.measures.kernels import FiveSums, Sums
 from dsis.measures.lag_products import half_plane, lag_products
 from dsis.measures.measured import Measured
@@ -112,7 +112,9 @@ class Accumulator:
         codes = np.ascontiguousarray(frame[self.region], np.float32)
         if self.frames == 0:
             self._begin(codes)
-        found = first_pass(codes, self.first, self.before, self.difference, self.threads)
+            found = no_change(codes)
+        else:
+            found = first_pass(codes, self.first, self.before, self.difference, self.threads)
         if not (found.whole or np.isfinite(codes).all()):
             message = f"frame {self.frames} holds values that are not finite (NaN or infinite)"
             raise ValueError(message)
@@ -130,7 +132,7 @@ class Accumulator:
 
     def _begin(self, codes: NDArray[np.float32]) -> None:
         self.first = codes.copy()
-        self.before, self.difference = np.zeros_like(codes), np.empty_like(codes)
+        self.before, self.difference = np.zeros_like(codes), np.zeros_like(codes)
         self.centred, self.centred_before = np.zeros_like(codes), np.zeros_like(codes)
 
     def _take_lines(self, found: Passed) -> None:

@@ -6,9 +6,9 @@ between them.
 """
 
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import lru_cache, partial
+from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self
 
@@ -22,6 +22,7 @@ from dsis.draw import Draw
 from dsis.effects import Effect, Exposure, Image, ReadOut, Stage, any_effect
 from dsis.effects.poisson_shot_noise import PoissonShotNoise
 from dsis.errors import Fault, InputError
+from dsis.exposing import Shared, Shutter
 from dsis.grid import PixelGrid
 from dsis.model import Model, read_toml, structure
 from dsis.noise import Segments, read_noise, shot_noise
@@ -161,6 +162,7 @@ class Camera(Model):
         exposure_time_s: float | None = None,
         earlier_clean: Callable[[int], Image] | None = None,
         threads: int = 1,
+        shared: Shared | None = None,
     ) -> Image:
         """Return one noisy frame of a clean signal: whole codes less black, float32.
 
@@ -180,37 +182,14 @@ class Camera(Model):
             The clean signal k frames earlier, for effects that remember; None: a static scene.
         threads
             Threads that kernels may use.
+        shared
+            What the frame has in common with other cameras': see `Shared`.
         """
         if exposure_time_s is None:
             self._refuse_growth()
-        chain, read_out = list(_drawn(self.chain(), temporal, sensor)), self.read_out
-
-        def after(links: int, back: int) -> Image:
-            """Return what the first `links` links make of the frame `back` frames earlier."""
-            image = earlier_clean(back) if back and earlier_clean else clean
-            # Before the first frame the counter runs backwards: it has 32 bits.
-            number, lit, expected = (frame - back) % 2**32, False, image
-            for place, (link, own_temporal, own_sensor) in enumerate(chain[:links]):
-                if link.stage > Stage.LIGHT and not lit:
-                    lit, expected = True, image
-                exposure = Exposure(
-                    grid,
-                    number,
-                    own_temporal,
-                    own_sensor,
-                    expected,
-                    read_out,
-                    partial(before, place, back),
-                    exposure_time_s or 0.0,
-                    threads,
-                )
-                image = link.apply(image, exposure)
-            return image
-
-        def before(links: int, back: int, k: int) -> Image:
-            return after(links, back + k)
-
-        return after(len(chain), 0)
+        time_s = exposure_time_s or 0.0
+        shutter = Shutter(clean, temporal, sensor, frame, grid, time_s, earlier_clean, threads)
+        return shutter.through(self.chain(), self.read_out, shared)
 
     def chain(self) -> tuple[Effect, ...]:
         """Return all links, base model included, in the order that light and charge meet them."""
@@ -256,19 +235,6 @@ def _scene_from_camera(camera_from_scene: tuple[Row, Row, Row], gain: float) -> 
 def _place(link: Effect) -> tuple[int, int, str]:
     """Return where a link stands in the chain."""
     return link.stage, link.rank, link.kind
-
-
-def _drawn(
-    chain: tuple[Effect, ...], temporal: Draw, sensor: Draw
-) -> Iterator[tuple[Effect, Draw, Draw]]:
-    """Yield each link with its random fields: a second effect of one kind has fields of its own."""
-    seen: Counter[str] = Counter()
-    for link in chain:
-        seen[link.kind] += 1
-        nth = () if seen[link.kind] == 1 else (f"{link.kind} {seen[link.kind]}",)
-        yield (
-            (link, temporal.within(*nth), sensor.within(*nth)) if nth else (link, temporal, sensor)
-        )
 
 
 @dataclass(frozen=True)

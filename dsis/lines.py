@@ -1,4 +1,4 @@
-"""Images whose rows or columns are scaled or shifted: in one pass."""
+"""Images whose rows, columns or pixels are scaled or shifted: in one pass."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +31,23 @@ def lit(image: Image, down: Line, across: Line) -> Image:
     if image.ndim > 2:
         return image * (down + across)
     return _lit(image, down.reshape(-1), across.reshape(-1))
+
+
+def shifted(image: Image, pattern: Image, size: np.float32) -> Image:
+    """Return an image plus a pattern of its shape times a size."""
+    return _shifted(*_in_line(image, pattern), size).reshape(image.shape)
+
+
+def gained(image: Image, pattern: Image, size: np.float32) -> Image:
+    """Return an image times one plus a pattern of its shape times a size."""
+    return _gained(*_in_line(image, pattern), size).reshape(image.shape)
+
+
+def _in_line(image: Image, pattern: Image) -> tuple[Image, Image]:
+    if image.shape != pattern.shape:
+        message = f"the pattern is {pattern.shape}, must be as the image, {image.shape}"
+        raise ValueError(message)
+    return np.ascontiguousarray(image).reshape(-1), np.ascontiguousarray(pattern).reshape(-1)
 
 
 def _of_rows(lines: Line, image: Image) -> bool:
@@ -74,4 +91,21 @@ def _lit(image: Image, down: Line, across: Line) -> Image:
         line, into, own = image[y], out[y], down[y]
         for x in range(into.size):
             into[x] = line[x] * (own + across[x])
+    return out
+
+
+@kernel
+def _shifted(image: Image, pattern: Image, size: np.float32) -> Image:
+    out = np.empty(image.shape, np.float32)
+    for i in range(out.size):
+        out[i] = image[i] + size * pattern[i]
+    return out
+
+
+@kernel
+def _gained(image: Image, pattern: Image, size: np.float32) -> Image:
+    out = np.empty(image.shape, np.float32)
+    one = np.float32(1)
+    for i in range(out.size):
+        out[i] = image[i] * (size * pattern[i] + one)
     return out

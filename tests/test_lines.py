@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from dsis.lines import lit, moved, settled
+from dsis.lines import gained, lit, moved, settled, shifted
 
 RNG = np.random.default_rng(1)
 
@@ -42,3 +42,15 @@ def test_full_planes_share_their_lines() -> None:
     np.testing.assert_array_equal(moved(planes, down[..., 0]), planes + down)
     np.testing.assert_array_equal(settled(planes, across, across), planes * across + across)
     np.testing.assert_array_equal(lit(planes, down, across), planes * (down + across))
+
+
+@pytest.mark.parametrize("size", [(7, 5), (7, 5, 3)])
+def test_patterns_are_added_and_scaled_as_numpy_does(size: tuple[int, ...]) -> None:
+    image, pattern, by = _some(*size), _some(*size), np.float32(0.37)
+    pattern.flags.writeable = False
+    np.testing.assert_array_equal(shifted(image, pattern, by), image + by * pattern)
+    np.testing.assert_array_equal(gained(image, pattern, by), image * (by * pattern + 1))
+    part = pattern[::2, 1:4]
+    np.testing.assert_array_equal(shifted(part, part, by), part + by * part)
+    with pytest.raises(ValueError, match="must be as the image"):
+        shifted(image, pattern[1:], by)

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from dsis.cfa import Cfa
 from dsis.measures import Accumulator
+from dsis.measures.first_pass import first_pass, no_change
 
 ROWS, COLUMNS = 96, 130
 Array = NDArray[np.float64]
@@ -68,3 +69,16 @@ def test_a_third_frame_goes_on_where_two_ended() -> None:
     kept = (1 - 1 / ROWS) * (1 - 1 / COLUMNS)
     found = sums.result().channels["MONO"].variance_map
     assert np.allclose(found, flat.var(0, ddof=1) / kept, rtol=1e-4, atol=1e-2)
+
+
+@pytest.mark.parametrize("value", [7.0, 0.5, np.nan, np.inf])
+def test_a_first_frame_is_passed_over_as_any_other(value: float) -> None:
+    frame = np.random.default_rng(3).integers(10, 90, (70, 9)).astype(np.float32)
+    frame[66, 4] = value
+    own, changes = no_change(frame), np.empty_like(frame)
+    with np.errstate(invalid="ignore"):
+        whole = first_pass(frame, frame, np.zeros_like(frame), changes, 1)
+    assert own[3:] == whole[3:]
+    if np.isfinite(value):
+        for mine, other in zip(own[:3], whole[:3], strict=True):
+            np.testing.assert_array_equal(mine, other, strict=True)

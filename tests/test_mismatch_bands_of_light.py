@@ -1,6 +1,7 @@
 """Bands of light that few exposures show: what whole frames gain by them, and by nothing else."""
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -9,8 +10,9 @@ import pytest
 import scipy.special
 from numpy.typing import NDArray
 
+from analysis.mismatch import bandgain
 from analysis.mismatch.bandgain import foretold, gain_of_bands
-from analysis.mismatch.phaselaw import moving_on
+from analysis.mismatch.phaselaw import moving_on, there
 
 FramesOf = Callable[[str], Iterator[NDArray[np.float64]]]
 ROWS, COLUMNS, SD, LIGHT = 96, 32, 2.0, 400.0
@@ -179,3 +181,44 @@ def test_without_light_or_others_nothing_is_foretold() -> None:
     assert not foretold(_layout(16), _frames(DEPTH, 1, frames=16), 0.2, LOCKED).size
     every = {"flat": tuple(range(8))}
     assert not foretold(LAYOUT, _frames(DEPTH, 1), 7.3, every).size
+
+
+def test_exposures_that_are_added_gain_what_all_of_them_gain_anew(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The log-likelihood of all projections so far, whole, less that without the last exposure."""
+    layout, frames = _layout(16), _frames(1.6 * DEPTH, 5, frames=16, advance=0.27)
+    calls: list[int] = []
+    whole = bandgain.there_in
+
+    def counted(own: Any, amplitude: float, **how: bool) -> Any:
+        calls.append(own.size)
+        return whole(own, amplitude, **how)
+
+    monkeypatch.setattr(bandgain, "there_in", counted)
+    gains = foretold(layout, frames, 7.3, LOCKED)
+    assert calls == [12, 12, 16, 16]  # each exposure anew only where its frames are others
+
+    found = bandgain._found(layout, frames, 7.3)
+    assert found is not None
+    rest = np.array([n not in LOCKED["flat"] for n in range(16)])
+    numbers = np.arange(16.0)
+    others = tuple(own[rest] - own[rest].mean(0) for own in found.power.found)
+    known = replace(found, power=replace(found.power, found=others))
+    bands = bandgain._bands(known, [numbers[rest]] * 2)
+    assert bands is not None
+    amplitudes = [float(np.sqrt(bands.power * w)) for w in bands.seen.weights]
+
+    def odds(added: int) -> float:
+        own = [
+            every[:, bands.place] / np.sqrt(noise) if i < added else some[:, 0]
+            for i, (every, noise, some) in enumerate(
+                zip(found.power.found, bands.noise, bands.seen.found, strict=True)
+            )
+        ]
+        steps = [numbers if i < added else numbers[rest] for i in range(2)]
+        free = there(own, amplitudes, kept=False, real=False)
+        return float(np.logaddexp(free, moving_on(own, steps, amplitudes)) - np.log(2))
+
+    expected = [odds(1) - odds(0), odds(2) - odds(1)]
+    np.testing.assert_allclose(gains, expected, atol=1e-9)

@@ -55,11 +55,12 @@ def test_recordings_made_ahead_are_those_that_are_asked_for(
     one, other = camera(), camera().model_copy(update={"black_level": 70.0})
 
     def each(_work: Any, items: Any, _jobs: int) -> Any:
-        return [(model.camera.black_level, number) for model, number in items]
+        return [[(m.camera.black_level, number) for m, _ in some] for some, number in items]
 
     monkeypatch.setattr("analysis.mismatch.simulations.each", each)
-    model: Any = SimpleNamespace(with_camera=lambda own: SimpleNamespace(camera=own))
-    made = Simulations(SimpleNamespace(cfa=Cfa.MONO), model, np.array, 0, 2)  # type: ignore[arg-type]
+    model: Any = SimpleNamespace(with_camera=lambda own: SimpleNamespace(camera=own), camera=one)
+    layout: Any = SimpleNamespace(cfa=Cfa.MONO, rows=4, columns=6, uniform=())
+    made = Simulations(layout, model, np.array, 0, 2)
     made.keep(one, [np.array((one.black_level, 0))])
     made.ready([one, other], 3)
     for own in (one, other):

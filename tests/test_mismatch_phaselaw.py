@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import scipy.special
 from numpy.typing import NDArray
 
 from analysis.mismatch import phaselaw
@@ -96,3 +97,37 @@ def test_phases_at_random_are_not_taken_for_ones_that_move_on(amplitude: float) 
             some.append(moving_on(own, [frames], [amplitude]) - free)
     assert np.mean(np.array(told) > np.log(20)) <= 0.1
     assert np.median(told) < 0 < np.median(steady)
+
+
+def test_turns_are_summed_as_one_by_one() -> None:
+    """By the definition: every share of a turn over every frame, what is shared taken off."""
+    rng = np.random.default_rng(4)
+    numbers = [np.array([2.0, 3.0, 7.0, 30.0]), np.arange(12.0), np.array([5.0])]
+    found = [1.5 * _noise(rng, own.size) for own in numbers]
+    amplitudes = [1.2, 9.0, 0.4]
+    line = np.zeros(phaselaw._STRENGTHS.size)
+    for own, number, amplitude in zip(found, numbers, amplitudes, strict=True):
+        count = phaselaw._TURNS * int(np.ptp(number) + 1)
+        turns = np.exp(2j * np.pi * np.outer(np.arange(count) / count, number))
+        turns -= turns.mean(1, keepdims=True)
+        for i, strength in enumerate(phaselaw._STRENGTHS):
+            scale = phaselaw._MOST / max(strength * amplitude, phaselaw._MOST)
+            a, seen = strength * amplitude * scale, np.abs(np.conj(turns) @ own) * scale
+            bessel = np.log(scipy.special.i0e(2 * a * seen)) + 2 * a * seen
+            each = bessel - a**2 * (np.abs(turns) ** 2).sum(1)
+            line[i] += scipy.special.logsumexp(each) - np.log(count)
+    expected = scipy.special.logsumexp(line) - np.log(line.size)
+    assert moving_on(found, numbers, amplitudes) == pytest.approx(expected, abs=1e-9)
+
+
+@pytest.mark.parametrize(("kept", "real"), [(True, False), (False, False), (True, True)])
+def test_exposures_add_up(kept: bool, real: bool) -> None:
+    """Two exposures of one strength and phase: the mean of what both say of each."""
+    rng = np.random.default_rng(5)
+    found, amplitudes = [2 * _noise(rng, 5), _noise(rng, 4)], [1.4, 0.7]
+    alone = [
+        phaselaw.there_in(own, a, kept=kept, real=real)
+        for own, a in zip(found, amplitudes, strict=True)
+    ]
+    both = np.log(np.mean(np.exp(alone[0]) * np.exp(alone[1])))
+    assert there(found, amplitudes, kept=kept, real=real) == pytest.approx(both, rel=1e-9)

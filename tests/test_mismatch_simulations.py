@@ -28,15 +28,15 @@ def made(monkeypatch: pytest.MonkeyPatch) -> list[tuple[float, int]]:
         return [(model.camera.black_level, number) for number in replicates]
 
     def simulated(layout: Any, seed: int, which: tuple[Any, int]) -> Any:
-        return simulate(which[0], layout, [which[1]], seed, 1)[0]
+        return [simulate(model, layout, [which[1]], seed, 1)[0] for model, _ in which[0]]
 
     monkeypatch.setattr(module, "simulate", simulate)
-    monkeypatch.setattr(module, "simulated", simulated)
+    monkeypatch.setattr(module, "simulated_together", simulated)
     return found
 
 
 def simulations(jobs: int) -> Simulations:
-    layout: Any = SimpleNamespace(cfa=Cfa.MONO)
+    layout: Any = SimpleNamespace(cfa=Cfa.MONO, rows=4, columns=6, uniform=())
     return Simulations(layout, Model(CAMERAS[0], {}), np.array, 1, jobs)
 
 

@@ -12,9 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.layout import Layout
-from analysis.mismatch.phaselaw import moving_on
+from analysis.mismatch.phaselaw import moving_on_in, of_exposures, there_in
 from analysis.mismatch.projections import LEAST, FramesOf, Power, projections
 
+Part = tuple[NDArray[np.float64], NDArray[np.float64]]
+"""What one exposure adds to the log-likelihood of free phases and of steady ones."""
 _BETWEEN = (-1 / 3, 0.0, 1 / 3)  # bins by which a frequency may be off
 _FAR = (-19, -15, -12, -9, -7, -5, 5, 7, 9, 12, 15, 19)  # bins that say what rows have in common
 _NEAR = (-2, -1, 1, 2)  # bins that a band leaves as they are, and slow waves do not
@@ -44,7 +46,7 @@ def gain_of_bands(layout: Layout, frames_of: FramesOf, cycles: float) -> float:
     if bands is None:
         return -np.inf
     share = min(np.sqrt(2 * np.pi) * bands.bins, 1.0)
-    return bands.odds(bands.seen.found) - float(np.log(layout.rows / 2 / share))
+    return odds_of(bands.parts) - float(np.log(layout.rows / 2 / share))
 
 
 def foretold(
@@ -80,13 +82,13 @@ def foretold(
     bands = _bands(known, [n[some] for n, some in zip(numbers, rest, strict=True)])
     if bands is None:
         return np.zeros(0)
-    seen, counted = list(bands.seen.found), list(bands.numbers)
-    odds, gains = bands.odds(seen), []
+    parts, gains = bands.parts, []
+    odds = odds_of(parts)
     for i, (own, noise) in enumerate(zip(found.power.found, bands.noise, strict=True)):
         if rest[i].all():
             continue
-        seen[i], counted[i] = own[:, [bands.place]] / np.sqrt(noise), numbers[i]
-        gains.append(replace(bands, numbers=counted).odds(seen) - odds)
+        parts[i] = bands.part(i, own[:, bands.place] / np.sqrt(noise), numbers[i])
+        gains.append(odds_of(parts) - odds)
         odds += gains[-1]
     return np.array(gains)
 
@@ -115,15 +117,26 @@ class _Bands:
         """Standard error of the place."""
         return self.seen.bins(self.power)
 
-    def odds(self, found: Sequence[NDArray[np.complex128]]) -> float:
-        """Return the log-likelihood of bands in projections, less that of noise.
+    @property
+    def parts(self) -> list[Part]:
+        """What each exposure says of them, see `odds_of`."""
+        pairs = zip(self.seen.found, self.numbers, strict=True)
+        return [self.part(i, own[:, 0], number) for i, (own, number) in enumerate(pairs)]
 
-        Their phase is another in each frame, or moves on steadily: as likely beforehand.
-        """
-        free = replace(self.seen, found=tuple(found)).there(self.power, kept=False, real=False)
-        amplitudes = [float(np.sqrt(self.power * w)) for w in self.seen.weights]
-        steady = moving_on([own[:, 0] for own in found], self.numbers, amplitudes)
-        return float(np.logaddexp(free, steady) - np.log(2))
+    def part(self, exposure: int, own: NDArray[np.complex128], number: NDArray[np.float64]) -> Part:
+        """Return what projections (frame,) of an exposure say: of any phase, of a steady one."""
+        amplitude = float(np.sqrt(self.power * self.seen.weights[exposure]))
+        free = there_in(own, amplitude, kept=False, real=False)
+        return free, moving_on_in(own, number, amplitude)
+
+
+def odds_of(parts: Sequence[Part]) -> float:
+    """Return the log-likelihood of bands in projections of all exposures, less that of noise.
+
+    Their phase is another in each frame, or moves on steadily: as likely beforehand.
+    """
+    free, steady = (of_exposures(own) for own in zip(*parts, strict=True))
+    return float(np.logaddexp(free, steady) - np.log(2))
 
 
 def _found(layout: Layout, frames_of: FramesOf, cycles: float) -> _Found | None:

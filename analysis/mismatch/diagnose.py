@@ -104,7 +104,7 @@ def _found(
     layout = layout_of(recording, development, source.frames)
     layout = replace(layout, moving=(*moving, *layout.moving))
     numbers = {e.name: e.numbers for e in layout.exposures}
-    remarks = remarks_on(recording, development, layout)
+    remarks = (*remarks_on(recording, development, layout), *(() if words else (_LOCATED,)))
     # What is left out proves nothing either: copies of a frame are told from any simulation.
     split = split.without(development.keys() - {e.name for e in layout.exposures})
     album, frames_of = Album(layout), partial(_frames_of, source, numbers)
@@ -112,7 +112,6 @@ def _found(
     large = layout.large
     setting = Setting.of(layout, seen, split.interpolated, *how)
     setting = replace(setting, given=len(camera.effect))
-    remarks = remarks if words else (*remarks, _LOCATED)
 
     trial = Trial.of(recording, split, source, setting)
     whole = State.of(setting if large else _of_all_frames(setting, trial), camera, step)
@@ -123,6 +122,8 @@ def _found(
         found = _finding(camera, whole, whole, search, {}, proof, {})
         return _said(found, remarks, evidence, words)
     base = whole if large else State.of(setting, camera, step)
+    # Of a large recording lines are looked for, and measured, in the same frames.
+    frames = WholeFrames(with_all_frames(layout) if large else layout, frames_of)
     search = Search(
         setting,
         camera,
@@ -130,8 +131,8 @@ def _found(
         words,
         step,
         whole=None if large else whole.setting,
-        lines=WholeFrames(with_all_frames(layout), frames_of) if large else trial.lines,
-        measuring=WholeFrames(with_all_frames(layout) if large else layout, frames_of),
+        lines=frames if large else trial.lines,
+        measuring=frames,
     )
     final = _searched(search, source) if large else search.run()
     known: dict[str, Array] = {}

@@ -5,7 +5,6 @@ the others is judged by `given`. So a fixed pattern that locked frames share wit
 as it should.
 """
 
-from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
@@ -26,7 +25,7 @@ from analysis.mismatch.split import Split
 from analysis.mismatch.state import Setting, State
 from analysis.mismatch.taking import layout_of
 from analysis.mismatch.thinned import Stage, thinned
-from analysis.mismatch.touches import touched
+from analysis.mismatch.touches import ALL_SUMS, differing, sums_for, touched
 from analysis.mismatch.vector import Vector, vector
 from dsis.camera import Camera
 from dsis.recording import Recording
@@ -50,7 +49,7 @@ class HeldNumbers:
     setting
         Of the diagnosis.
     kept
-        Numbers of simulated recordings, by yardstick and camera.
+        Numbers of simulated recordings, by yardstick, camera and sums that were made.
     """
 
     recording: Recording
@@ -113,8 +112,10 @@ class HeldNumbers:
         """
         if not self.frames:
             return None
-        yardstick = _yardstick(final, without)
-        one, other = (self._made(yardstick, final, camera) for camera in (final.camera, without))
+        yardstick, effects = _yardstick(final, without), differing(final.camera, without)
+        made = sums_for(effects) if effects else ALL_SUMS
+        cameras = final.camera, without
+        one, other = (self._made(yardstick, final, camera, made) for camera in cameras)
         layout, seen = self.whole
         parts = ((layout, seen), self.rest)
         recorded = [_vector_of(yardstick, *part) for part in parts]
@@ -123,24 +124,26 @@ class HeldNumbers:
             Numbers(own.values[of], one[i][:, of], other[i][:, of], own.errors[of])
             for i, (own, of) in enumerate(zip(recorded, places, strict=True))
         )
-        mine, theirs = Counter(final.camera.effect), Counter(without.effect)
-        effects = list(((mine - theirs) + (theirs - mine)).keys())
         may = touched(keys, effects) if effects else np.ones(len(keys), bool)
         return ratio(whole, rest, [(key.statistic, key.scope) for key in keys], may)
 
-    def _made(self, yardstick: Calibrated, final: State, camera: Camera) -> tuple[Array, Array]:
+    def _made(
+        self, yardstick: Calibrated, final: State, camera: Camera, sums: frozenset[str]
+    ) -> tuple[Array, Array]:
         """Return the numbers of simulated recordings: of all frames, and without the locked ones.
 
-        Each is (recording, number).
+        Each is (recording, number). `sums` are those that the numbers asked for need.
         """
         judge = yardstick.model.camera.model_dump_json()
-        key = f"{judge} {final.camera.model_dump_json()} {camera.model_dump_json()}"
+        cameras = f"{judge} {final.camera.model_dump_json()} {camera.model_dump_json()}"
+        key = f"{cameras} {sorted(sums)}"
         if key not in self.kept:
             whole, rest = self.whole[0], self.rest[0]
             count = _FEW if self.setting.large else _SIMULATIONS
             model, seed = relit(final.calibrated.model, camera, whole), self.setting.seed + 3
 
-            seen = each(partial(_two, model, whole, rest, seed), range(count), self.setting.jobs)
+            work = partial(_two, model, whole, rest, (seed, sums))
+            seen = each(work, range(count), self.setting.jobs)
             made = [
                 [
                     _vector_of(yardstick, *part).values
@@ -181,22 +184,31 @@ def _shared(parts: Sequence[Vector]) -> tuple[list[Key], list[list[int]]]:
 
 
 def _two(
-    model: Model, whole: Layout, rest: Layout, seed: int, replicate: int
+    model: Model, whole: Layout, rest: Layout, how: tuple[int, frozenset[str]], replicate: int
 ) -> tuple[Observation, Observation]:
-    """Return what all frames of a simulated recording show, and what those of `rest` show."""
+    """Return what all frames of a simulated recording show, and what those of `rest` show.
+
+    `how` are the seed, and which sums are made.
+    """
+    seed, sums = how
     frames, again = (model.frames(own, replicate, seed) for own in (whole, rest))
-    return _observed(whole, rest, frames, again)
+    return _observed(whole, rest, frames, again, sums)
 
 
 def _observed(
-    whole: Layout, rest: Layout, frames: Simulated, again: Simulated
+    whole: Layout,
+    rest: Layout,
+    frames: Simulated,
+    again: Simulated,
+    sums: frozenset[str] = ALL_SUMS,
 ) -> tuple[Observation, Observation]:
     """Return what all simulated frames show, and what those of `rest` show.
 
     Frames are simulated once and kept, or again where there are too many to keep.
     """
+    seen = partial(observe, places=False, made=sums)
     if rest.samples > _MOST_KEPT:
-        return observe(whole, frames, places=False), observe(rest, again, places=False)
+        return seen(whole, frames), seen(rest, again)
     numbers = {e.name: e.numbers for e in whole.exposures}
     wanted = {e.name: frozenset(e.numbers) for e in rest.exposures}
     kept: dict[str, list[NDArray[np.uint16]]] = {name: [] for name in wanted}
@@ -207,4 +219,4 @@ def _observed(
                 kept[name].append(codes.astype(np.uint16))
             yield codes
 
-    return observe(whole, watched, places=False), observe(rest, kept.pop, places=False)
+    return seen(whole, watched), seen(rest, kept.pop)

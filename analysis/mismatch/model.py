@@ -19,15 +19,18 @@ from numpy.typing import NDArray
 from analysis.mismatch.layout import Layout
 from analysis.mismatch.observe import Observation, observe
 from analysis.mismatch.scenes import without_picture
+from analysis.mismatch.touches import ALL_SUMS
 from dsis.camera import Camera
 from dsis.draw import Draw, keep_fields
 from dsis.effects import Image
 from dsis.effects.pink_noise import keep_series
+from dsis.exposing import Shared
 from dsis.grid import PixelGrid
 from dsis.simulate.shot import tiled
 from dsis.workers import Workers, workers
 
 Sites = NDArray[np.float64]
+Shots = Callable[[str, int, Shared | None], Image]
 T = TypeVar("T")
 R = TypeVar("R")
 _KEPT_BYTES = 400 << 20  # of pink noise, in each process: 300 frames of VGA
@@ -57,40 +60,71 @@ class Model:
 
     def frames(self, layout: Layout, replicate: int, seed: int) -> Callable[[str], Iterator[Image]]:
         """Return what gives the codes of an exposure's frames: float32 (row, column), DN."""
+        shot = self.shots(layout, replicate, seed)
+        numbers = {e.name: e.numbers for e in layout.exposures}
+
+        def of(name: str) -> Iterator[Image]:
+            for number in numbers[name]:
+                yield shot(name, number, None)
+
+        return of
+
+    def shots(self, layout: Layout, replicate: int, seed: int) -> Shots:
+        """Return what gives the codes of a frame by the name of its exposure and its number.
+
+        Last comes what the frame has in common with other cameras': see `Shared`.
+        """
         keep_series(_KEPT_BYTES)
         keep_fields(_FIELDS_BYTES)
         grid = PixelGrid(layout.rows, layout.columns, layout.cfa)
         sensor = Draw(seed).within("sensor", str(replicate))
         times = {e.name: e.exposure_time_s for e in layout.exposures}
-        numbers = {e.name: e.numbers for e in layout.exposures}
         black = np.float32(self.camera.black_level)
+        lit: dict[str, tuple[Camera, Image]] = {}
 
-        def of(name: str) -> Iterator[Image]:
+        def light(name: str) -> tuple[Camera, Image]:
+            picture, signal = name in layout.scenes, self.signals[name]
+            if picture:
+                return without_picture(self.camera), signal.astype(np.float32)
+            return self.camera, tiled(signal, grid)
+
+        def shot(name: str, number: int, shared: Shared | None) -> Image:
+            if name not in lit:
+                lit.clear()
+                lit[name] = light(name)
+            camera, clean = lit[name]
             temporal = Draw(seed).within("exposure", name, str(replicate))
-            picture = name in layout.scenes
-            camera = without_picture(self.camera) if picture else self.camera
-            signal = self.signals[name]
-            clean = signal.astype(np.float32) if picture else tiled(signal, grid)
-            for number in numbers[name]:
-                image = camera.expose(
-                    clean, temporal, sensor, number, grid, exposure_time_s=times[name]
-                )
-                yield np.rint(image + black)
+            time_s = times[name]
+            image = camera.expose(
+                clean, temporal, sensor, number, grid, exposure_time_s=time_s, shared=shared
+            )
+            return np.asarray(np.rint(image + black))
 
-        return of
+        return shot
 
 
 def simulate(
-    model: Model, layout: Layout, replicates: Sequence[int], seed: int, jobs: int
+    model: Model,
+    layout: Layout,
+    replicates: Sequence[int],
+    seed: int,
+    jobs: int,
+    made: frozenset[str] = ALL_SUMS,
 ) -> list[Observation]:
-    """Return the observations of simulated recordings, one for each replicate number."""
-    return each(partial(simulated, layout, seed), [(model, one) for one in replicates], jobs)
+    """Return the observations of simulated recordings, one for each replicate number.
+
+    `made` as of `observe`.
+    """
+    return each(partial(simulated, layout, seed), [(model, one, made) for one in replicates], jobs)
 
 
-def simulated(layout: Layout, seed: int, which: tuple[Model, int]) -> Observation:
-    """Return the observation of one simulated recording, of a model and replicate number."""
-    model, replicate = which
-    return observe(layout, model.frames(layout, replicate, seed), places=False)
+def simulated(layout: Layout, seed: int, which: tuple[Model, int, frozenset[str]]) -> Observation:
+    """Return the observation of one simulated recording, of a model and replicate number.
+
+    Last what of it is made: see `observe`.
+    """
+    model, replicate, made = which
+    return observe(layout, model.frames(layout, replicate, seed), places=False, made=made)
 
 
 @contextmanager

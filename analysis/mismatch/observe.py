@@ -2,36 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Generator, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from math import nan
 
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.mismatch.bank.bands import Bands
 from analysis.mismatch.bank.bulk import Bulk
-from analysis.mismatch.bank.carryover import CarryOver, CarryOverSums, Samples
+from analysis.mismatch.bank.carryover import Samples
 from analysis.mismatch.bank.coherent import Peak, SpectrumSums
 from analysis.mismatch.bank.common import common
 from analysis.mismatch.bank.local import local_scalars, variances, widened
-from analysis.mismatch.bank.maps import PatternSums, Regressors
 from analysis.mismatch.bank.parts import Parts, parts
-from analysis.mismatch.bank.persistent import VarianceSums
 from analysis.mismatch.bank.scalars import NAMES, UNKNOWN, Number, scalars
 from analysis.mismatch.bank.together import together
-from analysis.mismatch.bank.waves import Waves, WaveSums
 from analysis.mismatch.layout import Layout, Place
 from analysis.mismatch.scenes import Local
-from dsis.measures import Accumulator, Channel, Measured
-from dsis.measures.accumulator import LAGS
-from dsis.measures.plane import Transforms
+from analysis.mismatch.summed import ChannelSums, SensorSums, measure
+from analysis.mismatch.touches import ALL_SUMS, SPECTRA
+from dsis.measures import Channel, Measured
 
 Array = NDArray[np.float64]
-_FEW_LAGS = 2  # of neighbours: the bank asks for no farther ones
-_MANY_PIXELS = 2e5  # of which farther ones would take long
 
 Frames = Callable[[str], Iterable[NDArray[np.generic]]]
+Observing = Generator[None, None, "Observation"]
 Watcher = Callable[[str, Measured], None]
 
 
@@ -112,90 +107,6 @@ class Observation:
         return self.levels.get(place) or self.local.get(place)
 
 
-def measure(
-    layout: Layout,
-    frames: Iterable[NDArray[np.generic]],
-    spectra: Callable[[Transforms], None] | None = None,
-) -> Measured:
-    """Return the measures of one exposure's frames; `spectra` as an `Accumulator` has it."""
-    size, codes = (layout.rows, layout.columns), (layout.black_dn, layout.white_dn)
-    lags = _FEW_LAGS if layout.rows * layout.columns > _MANY_PIXELS else LAGS
-    sums = Accumulator(*size, layout.cfa, *codes, lags=lags, spectra=spectra)
-    for frame in frames:
-        sums.add(frame)
-    return sums.result()
-
-
-class _Channel:
-    """Sums over exposures of one channel."""
-
-    def __init__(self, regressors: Regressors, shape: tuple[int, int]) -> None:
-        self.patterns = PatternSums(regressors, shape)
-        self.variances = VarianceSums(shape)
-        self.spectra = SpectrumSums(shape)
-
-    def add(
-        self,
-        exposure: str,
-        channel: Channel,
-        frames: int,
-        variance_dn2: float,
-        signal_dn: float,
-    ) -> None:
-        """Take one exposure; the variance and signal that are expected weigh it."""
-        pixel = channel.estimates["pixel_variance"].value
-        self.patterns.add(exposure, channel.mean_frame, pixel, frames)
-        if frames > 2:
-            self.variances.add(channel.variance_map, (frames - 1) / variance_dn2)
-        self.spectra.add(channel, frames, variance_dn2, signal_dn)
-
-
-class _Whole:
-    """Sums over exposures of what all channels of the sensor show together."""
-
-    def __init__(self, layout: Layout, *, samples: bool) -> None:
-        self.layout, self.samples = layout, samples
-        self.mosaic = len(layout.sites) > 1
-        self.shape = (layout.rows, layout.columns)
-        self.common: dict[str, Mapping[str, Number]] = {}
-        self.bands = Bands(layout.rows, layout.sites)
-        self.waves = WaveSums(self.shape, 1 + self.mosaic)
-        self.memory = CarryOverSums()
-
-    def measured(
-        self, exposure: str, frames: int, seen: Iterable[NDArray[np.generic]], *, still: bool
-    ) -> Measured:
-        """Return the measures of an exposure's frames; take what moves in them, unless `still`."""
-        lines, after = Waves(self.shape), CarryOver(keep=self.samples)
-        if self.mosaic:
-            found = measure(self.layout, after.watching(lines.watching(seen)))
-        else:  # its transforms are at hand
-            found = measure(self.layout, after.watching(seen), lambda one: lines.take(one[0]))
-        self.memory.add(after, still=still)
-        if not still:
-            places = {name: (exposure, name) for name in found.channels}
-            expected = {name: self.layout.variance_dn2[place] for name, place in places.items()}
-            self.waves.add(lines, found.channels, expected)
-            if self.mosaic:
-                signals = {name: self.layout.signal_dn[place] for name, place in places.items()}
-                sites = self.layout.sites
-                self.common[exposure] = common(found.channels, signals, frames, sites)
-                self.bands.add(found.channels, expected, signals, frames)
-        return found
-
-    def numbers(self) -> dict[str, Number]:
-        """Return spectra and memories of the whole sensor."""
-        own = self.bands.numbers() if self.mosaic else {}
-        waves = {"spectral_peak": self.waves.number(), **self.waves.odd_lags()}
-        return {**own, **self.memory.numbers(), **waves}
-
-    def peaks(self) -> dict[str, Peak]:
-        """Return where its spectra are largest, by kind."""
-        own = self.bands.peaks() if self.mosaic else {}
-        peak = self.waves.peak()
-        return own if peak is None else {**own, "spectrum": peak}
-
-
 def observe(
     layout: Layout,
     frames_of: Frames,
@@ -204,6 +115,7 @@ def observe(
     keep: bool = False,
     samples: bool = True,
     places: bool = True,
+    made: frozenset[str] = ALL_SUMS,
 ) -> Observation:
     """Return the observation of a recording.
 
@@ -221,11 +133,39 @@ def observe(
         Whether to keep the latter, if anything.
     places
         Whether to look where spectra are largest: of simulations only numbers are asked for.
+    made
+        Those of `ALL_SUMS` that are made: without one its numbers are unknown, all others the same.
     """
+    return finished(
+        observing(layout, frames_of, watch, keep=keep, samples=samples, places=places, made=made)
+    )
+
+
+def finished(running: Observing) -> Observation:
+    """Return the observation that `observing` ends with."""
+    while True:
+        try:
+            next(running)
+        except StopIteration as end:
+            found: Observation = end.value
+            return found
+
+
+def observing(
+    layout: Layout,
+    frames_of: Frames,
+    watch: Watcher | None = None,
+    *,
+    keep: bool = False,
+    samples: bool = True,
+    places: bool = True,
+    made: frozenset[str] = ALL_SUMS,
+) -> Observing:
+    """Observe as `observe` does, and pause whenever an exposure of uniform light was looked at."""
     levels: dict[Place, Level] = {}
     found: dict[Place, Mapping[str, Number]] = {}
-    sums: dict[str, _Channel] = {}
-    whole = _Whole(layout, samples=keep and samples)
+    sums: dict[str, ChannelSums] = {}
+    whole = SensorSums(layout, samples=keep and samples, made=made)
     for exposure in layout.uniform:
         many, frames = Bulk.of(layout, exposure.name), len(exposure.numbers)
         still = {name for name in layout.channels if (exposure.name, name) in layout.still}
@@ -244,14 +184,15 @@ def observe(
             )
             if name not in sums:
                 n, m = channel.mean_frame.shape
-                sums[name] = _Channel(layout.regressors(name), (n, m))
+                sums[name] = ChannelSums(layout.regressors(name), (n, m), waves=SPECTRA in made)
             if name in still:
                 found[place] = dict.fromkeys(NAMES, UNKNOWN)
                 continue
             found[place] = scalars(channel, frames)
             variance, signal = layout.variance_dn2[place], layout.signal_dn[place]
             sums[name].add(exposure.name, channel, frames, variance, signal)
-    local = _scenes(layout, frames_of, watch, found, whole.common)
+        yield
+    local = _scenes(layout, frames_of, watch, found, whole.common, made)
     maps, images = _maps(layout, sums)
     pooled, peaks = _pooled(sums, whole, places=places)
     return Observation(
@@ -268,7 +209,7 @@ def observe(
 
 
 def _pooled(
-    sums: Mapping[str, _Channel], whole: _Whole, *, places: bool
+    sums: Mapping[str, ChannelSums], whole: SensorSums, *, places: bool
 ) -> tuple[dict[str, Mapping[str, Number]], dict[tuple[str, str], Peak]]:
     """Return spectra and persistent variances, and where spectra are largest; "": a mosaic's."""
     spectra = {name: own.spectra for name, own in sums.items()}
@@ -292,12 +233,13 @@ def _scenes(
     watch: Watcher | None,
     found: dict[Place, Mapping[str, Number]],
     shared: dict[str, Mapping[str, Number]],
+    made: frozenset[str],
 ) -> dict[Place, Level]:
     """Add what scenes show to what was found; return their variances by signal."""
     local: dict[Place, Level] = {}
     for exposure in layout.pictures:
         scene = layout.scenes[exposure.name]
-        measured = measure(layout, map(scene.steadied, frames_of(exposure.name)))
+        measured = measure(layout, map(scene.steadied, frames_of(exposure.name)), made=made)
         if watch is not None:
             watch(exposure.name, measured)
         frames, parts = len(exposure.numbers), scene.channels
@@ -331,7 +273,7 @@ def _by_signal(channel: Channel, frames: int, own: Local) -> dict[str, Level]:
 
 
 def _maps(
-    layout: Layout, sums: Mapping[str, _Channel]
+    layout: Layout, sums: Mapping[str, ChannelSums]
 ) -> tuple[dict[tuple[str, str], Mapping[str, Number]], dict[tuple[str, str], tuple[Array, float]]]:
     """Return the statistics of all maps, and the maps with their noise."""
     numbers: dict[tuple[str, str], Mapping[str, Number]] = {}

@@ -66,15 +66,26 @@ def there(
         Whether all samples of the pattern are real: projections are, noise and all; then it has no
         phase but its sign.
     """
+    pairs = zip(found, amplitudes, strict=True)
+    return of_exposures([there_in(*pair, kept=kept, real=real) for pair in pairs])
+
+
+def there_in(own: Complex, amplitude: float, *, kept: bool, real: bool) -> Array:
+    """Return what one exposure adds to `there`: by amplitude and by phase."""
     phases = tuple(_phases()) if kept and not real else (1.0 + 0.0j,)
     unit = np.sqrt(0.5) if real else 1.0
-    line = np.zeros((_STRENGTHS.size, len(phases)))
-    for own, amplitude in zip(found, amplitudes, strict=True):
-        for i, strength in enumerate(_STRENGTHS):
-            scale = unit * _MOST / max(strength * amplitude, _MOST)
-            one, other = _likelihoods(own * scale, strength * amplitude * scale, phases)
-            _, nothing = _likelihoods(own * scale, 0.0, phases[:1])
-            line[i] += (one if kept or real else other) - nothing
+    line = np.empty((_STRENGTHS.size, len(phases)))
+    for i, strength in enumerate(_STRENGTHS):
+        scale = unit * _MOST / max(strength * amplitude, _MOST)
+        one, other = _likelihoods(own * scale, strength * amplitude * scale, phases)
+        _, nothing = _likelihoods(own * scale, 0.0, phases[:1])
+        line[i] = (one if kept or real else other) - nothing
+    return line
+
+
+def of_exposures(parts: Sequence[Array]) -> float:
+    """Return the log-likelihood of all exposures: a mean over amplitudes and phases."""
+    line = sum(parts, np.zeros_like(parts[0]))
     return float(scipy.special.logsumexp(line) - np.log(line.size))
 
 
@@ -94,20 +105,30 @@ def moving_on(
     found, amplitudes
         As above.
     numbers
-        Of the frames in their exposure.
+        Of the frames in their exposure: whole.
     """
-    line = np.zeros(_STRENGTHS.size)
-    for own, number, amplitude in zip(found, numbers, amplitudes, strict=True):
-        count = _TURNS * int(np.ptp(number) + 1)
-        turns = np.exp(2j * np.pi * np.outer(np.arange(count) / count, number))
-        turns -= turns.mean(1, keepdims=True)
-        size, square = np.abs(np.conj(turns) @ own), (np.abs(turns) ** 2).sum(1)
-        for i, strength in enumerate(_STRENGTHS):
-            scale = _MOST / max(strength * amplitude, _MOST)
-            a, seen = strength * amplitude * scale, size * scale
-            each = np.log(scipy.special.i0e(2 * a * seen)) + 2 * a * seen - a**2 * square
-            line[i] += scipy.special.logsumexp(each) - np.log(count)
-    return float(scipy.special.logsumexp(line) - np.log(line.size))
+    parts = zip(found, numbers, amplitudes, strict=True)
+    return of_exposures([moving_on_in(*part) for part in parts])
+
+
+def moving_on_in(own: Complex, number: Array, amplitude: float) -> Array:
+    """Return what one exposure adds to `moving_on`: by amplitude.
+
+    Sums over its frames, turned by each share of a turn that is tried, are a Fourier transform.
+    """
+    first, size = int(number.min()), own.size
+    count = _TURNS * int(np.ptp(number) + 1)
+    series = np.zeros((2, count), np.complex128)
+    series[:, number.astype(np.intp) - first] = own, np.full(size, 1 / size)
+    summed, mean = np.fft.fft(series)
+    moved, square = np.abs(summed - mean * own.sum()), size * (1 - np.abs(mean) ** 2)
+    line = np.empty(_STRENGTHS.size)
+    for i, strength in enumerate(_STRENGTHS):
+        scale = _MOST / max(strength * amplitude, _MOST)
+        a, seen = strength * amplitude * scale, moved * scale
+        each = np.log(scipy.special.i0e(2 * a * seen)) + 2 * a * seen - a**2 * square
+        line[i] = scipy.special.logsumexp(each) - np.log(count)
+    return line
 
 
 def strength_of(

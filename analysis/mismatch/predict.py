@@ -7,7 +7,6 @@ scatter by more than that, and by a law that is known: chi-squared (Wilson & Hil
 their cube roots). Counts of pixels have theirs; see `counted`.
 """
 
-from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -19,7 +18,7 @@ from analysis.mismatch.bank.key import Key
 from analysis.mismatch.counted import Counted
 from analysis.mismatch.null import Null
 from analysis.mismatch.simulations import Simulations
-from analysis.mismatch.touches import touched
+from analysis.mismatch.touches import differing, touched
 from analysis.mismatch.vector import Vector
 from dsis.camera import Camera
 
@@ -88,9 +87,7 @@ class Predictor:
 
         Numbers that the effects in which the cameras differ cannot change stay as they are.
         """
-        mine, theirs = Counter(camera.effect), Counter(self.reference.camera.effect)
-        different = list(((mine - theirs) + (theirs - mine)).keys())
-        may = touched(self.reference.vector.keys, different)
+        may = touched(self.reference.vector.keys, differing(camera, self.reference.camera))
         made = self.simulations.of(camera, self.replicates)
         return np.asarray(np.where(may, made - self.base, 0.0))
 

@@ -1,16 +1,19 @@
 """Numbers of simulated recordings, by camera: each recording is simulated once."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.layout import Layout
-from analysis.mismatch.model import Model, each, simulate, simulated
+from analysis.mismatch.model import Model, each, simulate
 from analysis.mismatch.observe import Observation
 from analysis.mismatch.relit import relit
+from analysis.mismatch.together import Work, most_together, shared_links, simulated_together
+from analysis.mismatch.touches import ALL_SUMS, differing, sums_for
 from dsis.camera import Camera
 
 Array = NDArray[np.float64]
@@ -29,7 +32,8 @@ class Simulations:
     seed, jobs
         Of the simulations.
     kept
-        Numbers by camera, in the order of the replicates.
+        Numbers by camera, in the order of the replicates. Those that need sums which the effects in
+        which it differs from the model's cannot change are unknown.
     """
 
     layout: Layout
@@ -56,11 +60,18 @@ class Simulations:
         if self.jobs < 2 or len(missing) < 2:
             return
 
-        work = [(self._model(wanted[key]), number) for key, number in missing]
-        made = each(partial(simulated, self.layout, self.seed), work, self.jobs)
+        own = self.model.camera
+        parting = {key: shared_links([own, one])[1][1] for key, one in wanted.items()}
+        groups = _groups(missing, parting, most_together(self.layout), self.jobs)
+        work: list[Work] = [
+            ([(self._model(wanted[key]), self._made(wanted[key])) for key in keys], number)
+            for keys, number in groups
+        ]
+        made = each(partial(simulated_together, self.layout, self.seed), work, self.jobs)
         ahead: dict[str, list[Array]] = {}
-        for (key, _), seen in zip(missing, made, strict=True):
-            ahead.setdefault(key, []).append(self.numbers_of(seen))
+        for (keys, _), some in zip(groups, made, strict=True):
+            for key, seen in zip(keys, some, strict=True):
+                ahead.setdefault(key, []).append(self.numbers_of(seen))
         for key, more in ahead.items():
             known = self.kept.get(key, [])
             self.kept[key] = [*known[: replicates - len(more)], *more]
@@ -71,13 +82,40 @@ class Simulations:
         known = self.kept.get(key, [])
         missing = range(len(known), replicates)
         if missing:
-            made = simulate(self._model(camera), self.layout, missing, self.seed, self.jobs)
-            known = [*known, *(self.numbers_of(one) for one in made)]
+            which = self._model(camera), self.layout, missing, self.seed, self.jobs
+            made = self._made(camera)
+            some = simulate(*which) if made == ALL_SUMS else simulate(*which, made=made)
+            known = [*known, *(self.numbers_of(one) for one in some)]
             self.kept[key] = known
         return np.stack(known[:replicates])
 
     def _model(self, camera: Camera) -> Model:
         return relit(self.model, camera, self.layout)
+
+    def _made(self, camera: Camera) -> frozenset[str]:
+        """Return the sums that a camera's numbers need: all, unless it differs by few effects."""
+        own = self.model.camera
+        effects = differing(camera, own)
+        alike = camera.model_copy(update={"effect": own.effect}) == own
+        return sums_for(effects) if effects and alike else ALL_SUMS
+
+
+def _groups(
+    missing: Sequence[tuple[str, int]], parting: Mapping[str, int], most: int, jobs: int
+) -> list[tuple[list[str], int]]:
+    """Return keys of cameras that are simulated side by side, at most so many, and the replicate.
+
+    Those that part from the model behind as many links (`parting`) have most in common, those that
+    part early take longest and come first; there are groups for all jobs.
+    """
+    found = []
+    for number in sorted({number for _, number in missing}):
+        keys = [key for key, own in missing if own == number]
+        keys.sort(key=lambda key: -parting[key])
+        count = min(-(-max(-(-len(keys) // most), 1) // jobs) * jobs, len(keys))
+        ends = [len(keys) * i // count for i in range(count + 1)]
+        found += [(keys[a:b], number) for a, b in pairwise(ends)][::-1]
+    return found
 
 
 def _key(camera: Camera) -> str:

@@ -1,11 +1,16 @@
-"""Which numbers of the bank an effect may change: those that follow from its measures."""
+"""Which numbers of the bank an effect may change: those that follow from its measures.
 
-from collections.abc import Sequence
+And which sums over frames such numbers need: of simulated frames no others are made.
+"""
+
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.bank.key import Key
+from dsis.camera import Camera
 from dsis.effects import Effect
 
 _LINES = frozenset({"row_variance", "column_variance", "frame_variance"})
@@ -56,6 +61,27 @@ _FOLLOWS = {
     "code_spacing": frozenset({"code_spacing", "skewness"}),
 }
 
+SPECTRA, NEIGHBOURS, CARRY_OVER = "spectra", "neighbours", "carry_over"
+_NEED: Mapping[str, frozenset[str]] = {
+    SPECTRA: frozenset({"spectral_peak", "line_correlation", "alternation_variance"}),
+    NEIGHBOURS: _CORRELATIONS | {"fixed_correlation_0_1", "fixed_correlation_1_0"},
+    CARRY_OVER: frozenset({"carry_over"}),
+}
+ALL_SUMS = frozenset(_NEED)
+"""Sums over frames that take long: power of waves, products of neighbours, samples by the code
+before. All other sums are always made."""
+
+
+def differing(one: Camera, other: Camera) -> list[Effect]:
+    """Return the effects that one of two cameras has and the other has not."""
+    mine, theirs = Counter(one.effect), Counter(other.effect)
+    return list(((mine - theirs) + (theirs - mine)).keys())
+
+
+def sums_for(effects: Sequence[Effect]) -> frozenset[str]:
+    """Return which of `ALL_SUMS` the numbers need that some of the effects may change."""
+    return frozenset(name for name, needing in _NEED.items() if _changed(needing, effects))
+
 
 def touched(keys: Sequence[Key], effects: Sequence[Effect]) -> NDArray[np.bool_]:
     """Return which numbers some of the effects may change.
@@ -63,9 +89,14 @@ def touched(keys: Sequence[Key], effects: Sequence[Effect]) -> NDArray[np.bool_]
     What is drawn at random for every line or pixel has no side: it leans one way on one sensor and
     the other way on the next. Few simulated sensors would say which, and be wrong.
     """
-    names = {key.statistic for key in keys}
+    may = _changed({key.statistic for key in keys}, effects)
+    return np.array([key.statistic in may for key in keys], bool)
+
+
+def _changed(names: Iterable[str], effects: Sequence[Effect]) -> set[str]:
+    """Return which statistics some of the effects may change."""
     may: set[str] = set()
     for effect in effects:
         own = {name for name in names if effect.measures & _FOLLOWS.get(name, frozenset({name}))}
         may |= own - _SIDED if effect.draws else own
-    return np.array([key.statistic in may for key in keys], bool)
+    return may

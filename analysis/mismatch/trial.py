@@ -79,6 +79,12 @@ def _loglik(held: Held, signals: Signals, seed: int, camera: Camera) -> Loglik:
     return loglik_of(held, camera, signals, seed=seed)
 
 
+def _key(camera: Camera, signals: Signals) -> tuple[str, bytes]:
+    """Return what tells log-likelihoods apart."""
+    light = b"".join(name.encode() + own.tobytes() for name, own in sorted(signals.items()))
+    return camera.model_dump_json(), light
+
+
 def _per_frame(told: Ratio, frames: int) -> Gain:
     value, error = told.nats / frames, _NORMAL * told.error / frames
     return Gain(value, (value - error, value + error))
@@ -161,8 +167,7 @@ class Trial:
 
     def _logliks(self, held: Held, cameras: Sequence[Camera], signals: Signals) -> list[Loglik]:
         """Return the log-likelihood of the locked frames under each camera."""
-        light = b"".join(name.encode() + own.tobytes() for name, own in sorted(signals.items()))
-        keys = [(camera.model_dump_json(), light) for camera in cameras]
+        keys = [_key(camera, signals) for camera in cameras]
         missing = {k: c for k, c in zip(keys, cameras, strict=True) if k not in self.likely}
         likely = partial(_loglik, held, signals, self.seed)
         # Of large frames more would be sent to processes than is won.
@@ -183,7 +188,8 @@ class Trial:
         seen = hold_seen(self.recording, *frames, self.held)
         models = base.camera, final.camera, signals
         jobs = self.numbers.setting.jobs
-        numbers = prove_held(self.held, *models, seed=self.seed, jobs=jobs, seen=seen)
+        known = self.likely.get(_key(final.camera, signals))
+        numbers = prove_held(self.held, *models, seed=self.seed, jobs=jobs, seen=seen, known=known)
         step()
         gap = self._gap(base, final, source) if base.mismatches else None
         locked = dict(self.split.locked)

@@ -11,6 +11,7 @@ from pydantic import Field, field_validator
 from dsis.cfa import Cfa
 from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, Stage
 from dsis.grid import PixelGrid
+from dsis.lines import shifted
 
 Frequency = Annotated[float, Field(ge=-0.5, le=0.5)]
 _POINT = PixelGrid(1, 1, Cfa.MONO)
@@ -67,7 +68,10 @@ class BistablePattern(Effect):
         """Add the pattern with the frame's sign."""
         draw = exposure.temporal.uniform("bistable_pattern", _POINT, exposure.frame)[0, 0]
         sign = np.float32(1 if draw < 0.5 else -1)
-        return image + sign * np.float32(self.amplitude_dn) * _cosine(exposure.grid, self.frequency)
+        pattern = _cosine(exposure.grid, self.frequency)
+        if pattern.shape != image.shape:  # one for all channels
+            return image + sign * np.float32(self.amplitude_dn) * pattern
+        return shifted(image, pattern, sign * np.float32(self.amplitude_dn))
 
     def contributions(self, point: OperatingPoint) -> Mapping[str, float]:
         """Return the pattern's variance, split between pixels and means of lines and frame."""

@@ -7,6 +7,7 @@ import numpy as np
 from pydantic import Field
 
 from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, Stage
+from dsis.lines import shifted
 
 
 class Dsnu(Effect):
@@ -30,7 +31,7 @@ class Dsnu(Effect):
     def apply(self, image: Image, exposure: Exposure) -> Image:
         """Add the offset of each pixel."""
         offsets = exposure.sensor.fixed("dsnu", exposure.grid, threads=exposure.threads)
-        return image + np.float32(self.sigma_dn) * offsets
+        return shifted(image, offsets, np.float32(self.sigma_dn))
 
     def contributions(self, point: OperatingPoint) -> Mapping[str, float]:
         """Return sigma^2 for the fixed pixel variance."""

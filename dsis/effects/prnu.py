@@ -7,6 +7,7 @@ import numpy as np
 from pydantic import Field
 
 from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, Stage
+from dsis.lines import gained
 
 
 class Prnu(Effect):
@@ -27,10 +28,7 @@ class Prnu(Effect):
     def apply(self, image: Image, exposure: Exposure) -> Image:
         """Multiply each pixel by its gain."""
         gains = exposure.sensor.fixed("prnu", exposure.grid, threads=exposure.threads)
-        made: Image = np.float32(self.sigma_percent / 100) * gains
-        made += np.float32(1)
-        made *= image
-        return made
+        return gained(image, gains, np.float32(self.sigma_percent / 100))
 
     def contributions(self, point: OperatingPoint) -> Mapping[str, float]:
         """Return (sigma S)^2 for the fixed pixel variance, its share for the shot variance."""

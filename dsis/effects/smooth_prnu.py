@@ -14,6 +14,7 @@ from dsis.cfa import Cfa
 from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, Stage
 from dsis.grid import PixelGrid
 from dsis.kept import Kept
+from dsis.lines import gained
 
 _FIELDS = Kept(32 << 20)  # every frame of a sensor asks for its field
 _MARGIN = 8.0  # correlation lengths from one end of the sensor around to the other
@@ -62,8 +63,10 @@ class SmoothPrnu(Effect):
         gains = _FIELDS.of(key, partial(_field, exposure, self.length_pixels))
         first, left = grid.first_row, grid.first_column
         seen = gains[first : first + grid.rows, left : left + grid.columns]
-        own = np.float32(self.sigma_percent / 100) * seen
-        own += np.float32(1)
+        size = np.float32(self.sigma_percent / 100)
+        if image.ndim == 2:
+            return gained(image, seen, size)
+        own = size * seen + np.float32(1)
         made: Image = image * own.reshape(*own.shape, *(1,) * (image.ndim - 2))
         return made
 

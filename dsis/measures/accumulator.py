@@ -16,7 +16,7 @@ from dsis.cfa import Cfa
 from dsis.measures import kernels
 from dsis.measures.assembly import measured
 from dsis.measures.codes import CodeCounts
-from dsis.measures.first_pass import Passed, first_pass
+from dsis.measures.first_pass import Passed, first_pass, no_change
 from dsis.measures.kernels import FiveSums, Sums
 from dsis.measures.lag_products import half_plane, lag_products
 from dsis.measures.measured import Measured
@@ -52,6 +52,9 @@ class Accumulator:
     spectra
         Sees the transforms of each frame but the first, less the first and its own mean, of the
         planes of one size: complex64 (plane, row, column // 2 + 1).
+    power, neighbours
+        Whether to take transforms of frames, and products of neighbouring pixels: most of the time
+        goes there. Without them spectral_peak, and the correlations, are unknown.
     """
 
     def __init__(
@@ -67,8 +70,11 @@ class Accumulator:
         lags: int = LAGS,
         threads: int = 1,
         spectra: Callable[[Transforms], None] | None = None,
+        power: bool = True,
+        neighbours: bool = True,
     ) -> None:
         self.spectra = spectra
+        self.power, self.neighbours = power, neighbours
         self.frame_shape = (rows, columns)
         self.cfa, self.black_level, self.threads = cfa, black_level, threads
         self.white_level, self.lowest_code = white_level, lowest_code
@@ -106,7 +112,9 @@ class Accumulator:
         codes = np.ascontiguousarray(frame[self.region], np.float32)
         if self.frames == 0:
             self._begin(codes)
-        found = first_pass(codes, self.first, self.before, self.difference, self.threads)
+            found = no_change(codes)
+        else:
+            found = first_pass(codes, self.first, self.before, self.difference, self.threads)
         if not (found.whole or np.isfinite(codes).all()):
             message = f"frame {self.frames} holds values that are not finite (NaN or infinite)"
             raise ValueError(message)
@@ -124,7 +132,7 @@ class Accumulator:
 
     def _begin(self, codes: NDArray[np.float32]) -> None:
         self.first = codes.copy()
-        self.before, self.difference = np.zeros_like(codes), np.empty_like(codes)
+        self.before, self.difference = np.zeros_like(codes), np.zeros_like(codes)
         self.centred, self.centred_before = np.zeros_like(codes), np.zeros_like(codes)
 
     def _take_lines(self, found: Passed) -> None:
@@ -139,7 +147,10 @@ class Accumulator:
             self.pair_squares.append(found.squares)
         for sheet in self.sheets:
             if self.frames:
-                transforms = sheet.add(self.difference, means, self.threads)
+                sheet.add(self.difference, means)
+                if not self.power:
+                    continue
+                transforms = sheet.transformed(self.threads)
                 if self.spectra is not None:
                     self.spectra(transforms)
             else:
@@ -162,7 +173,8 @@ class Accumulator:
                 self.moments,
                 self.threads,
             )
-        self.lag_sums += lag_products(self.centred, self.reach, self.threads)
+        if self.neighbours:
+            self.lag_sums += lag_products(self.centred, self.reach, self.threads)
 
 
 def measure_exposure(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -74,12 +75,13 @@ def measured(sums: Accumulator) -> Measured:
         )
         for one, part in zip(noise, parts, strict=True)
     ]
-    spatial = _fixed_correlations(sums, noise, fixed)
+    # What was not summed is as good as white, and said to be unknown.
+    spatial = _fixed_correlations(sums, noise, fixed) if sums.neighbours else temporal
     channels = {}
     for one, part, pattern, moving, still in zip(
         noise, parts, fixed, temporal, spatial, strict=True
     ):
-        pair = (moving, still.less(moving, sums.frames))
+        pair = (moving, still.less(moving, sums.frames) if sums.neighbours else still)
         channels[one.plane.name] = _channel(sums, one, part, pattern, pair)
     return Measured(sums.frames, sums.cfa, sums.region, sums.black_level, channels)
 
@@ -107,7 +109,7 @@ def _noise(sums: Accumulator, sheet: Sheets) -> list[_Noise]:
         )
         for k, plane in enumerate(sheet.planes)
     ]
-    powers = _temporal_powers(sums, sheet, changes)
+    powers = _temporal_powers(sums, sheet, changes) if sums.power else sheet.power
     noise = []
     for k, plane in enumerate(sheet.planes):
         share = kept(frames, n, m, 2)
@@ -159,9 +161,11 @@ def _temporal_correlations(sums: Accumulator, noise: list[_Noise]) -> list[Autoc
         sums.moments is None
     ):  # the first is zero: the mean is half the second, products are quarters
         left = sums.lag_sums / 4
-    else:
+    elif sums.neighbours:
         mean = (sums.moments[0] / sums.frames).astype(np.float32)
         left = lag_products(mean, sums.reach, sums.threads)
+    else:
+        left = np.zeros_like(sums.lag_sums)
     table = LagTable.of(sums.reach, sums.lag_sums - sums.frames * left, sums.shape)
     variances = np.empty((2, 2))
     for one in noise:
@@ -190,6 +194,13 @@ def _fixed_correlations(
     ]
 
 
+def _correlations(
+    sums: Accumulator, of: Autocorrelation, lags: Mapping[str, tuple[int, int]]
+) -> dict[str, Estimate]:
+    """Return the correlations at some lags by name, unknown where products were not summed."""
+    return of.at(lags) if sums.neighbours else dict.fromkeys(lags, unknown(0.0))
+
+
 def _channel(
     sums: Accumulator,
     one: _Noise,
@@ -209,13 +220,13 @@ def _channel(
         "level": _level(float(one.mean_frame.mean()), part, fixed),
         **part.estimates(),
         **one.moments.estimates(temporal.inflation()),
-        **temporal.at(CORRELATION_LAGS),
-        "spectral_peak": spectral_peak(one.power, m, frames - 1),
+        **_correlations(sums, temporal, CORRELATION_LAGS),
+        "spectral_peak": spectral_peak(one.power, m, frames - 1) if sums.power else unknown(),
         "row_spectrum_peak": line_peak(row_power, n, frames - 1),
         "code_spacing": codes.spacing() if codes else unknown(1.0),
         "code_imbalance": codes.imbalance(part.ms_pixel) if codes else unknown(0.0),
         **fixed.estimates,
-        **still.at(FIXED_CORRELATION_LAGS),
+        **_correlations(sums, still, FIXED_CORRELATION_LAGS),
     }
     low, high = sums.lowest_code, sums.white_level
     return Channel(

@@ -107,12 +107,15 @@ class Sheets:
         size = self.planes[0].smooth.degree + 1
         self.surfaces.append(np.zeros((len(self.planes), size, size)))
 
-    def add(self, difference: Frame, means: Sums, threads: int) -> Transforms:
-        """Take a further frame, less the mean of each phase (2, 2); return its transforms."""
+    def add(self, difference: Frame, means: Sums) -> None:
+        """Take a further frame, less the mean of each phase (2, 2)."""
         kernels.split(difference, self.places, means, self.images)
+        self.surfaces.append(self.planes[0].smooth.coefficients(self.images))
+
+    def transformed(self, threads: int) -> Transforms:
+        """Take the power of the last frame; return its transforms."""
         transforms: Transforms = scipy.fft.rfft2(self.images, workers=threads)
         kernels.add_power(transforms, self.power)
-        self.surfaces.append(self.planes[0].smooth.coefficients(self.images))
         return transforms
 
 

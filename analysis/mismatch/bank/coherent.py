@@ -45,10 +45,17 @@ class SpectrumSums:
 
     Three weightings: amplitudes constant in DN, in proportion to the signal (of lines), and in
     proportion to the noise (for correlations).
+
+    Parameters
+    ----------
+    shape
+        Rows and columns of the channel.
+    waves
+        Whether frames have spectra; else there are only those of row and column means.
     """
 
-    def __init__(self, shape: tuple[int, int]) -> None:
-        self.shape = shape
+    def __init__(self, shape: tuple[int, int], *, waves: bool = True) -> None:
+        self.shape, self.waves = shape, waves
         n, m = shape
         self.power, self.relative = np.zeros((2, n, m // 2 + 1))
         self.rows = {key: np.zeros(n // 2 + 1) for key in ("", "signal")}
@@ -65,8 +72,9 @@ class SpectrumSums:
             return
         seen = frames - 1
         weights = {"": seen / variance_dn2, "signal": seen * max(signal_dn, 0) ** 2 / variance_dn2}
-        self.power += weights[""] * channel.power_spectrum / pixel
-        self.relative += seen * channel.power_spectrum / pixel
+        if self.waves:
+            self.power += weights[""] * channel.power_spectrum / pixel
+            self.relative += seen * channel.power_spectrum / pixel
         self.seen += seen
         self.columns += weights[""] * channel.column_spectrum / pixel
         fine = _half_bins(channel, seen)
@@ -79,7 +87,7 @@ class SpectrumSums:
     @classmethod
     def merged(cls, parts: Sequence["SpectrumSums"]) -> "SpectrumSums":
         """Return the sums of channels together: white noise of each is independent."""
-        found = cls(parts[0].shape)
+        found = cls(parts[0].shape, waves=all(part.waves for part in parts))
         for part in parts:
             found.power += part.power
             found.relative += part.relative
@@ -212,6 +220,8 @@ class SpectrumSums:
             ("columns", self.columns[m // 2]),
         ):
             found[f"alternation_variance of {name}"] = ratio_root(float(power) / total, degrees)
+        if not self.waves:
+            found["alternation_variance of checkerboard"] = UNKNOWN
         return found
 
     def _lags(self) -> dict[str, Number]:
@@ -220,13 +230,22 @@ class SpectrumSums:
         A memory's spectrum is smooth: sinusoids, which correlate at their period, are taken out.
         """
         n, m = self.shape
+        reach = {axis: min(LAGS, size // 2 - 1) for axis, size in (("rows", m), ("columns", n))}
+        if not self.waves:
+            return {
+                _lag_name(a, k): UNKNOWN for a, most in reach.items() for k in range(1, most + 1)
+            }
         covariance = np.fft.irfft2(without_lines(self.relative, self.seen), s=(n, m))
         sd = 1 / sqrt(n * m * self.seen)
         found: dict[str, Number] = {}
         for axis, line in (("rows", covariance[0]), ("columns", covariance[:, 0])):
-            for lag in range(1, min(LAGS, line.size // 2 - 1) + 1):
-                found[f"line_correlation along {axis} {lag}"] = (float(line[lag] / line[0]), sd)
+            for lag in range(1, reach[axis] + 1):
+                found[_lag_name(axis, lag)] = (float(line[lag] / line[0]), sd)
         return found
+
+
+def _lag_name(axis: str, lag: int) -> str:
+    return f"line_correlation along {axis} {lag}"
 
 
 def line_name(rank: int) -> str:

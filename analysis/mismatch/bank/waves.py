@@ -82,10 +82,12 @@ class WaveSums:
         Rows and columns of the sensor.
     step
         Of a channel's pixels: 1, or 2 on a mosaic, whose rows and columns are even then.
+    taken
+        Whether exposures have spectra; else all numbers are unknown.
     """
 
-    def __init__(self, shape: tuple[int, int], step: int) -> None:
-        self.shape, self.step = shape, step
+    def __init__(self, shape: tuple[int, int], step: int, *, taken: bool = True) -> None:
+        self.shape, self.step, self.taken = shape, step, taken
         rows, columns = shape
         self.power = np.zeros((2, 2, rows, columns // 2 + 1))
         self.weight = self.squares = 0.0
@@ -103,7 +105,8 @@ class WaveSums:
         expected = float(np.average([variance_dn2[name] for name in channels], weights=sizes))
         seen = waves.frames - 1
         weight = seen / expected
-        waves.add_to(self.power, weight / white)
+        if self.taken:
+            waves.add_to(self.power, weight / white)
         self.weight += weight
         self.squares += weight**2 / seen
         if self.step == 2:
@@ -119,7 +122,7 @@ class WaveSums:
         in white noise, and its upper tail, by which a line is told, no lighter than that.
         """
         parts = [part for part in self._parts() if part.size]
-        if not self.weight or not parts:
+        if not (self.taken and self.weight and parts):
             return UNKNOWN
         degrees = self._degrees
         # Each by itself: between bins the middle of the sensor counts more than its edges, and
@@ -142,6 +145,8 @@ class WaveSums:
         """
         if self.step == 1 or not self.weight:
             return {}
+        if not self.taken:
+            return {name: UNKNOWN for axis in _PAIRED for _, name in self._odd(axis)}
         rows, columns = self.shape
         power = self.power[0, 0] / self.weight
         held = np.zeros(power.shape, np.bool_)
@@ -152,10 +157,15 @@ class WaveSums:
         found: dict[str, Number] = {}
         for axis, line in (("rows", covariance[0]), ("columns", covariance[:, 0])):
             sd = float(np.sqrt(self.uneven[axis] / (rows * columns))) / self.weight
-            for lag in range(3, min(2 * LAGS, line.size // 2 - 1) + 1, 2):
-                name = f"line_correlation along {axis} {lag / self.step:g}"
+            for lag, name in self._odd(axis):
                 found[name] = (float(line[lag] / line[0]), sd)
         return found
+
+    def _odd(self, axis: str) -> list[tuple[int, str]]:
+        """Return the odd lags along an axis, pixels of the mosaic, and the name of each."""
+        size = self.shape[axis == "rows"]
+        lags = range(3, min(2 * LAGS, size // 2 - 1) + 1, 2)
+        return [(lag, f"line_correlation along {axis} {lag / self.step:g}") for lag in lags]
 
     @property
     def _degrees(self) -> int:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from analysis.mismatch.prove.hot import Hot
+from dsis.measures.median import median
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -83,8 +84,8 @@ def far_pixels(maps: Array) -> Mask:
     """Return which pixels lie far from all others in any map."""
     far = np.zeros(maps.shape[1:], np.bool_)
     for image in maps:
-        departure = np.abs(image - np.median(image))
-        spread = 1.4826 * float(np.median(departure))
+        departure = np.abs(image - median(image))
+        spread = 1.4826 * median(departure)
         if spread > 0:
             far |= departure > _FAR * spread
     return far

@@ -110,15 +110,18 @@ def prove_held(
     seed: int,
     jobs: int = 1,
     seen: Held | None = None,
+    known: Loglik | None = None,
 ) -> ProofNumbers:
     """Compare two camera models on frames that were read before; see `prove`.
 
-    `seen` are those that the classifier looks at; None: the same.
+    `seen` are those that the classifier looks at; None: the same. `known` is the log-likelihood
+    under `after`; None: it was not asked for yet.
     """
 
     def judged(camera: Camera) -> tuple[Loglik, Auc | None]:
+        told = known if camera == after else None
         return (
-            loglik_of(held, camera, signals, seed=seed),
+            told or loglik_of(held, camera, signals, seed=seed),
             auc_of(held if seen is None else seen, camera, signals, seed=seed),
         )
 

@@ -1,0 +1,123 @@
+"""Sums over the frames and exposures of a recording, from which an observation follows."""
+
+from collections.abc import Callable, Iterable, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.mismatch.bank.bands import Bands
+from analysis.mismatch.bank.carryover import CarryOver, CarryOverSums
+from analysis.mismatch.bank.coherent import Peak, SpectrumSums
+from analysis.mismatch.bank.common import common
+from analysis.mismatch.bank.maps import PatternSums, Regressors
+from analysis.mismatch.bank.persistent import VarianceSums
+from analysis.mismatch.bank.scalars import Number
+from analysis.mismatch.bank.waves import Waves, WaveSums
+from analysis.mismatch.layout import Layout
+from analysis.mismatch.touches import ALL_SUMS, CARRY_OVER, NEIGHBOURS, SPECTRA
+from dsis.measures import Accumulator, Channel, Measured
+from dsis.measures.accumulator import LAGS
+from dsis.measures.plane import Transforms
+
+_FEW_LAGS = 2  # of neighbours: the bank asks for no farther ones
+_MANY_PIXELS = 2e5  # of which farther ones would take long
+
+
+def measure(
+    layout: Layout,
+    frames: Iterable[NDArray[np.generic]],
+    spectra: Callable[[Transforms], None] | None = None,
+    made: frozenset[str] = ALL_SUMS,
+) -> Measured:
+    """Return the measures of one exposure's frames; `spectra` as an `Accumulator` has it.
+
+    `made` are those of `ALL_SUMS` that are.
+    """
+    size, codes = (layout.rows, layout.columns), (layout.black_dn, layout.white_dn)
+    lags = _FEW_LAGS if layout.rows * layout.columns > _MANY_PIXELS else LAGS
+    sums = Accumulator(
+        *size,
+        layout.cfa,
+        *codes,
+        lags=lags,
+        spectra=spectra,
+        power=SPECTRA in made,
+        neighbours=NEIGHBOURS in made,
+    )
+    for frame in frames:
+        sums.add(frame)
+    return sums.result()
+
+
+class ChannelSums:
+    """Sums over exposures of one channel."""
+
+    def __init__(self, regressors: Regressors, shape: tuple[int, int], *, waves: bool) -> None:
+        self.patterns = PatternSums(regressors, shape)
+        self.variances = VarianceSums(shape)
+        self.spectra = SpectrumSums(shape, waves=waves)
+
+    def add(
+        self,
+        exposure: str,
+        channel: Channel,
+        frames: int,
+        variance_dn2: float,
+        signal_dn: float,
+    ) -> None:
+        """Take one exposure; the variance and signal that are expected weigh it."""
+        pixel = channel.estimates["pixel_variance"].value
+        self.patterns.add(exposure, channel.mean_frame, pixel, frames)
+        if frames > 2:
+            self.variances.add(channel.variance_map, (frames - 1) / variance_dn2)
+        self.spectra.add(channel, frames, variance_dn2, signal_dn)
+
+
+class SensorSums:
+    """Sums over exposures of what all channels of the sensor show together."""
+
+    def __init__(self, layout: Layout, *, samples: bool, made: frozenset[str]) -> None:
+        self.layout, self.samples, self.made = layout, samples, made
+        self.mosaic = len(layout.sites) > 1
+        self.shape = (layout.rows, layout.columns)
+        self.common: dict[str, Mapping[str, Number]] = {}
+        self.bands = Bands(layout.rows, layout.sites)
+        self.waves = WaveSums(self.shape, 1 + self.mosaic, taken=SPECTRA in made)
+        self.memory = CarryOverSums()
+
+    def measured(
+        self, exposure: str, frames: int, seen: Iterable[NDArray[np.generic]], *, still: bool
+    ) -> Measured:
+        """Return the measures of an exposure's frames; take what moves in them, unless `still`."""
+        lines, after = Waves(self.shape), CarryOver(keep=self.samples)
+        if SPECTRA not in self.made:
+            lines.frames = frames
+        elif self.mosaic:
+            seen = lines.watching(seen)
+        watched = after.watching(seen) if CARRY_OVER in self.made else seen
+        # The transforms of a sensor without colours are at hand.
+        take = None if self.mosaic else lambda one: lines.take(one[0])
+        found = measure(self.layout, watched, take, self.made)
+        self.memory.add(after, still=still)
+        if not still:
+            places = {name: (exposure, name) for name in found.channels}
+            expected = {name: self.layout.variance_dn2[place] for name, place in places.items()}
+            self.waves.add(lines, found.channels, expected)
+            if self.mosaic:
+                signals = {name: self.layout.signal_dn[place] for name, place in places.items()}
+                sites = self.layout.sites
+                self.common[exposure] = common(found.channels, signals, frames, sites)
+                self.bands.add(found.channels, expected, signals, frames)
+        return found
+
+    def numbers(self) -> dict[str, Number]:
+        """Return spectra and memories of the whole sensor."""
+        own = self.bands.numbers() if self.mosaic else {}
+        waves = {"spectral_peak": self.waves.number(), **self.waves.odd_lags()}
+        return {**own, **self.memory.numbers(), **waves}
+
+    def peaks(self) -> dict[str, Peak]:
+        """Return where its spectra are largest, by kind."""
+        own = self.bands.peaks() if self.mosaic else {}
+        peak = self.waves.peak()
+        return own if peak is None else {**own, "spectrum": peak}

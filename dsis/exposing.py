@@ -1,0 +1,123 @@
+"""A frame on its way through the links of a camera, and what links that cameras share made of it.
+
+Links are effects in the order that light and charge meet them. Draws are counted: links that are
+the same make the same of a frame, whatever comes behind them.
+"""
+
+from collections import Counter
+from collections.abc import Callable, Collection, Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+
+from dsis.draw import Draw
+from dsis.effects import Effect, Exposure, Image, ReadOut, Stage
+from dsis.grid import PixelGrid
+
+
+@dataclass(frozen=True)
+class Begun:
+    """What the first links of a chain made of a frame.
+
+    Attributes
+    ----------
+    links
+        How many.
+    image
+        What they made, DN above black.
+    lit
+        Whether some of them are behind the light.
+    expected_dn
+        As `Exposure` has it.
+    """
+
+    links: int
+    image: Image
+    lit: bool
+    expected_dn: Image
+
+
+@dataclass
+class Shared:
+    """What cameras whose chains begin alike have of one frame.
+
+    Attributes
+    ----------
+    start
+        What an earlier camera's first links, the same as this one's, made of the frame; None: it
+        goes through all links.
+    wanted
+        Numbers of first links of which later cameras need what they made.
+    found
+        That, by their number; filled while the frame is made.
+    """
+
+    start: Begun | None = None
+    wanted: Collection[int] = ()
+    found: dict[int, Begun] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Shutter:
+    """One frame that is exposed: see `dsis.camera.Camera.expose`."""
+
+    clean: Image
+    temporal: Draw
+    sensor: Draw
+    frame: int
+    grid: PixelGrid
+    exposure_time_s: float
+    earlier_clean: Callable[[int], Image] | None
+    threads: int
+
+    def through(
+        self, links: Sequence[Effect], read_out: ReadOut, shared: Shared | None = None
+    ) -> Image:
+        """Return what links make of the frame; `shared` where other cameras make it too."""
+        chain = list(_drawn(links, self.temporal, self.sensor))
+        first = shared or Shared()
+
+        def after(links: int, back: int) -> Image:
+            """Return what the first `links` links make of the frame `back` frames earlier."""
+            light = self.earlier_clean(back) if back and self.earlier_clean else self.clean
+            own = first if links == len(chain) and not back else Shared()
+            begun = own.start or Begun(0, light, lit=False, expected_dn=light)
+            image, lit, expected = begun.image, begun.lit, begun.expected_dn
+            # Before the first frame the counter runs backwards: it has 32 bits.
+            number = (self.frame - back) % 2**32
+            for place in range(begun.links, links):
+                link, temporal, sensor = chain[place]
+                if link.stage > Stage.LIGHT and not lit:
+                    lit, expected = True, image
+                exposure = Exposure(
+                    self.grid,
+                    number,
+                    temporal,
+                    sensor,
+                    expected,
+                    read_out,
+                    partial(before, place, back),
+                    self.exposure_time_s,
+                    self.threads,
+                )
+                image = link.apply(image, exposure)
+                if place + 1 in own.wanted:
+                    own.found[place + 1] = Begun(place + 1, image, lit, expected)
+            return image
+
+        def before(links: int, back: int, k: int) -> Image:
+            return after(links, back + k)
+
+        return after(len(chain), 0)
+
+
+def _drawn(
+    chain: Sequence[Effect], temporal: Draw, sensor: Draw
+) -> Iterator[tuple[Effect, Draw, Draw]]:
+    """Yield each link with its random fields: a second effect of one kind has fields of its own."""
+    seen: Counter[str] = Counter()
+    for link in chain:
+        seen[link.kind] += 1
+        nth = () if seen[link.kind] == 1 else (f"{link.kind} {seen[link.kind]}",)
+        yield (
+            (link, temporal.within(*nth), sensor.within(*nth)) if nth else (link, temporal, sensor)
+        )

@@ -1,0 +1,123 @@
+"""Recordings that are simulated side by side are those that are simulated one by one."""
+
+import numpy as np
+import pytest
+
+from analysis.mismatch.layout import Layout
+from analysis.mismatch.model import Model, simulated
+from analysis.mismatch.observe import Observation
+from analysis.mismatch.simulations import _groups
+from analysis.mismatch.state import State
+from analysis.mismatch.together import most_together, shared_links, simulated_together
+from analysis.mismatch.touches import ALL_SUMS, SPECTRA
+from analysis.mismatch.vector import vector
+from dsis.camera import Camera
+from dsis.draw import Draw
+from dsis.effects import Effect
+from dsis.effects.adc_dnl import AdcDnl
+from dsis.effects.flicker import Flicker
+from dsis.effects.image_lag import ImageLag
+from dsis.effects.periodic_noise import PeriodicNoise
+from dsis.effects.row_noise import RowNoise
+from dsis.effects.saturation import Saturation
+from dsis.exposing import Shared
+from dsis.grid import PixelGrid
+from effect_examples import KINDS, camera_with, example_of
+from mismatch_recordings import camera, recorded, state_of
+
+LIGHT, ROWS, DNL = Flicker(sigma_percent=1.0), RowNoise(sigma_dn=2.0), AdcDnl(rms_lsb=0.3)
+WAVE = PeriodicNoise(amplitude_dn=1.0, frequency=(0.21, 0.13))
+OTHER = PeriodicNoise(amplitude_dn=1.5, frequency=(0.21, 0.13))
+SCENE = np.linspace(100, 2000, 96 * 128, dtype=np.float32).reshape(96, 128)
+SOME: tuple[tuple[Effect, ...], ...] = (
+    (LIGHT, ROWS, WAVE, DNL),
+    (LIGHT, ROWS, WAVE, AdcDnl(rms_lsb=0.4)),
+    (LIGHT, ROWS, OTHER, DNL),
+    (LIGHT, ROWS, WAVE),
+    (ROWS, WAVE, DNL),
+    (LIGHT, ROWS, WAVE, DNL, Saturation(full_well_dn=900.0)),
+    (LIGHT, ROWS, WAVE, DNL),
+)
+
+
+@pytest.fixture(scope="module")
+def state() -> State:
+    return state_of(recorded(camera(), 3, frames=6, levels=(300.0, 900.0), scene=SCENE), camera())
+
+
+def numbers(state: State, layout: Layout, seen: Observation) -> np.ndarray:
+    return vector(layout, seen, state.calibrated.refit(layout, seen.levels)).values
+
+
+def test_side_by_side_is_as_one_by_one(state: State) -> None:
+    layout, model = state.setting.layout, state.calibrated.model
+    made = [ALL_SUMS, frozenset({SPECTRA}), *[ALL_SUMS] * (len(SOME) - 2)]
+    models = [
+        model.with_camera(model.camera.model_copy(update={"effect": effects})) for effects in SOME
+    ]
+    darker = models[0].camera.model_copy(update={"black_level": models[0].camera.black_level + 3})
+    models[-1] = model.with_camera(darker)
+    together = simulated_together(layout, 5, (list(zip(models, made, strict=True)), 1))
+    for own, sums, seen in zip(models, made, together, strict=True):
+        alone = simulated(layout, 5, (own, 1, sums))
+        np.testing.assert_array_equal(
+            numbers(state, layout, seen), numbers(state, layout, alone), strict=True
+        )
+        assert seen.levels == alone.levels
+
+
+def test_of_other_light_nothing_is_shared(state: State) -> None:
+    layout, model = state.setting.layout, state.calibrated.model
+    brighter = Model(model.camera, {name: 1.5 * own for name, own in model.signals.items()})
+    one, two = simulated_together(layout, 5, ([(model, ALL_SUMS), (brighter, ALL_SUMS)], 0))
+    for seen, own in ((one, model), (two, brighter)):
+        assert seen.levels == simulated(layout, 5, (own, 0, ALL_SUMS)).levels
+
+
+def test_chains_begin_alike_up_to_what_differs() -> None:
+    cameras = [camera(*effects) for effects in SOME]
+    chains = [own.chain() for own in cameras]
+    for place, (earlier, links) in enumerate(shared_links(cameras)):
+        assert chains[place][:links] == chains[earlier][:links]
+        assert earlier < place or not links
+    assert [links for _, links in shared_links(cameras)][:2] == [0, len(chains[0]) - 2]
+    other = camera(*SOME[0], segments=((0.6, 20.0, None),))
+    assert shared_links([cameras[0], other]) == [(0, 0), (0, 0)]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_frame_goes_on_from_any_link_as_it_would_have(kind: str) -> None:
+    """Effects that remember earlier frames, or redraw noise, among them."""
+    made = camera_with(example_of(KINDS[kind]))
+    if kind != "image_lag":
+        made = made.model_copy(update={"effect": (*made.effect, ImageLag(fraction=0.02))})
+    grid = PixelGrid(12, 16, made.cfa)
+    clean = np.full(grid.shape, 700.0, np.float32)
+    links = len(made.chain())
+
+    def frame(shared: Shared | None) -> np.ndarray:
+        return Camera.expose(
+            made, clean, Draw(1), Draw(2), 4, grid, exposure_time_s=0.01, shared=shared
+        )
+
+    whole, kept = frame(None), Shared(None, range(1, links + 1))
+    np.testing.assert_array_equal(frame(kept), whole)
+    assert sorted(kept.found) == list(range(1, links + 1))
+    for begun in kept.found.values():
+        np.testing.assert_array_equal(frame(Shared(begun)), whole)
+
+
+def test_groups_hold_each_once_and_are_enough_for_all_jobs() -> None:
+    parting = {f"camera {i}": i % 5 for i in range(9)}
+    missing = [(key, number) for number in range(2) for key in parting]
+    groups = _groups(missing, parting, 4, 2)
+    assert sorted((key, n) for keys, n in groups for key in keys) == sorted(missing)
+    assert len(groups) == 8
+    assert max(len(keys) for keys, _ in groups) <= 4
+    assert _groups(missing[:1], parting, 4, 2) == [(["camera 0"], 0)]
+
+
+def test_few_large_frames_are_held_at_once(state: State) -> None:
+    assert most_together(state.setting.layout) > 16
+    large = state.setting.layout.__class__((), 4000, 6000, *[camera().cfa, 64.0, 4095.0, {}, {}])
+    assert most_together(large) == 1

@@ -22,6 +22,7 @@ from analysis.mismatch.projections import FramesOf
 Array = NDArray[np.float64]
 _LEAST_FRAMES = 3  # of which a median pixel tells the noise
 _COARSE = 1.0  # step between codes, in standard deviations, from which on codes jump by themselves
+_MOST_LINES = 256
 _NOISY, _OTHERS = 2.5, 1024  # standard deviations: all such pixels, and so many of the others
 _HEIGHTS: Array = np.geomspace(0.7, 120.0, 24)  # in standard deviations of the least noise
 _SWITCHING = np.array([0.02, 0.05, 0.1, 0.15, 0.2, 0.27, 0.35, 0.5])
@@ -133,7 +134,7 @@ def telegraph(layout: Layout, frames_of: FramesOf) -> Telegraph | None:
     Parameters
     ----------
     layout, frames_of
-        The frames: of darks and flats all are asked.
+        The frames: asked are darks and flats, of a larger sensor its middle.
 
     References
     ----------
@@ -166,15 +167,23 @@ def _blocks(layout: Layout, frames_of: FramesOf) -> Iterator[tuple[Array, Array,
 
     Less what rows and columns of a frame have in common. Noise is that of the median pixel.
     """
+    window = tuple(_middle(size) for size in (layout.rows, layout.columns))
     for exposure in layout.uniform:
         if any((exposure.name, channel) in layout.still for channel in layout.channels):
             continue
-        stack = np.stack([np.asarray(own, np.float64) for own in frames_of(exposure.name)])
+        frames = [np.asarray(own[window], np.float64) for own in frames_of(exposure.name)]
+        stack = np.stack(frames)
         parts = -(-len(stack) // MOST_FRAMES)
         for some in np.array_split(stack, parts):
             block = _noise(layout, some) if len(some) >= _LEAST_FRAMES else None
             if block is not None:
                 yield *block, exposure.exposure_time_s
+
+
+def _middle(size: int) -> slice:
+    """Return the lines in the middle of a sensor: so many pixels tell as much as is asked."""
+    first = max(size - _MOST_LINES, 0) // 4 * 2  # cells of a mosaic stay whole
+    return slice(first, first + _MOST_LINES)
 
 
 def _noise(layout: Layout, stack: Array) -> tuple[Array, Array] | None:

@@ -52,6 +52,7 @@ _TWINS = {
     "tap_mismatch": "channel_imbalance",
     "pink_noise": "row_banding",
     "row_banding": "pink_noise",
+    "readout_memory": "crosstalk",
 }
 _FAR_OFF, _LITTLE = 8.0, 0.3  # departures, and the share of one that is little
 _STRONG = 30.0  # gain of log-likelihood beside which what gained little before needs no new trial
@@ -331,7 +332,8 @@ def twin(
 
     Amplifiers of even and odd rows do nearly what greens that differ do to a mosaic whose light
     is of unknown colour: only the noise of each channel tells. Over the rows of few small frames
-    1/f noise and a black level that lags behind are as near.
+    1/f noise and a black level that lags behind are as near. Correlations have no side: memory of
+    the sample before may be charge that neighbours exchange.
     """
     other = _TWINS.get(best.kind)
     if other is None or other in vocabulary:

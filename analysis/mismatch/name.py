@@ -13,7 +13,6 @@ from analysis.mismatch.credited import joined, kept_up
 from analysis.mismatch.fitted import Fitted
 from analysis.mismatch.instance import LINES, Frequency, frequency_of, instance
 from analysis.mismatch.judge import INSTEAD, LITTLE, NEEDLESS, NOTHING, Judge
-from analysis.mismatch.mapped import as_maps_show
 from analysis.mismatch.memory import Memory
 from analysis.mismatch.named import Named
 from analysis.mismatch.phase import ABSENT, WholeFrames
@@ -31,6 +30,7 @@ from analysis.mismatch.rank import (
     twin,
 )
 from analysis.mismatch.resolved import calls_alone, differ, explains, gained, opened
+from analysis.mismatch.rowtold import as_shown, unlike_frames
 from analysis.mismatch.segments import second_path
 from analysis.mismatch.state import State
 from dsis.camera import Camera
@@ -294,7 +294,8 @@ class Search(Fitted):
             if len(self.settled) > len(settled):
                 continue  # a line was refused: behind it another may be
             before = len(self.doubted)
-            fitted = self._undoubted(state, as_maps_show(state, plainest(state, fitted)))
+            fitted = as_shown(state, self.lines, plainest(state, fitted))
+            fitted = self._undoubted(state, fitted)
             if len(self.doubted) > before:
                 continue  # all that was fitted of a kind is denied: others were too far behind it
             if not fitted or fitted[0].gain < LEAST_GAIN:
@@ -326,6 +327,7 @@ class Search(Fitted):
             best, *others = fitted
             predictor = state.predictor(replicates_for(self.setting, [best.proposal.effect]))
             denial = refuted(state, predictor, best.kind, best.polished)
+            denial = denial or unlike_frames(state, self.lines, best, others)
             if denial is None:
                 break
             fitted = others

@@ -8,6 +8,7 @@ the chance of the largest of all frequencies is known.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,8 @@ from analysis.mismatch.bandgain import gain_of_bands
 from analysis.mismatch.instance import Frequency, frequency_of, same_line
 from analysis.mismatch.layout import Layout
 from analysis.mismatch.projections import LEAST, SURE, FramesOf, Power, projections
+from analysis.mismatch.rowlaw import RowLaw
+from analysis.mismatch.rowpower import Size, row_powers
 from analysis.mismatch.telegraph import Telegraph, telegraph
 from dsis.effects import Effect
 from dsis.effects.line_flicker import LineFlicker
@@ -173,6 +176,12 @@ class WholeFrames:
         anywhere = float(np.log(self.layout.rows * self.layout.columns / 2 / share))
         chosen = float(np.log(_FEW)) if kept and _of_pixels(frequency) else anywhere
         return line.there(power, kept=kept, real=real) - chosen
+
+    @cached_property
+    def rows(self) -> RowLaw:
+        """What they say of the causes that make rows alike."""
+        powers = row_powers(self.layout, self.frames_of)
+        return RowLaw(Size(self.layout.rows, self.layout.columns), powers)
 
     @property
     def _size(self) -> tuple[int, int]:

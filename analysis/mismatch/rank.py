@@ -48,12 +48,7 @@ _BY_DRAW = frozenset(
 _BY_BIN = frozenset({"periodic_noise"})  # of few frames: the noise of one bin comes on top
 # That greens differ is seen; what amplifiers of even and odd rows make of red and blue is not.
 _SAYS_LESS = {"channel_imbalance": "tap_mismatch"}
-_TWINS = {
-    "tap_mismatch": "channel_imbalance",
-    "pink_noise": "row_banding",
-    "row_banding": "pink_noise",
-    "readout_memory": "crosstalk",
-}
+_TWINS = {"tap_mismatch": "channel_imbalance", "readout_memory": "crosstalk"}
 _FAR_OFF, _LITTLE = 8.0, 0.3  # departures, and the share of one that is little
 _STRONG = 30.0  # gain of log-likelihood beside which what gained little before needs no new trial
 _WORTH_IT = 0.3  # share of it
@@ -331,8 +326,7 @@ def twin(
     """Return the effect that the best cannot be told from, though it must not be named itself.
 
     Amplifiers of even and odd rows do nearly what greens that differ do to a mosaic whose light
-    is of unknown colour: only the noise of each channel tells. Over the rows of few small frames
-    1/f noise and a black level that lags behind are as near. Correlations have no side: memory of
+    is of unknown colour: only the noise of each channel tells. Correlations have no side: memory of
     the sample before may be charge that neighbours exchange.
     """
     other = _TWINS.get(best.kind)

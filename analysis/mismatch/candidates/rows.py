@@ -14,8 +14,7 @@ from dsis.effects import Effect
 
 Array = NDArray[np.float64]
 _SHARED = 0.25  # of an offset, by the next row: rows that share less are as good as white
-# Of rows, and of the frame's: what lasts longer looks as 1/f noise does over a frame, or a drift.
-_MOST_ROWS, _MOST = 4.0, 1 / 4
+_MOST = 1 / 4  # of the frame's rows: what lasts longer looks as a drift does
 _CLEAR = 3.0  # standard deviations of the correlation of row means
 _LENGTHS = 24  # tried, in equal ratios
 
@@ -73,7 +72,7 @@ def _shortest() -> float:
 
 
 def _longest(layout: Layout) -> float:
-    return min(_MOST_ROWS, _MOST * layout.rows)
+    return _MOST * layout.rows
 
 
 def _sane(layout: Layout, effect: Effect) -> bool:

@@ -1,0 +1,291 @@
+"""1/f noise of the read-out or bands of rows: which of them whole frames show.
+
+Both make the means of near rows alike. Bands are constant along a row and forget over a length:
+their spectrum is a Lorentzian. 1/f noise runs on from pixel to pixel: it has no length, wanders
+over a frame and more, and rises within a row where it rises from row to row. How much power waves
+down and along frames have, and what they have in common, is compared with what each cause makes of
+it, and of noise beside it, by Whittle's likelihood (1953) of expected powers that are exact for
+frames so large (Sykulski et al., Biometrika 106, 2019).
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import lru_cache
+from itertools import combinations
+from math import log
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+from scipy.linalg import toeplitz
+from scipy.special import logsumexp
+
+from analysis.mismatch.rowpower import SLOW, Powers, Size, down
+
+Array = NDArray[np.float64]
+_STEPS, _HALVES = 30, 10
+_ENOUGH = 1e-4  # nats
+_LENGTHS = 24  # of bands, in equal ratios
+_SHORTEST, _LONGEST = 0.72, 1 / 4  # rows, and of the frame's
+BESIDE = frozenset({"row_noise", "black_level_drift", "flicker"})
+"""What may move rows or frames besides."""
+
+
+@dataclass(frozen=True)
+class Cause:
+    """Power that a cause of unit variance has, as `Powers` has it.
+
+    Attributes
+    ----------
+    slow, waves, whole
+        (band, wave, wave), (wave,) and a number.
+    of_light
+        Whether its variance is of the signal, %^2, and not of DN^2.
+    """
+
+    slow: Array
+    waves: Array
+    whole: float
+    of_light: bool = False
+
+    @classmethod
+    def of_rows(cls, size: Size, power: Array, whole: float, *, of_light: bool = False) -> "Cause":
+        """Return a cause that is constant along rows, by its power in bands."""
+        slow = np.zeros((size.counts.size, SLOW, SLOW))
+        slow[:, 0, 0] = power
+        return cls(slow, np.zeros(size.waves - SLOW + 1), whole, of_light)
+
+
+def waves_of(covariance: Array) -> Array:
+    """Return the expected power of each wave of a series but the constant: (n - 1,).
+
+    Of an orthonormal cosine transform (DCT-II). `covariance` is that of a stationary series at lags
+    0, 1, ... n - 1. Products of cosine k at lag d sum to ((n - d) cos(a d) - sin(a d) / sin(a)) / n
+    with a = pi k / n.
+    """
+    n = covariance.size
+    lag = np.arange(n)
+    twice = np.where(lag == 0, 1.0, 2.0) * covariance / n
+    falling, level = fft.rfft(twice * (n - lag), 2 * n), fft.rfft(twice, 2 * n)
+    angle = np.pi * np.arange(1, n) / n
+    return np.asarray(falling.real[1:n] + level.imag[1:n] / np.sin(angle))
+
+
+def constant_of(covariance: Array) -> float:
+    """Return the expected power of the constant of the same transform; see `waves_of`."""
+    lag = np.arange(covariance.size)
+    twice = np.where(lag == 0, 1.0, 2.0) * covariance
+    return float(twice @ (1 - lag / covariance.size))
+
+
+def bands(size: Size, length_rows: float) -> Cause:
+    """Return offsets of rows whose correlation falls as exp(-d / length) at d rows."""
+    covariance = size.columns * np.exp(-np.arange(size.rows) / length_rows)
+    return Cause.of_rows(size, size.banded(waves_of(covariance)), constant_of(covariance))
+
+
+@lru_cache(maxsize=2)
+def pink(size: Size) -> Cause:
+    """Return 1/f noise in the order of read-out: waves of two frames' length to two samples."""
+    rows, columns = size.rows, size.columns
+    length = 2 * fft.next_fast_len(rows * columns, real=True)
+    power = np.zeros(length // 2 + 1)
+    power[1:-1] = 1 / np.arange(1, length // 2)
+    series = fft.irfft(power / power.sum(), length) * length / 2
+    lag = np.arange(1 - columns, columns)
+    near = np.stack([series[y * columns + lag] for y in range(rows)])  # (row, lag)
+    along = fft.dct(np.eye(columns), axis=0, norm="ortho")[:SLOW]
+    basis = down(rows)
+    slow = np.zeros((rows - 1, SLOW, SLOW))
+    first = np.zeros(rows)
+    for i in range(SLOW):
+        for j in range(SLOW):
+            # Of wave i some rows below wave j, and the other way round.
+            below = near @ np.correlate(along[i], along[j], "full")
+            above = near @ np.correlate(along[j], along[i], "full")
+            products = basis[i] @ toeplitz(below, above)
+            slow[:, i, j] = (products * basis[j]).sum(1)
+            first = below if i == j == 0 else first
+    waves = waves_of(series[:columns])[SLOW - 1 : size.waves]
+    return Cause(size.banded(slow), waves, constant_of(first))
+
+
+def beside(size: Size) -> dict[str, Cause]:
+    """Return what may move rows or frames besides, by kind."""
+    none = np.zeros(size.counts.size)
+    pixels, columns = float(size.rows * size.columns), float(size.columns)
+    return {
+        "row_noise": Cause.of_rows(size, none + columns, columns),
+        "black_level_drift": Cause.of_rows(size, none, pixels),
+        "flicker": Cause.of_rows(size, none, pixels, of_light=True),
+    }
+
+
+@dataclass(frozen=True)
+class _Part:
+    """Products that are Wishart variables, of an expectation that is linear in parameters.
+
+    Attributes
+    ----------
+    design
+        (product, parameter, wave, wave).
+    seen
+        (product, wave, wave).
+    shape
+        Half of the degrees of freedom: (product,).
+    """
+
+    design: Array
+    seen: Array
+    shape: Array
+
+    def likelihood(self, values: Array) -> float:
+        """Return the log-likelihood but for a constant; minus infinity: values are impossible."""
+        expected = np.einsum("npij,p->nij", self.design, values)
+        if not (np.linalg.eigvalsh(expected)[:, 0] > 0).all():
+            return -np.inf
+        rest = np.linalg.slogdet(expected)[1]
+        rest += np.trace(np.linalg.solve(expected, self.seen), axis1=1, axis2=2)
+        return -float(self.shape @ rest)
+
+    def slope(self, values: Array) -> tuple[Array, Array]:
+        """Return the gradient of the log-likelihood, and Fisher's information."""
+        inverse = np.linalg.inv(np.einsum("npij,p->nij", self.design, values))
+        own = inverse[:, np.newaxis] @ self.design
+        left = np.eye(inverse.shape[1]) - inverse @ self.seen
+        count = own.shape[1]
+        # tr(P A - P S P A) = tr((1 - P S) P A), with P the inverse and A the design.
+        gradient = -np.einsum("n,nij,npji->p", self.shape, left, own)
+        weighed = own * self.shape[:, np.newaxis, np.newaxis, np.newaxis]
+        flat = weighed.swapaxes(0, 1).reshape(count, -1)
+        other = own.swapaxes(2, 3).swapaxes(0, 1).reshape(count, -1)
+        return gradient, flat @ other.T
+
+
+def fitted(
+    powers: Sequence[Powers], size: Size, causes: Sequence[Cause]
+) -> tuple[float, Array] | None:
+    """Return the log-likelihood, nats, and the variances of causes; None where one is negative.
+
+    Fisher scoring. Each exposure has its own level of white noise, and a bend of it along rows, for
+    neighbouring pixels may be alike.
+    """
+    count = len(causes)
+    total = count + 2 * len(powers)
+    bend = (np.arange(SLOW, size.waves + 1) / size.waves) ** 2
+    bands_, waves = size.counts.size, bend.size
+    slow = np.zeros((len(powers), bands_, total, SLOW, SLOW))
+    rest = np.zeros((len(powers), waves + 1, total, 1, 1))
+    for i, own in enumerate(powers):
+        for j, cause in enumerate(causes):
+            scale = (own.signal_dn / 100) ** 2 if cause.of_light else 1.0
+            slow[i, :, j] = scale * cause.slow
+            rest[i, :, j, 0, 0] = scale * np.append(cause.waves, cause.whole)
+        slow[i, :, count + 2 * i] = own.white[:, np.newaxis] * np.eye(SLOW)
+        rest[i, :, count + 2 * i, 0, 0] = np.append(np.ones(waves), own.white[0, 0])
+        rest[i, :-1, count + 2 * i + 1, 0, 0] = bend
+    frames = np.array([own.frames for own in powers])
+    along = np.append(np.full(waves, size.rows - 1.0), 1.0)
+    parts = [
+        _Part(
+            slow.reshape(-1, *slow.shape[2:]),
+            np.concatenate([own.slow for own in powers]),
+            np.outer(frames, size.counts).reshape(-1) / 2,
+        ),
+        _Part(
+            rest.reshape(-1, *rest.shape[2:]),
+            np.concatenate([[*own.waves, own.whole] for own in powers])[:, np.newaxis, np.newaxis],
+            np.outer(frames, along).reshape(-1) / 2,
+        ),
+    ]
+    start = np.zeros(total)
+    start[count::2] = [float(own.waves.mean()) for own in powers]
+    value, found = _scored(parts, start)
+    return None if (found[:count] < 0).any() else (value, found[:count])
+
+
+def _scored(parts: Sequence[_Part], found: Array) -> tuple[float, Array]:
+    """Return the largest log-likelihood, and the parameters there."""
+    value = sum(part.likelihood(found) for part in parts)
+    for _ in range(_STEPS):
+        slopes = [part.slope(found) for part in parts]
+        gradient, information = (np.sum(own, 0) for own in zip(*slopes, strict=True))
+        step = np.linalg.lstsq(information, gradient, rcond=None)[0]
+        for k in range(_HALVES):
+            trial = found + step / 2**k
+            new = sum(part.likelihood(trial) for part in parts)
+            if new >= value:
+                break
+        else:
+            break
+        found, gained, value = trial, new - value, new
+        if gained < _ENOUGH:
+            break
+    return value, found
+
+
+@dataclass(frozen=True)
+class RowLaw:
+    """What whole frames say of the causes that make rows alike.
+
+    Attributes
+    ----------
+    size
+        Of the frames.
+    powers
+        Of each exposure.
+    """
+
+    size: Size
+    powers: Sequence[Powers]
+    _found: dict[tuple[str, frozenset[str]], float] = field(default_factory=dict)
+
+    def odds(self, kind: str, other: str, known: frozenset[str]) -> float | None:
+        """Return by how much one cause is likelier than another, nats; None: nothing tells.
+
+        Parameters
+        ----------
+        kind, other
+            `row_banding` and `pink_noise`.
+        known
+            Effects of `BESIDE` that are there.
+        """
+        if not self.powers:
+            return None
+        return self._evidence(kind, known) - self._evidence(other, known)
+
+    def _evidence(self, kind: str, known: frozenset[str]) -> float:
+        key = (kind, known & BESIDE)
+        if key not in self._found:
+            self._found[key] = self._weighed(*key)
+        return self._found[key]
+
+    def _weighed(self, kind: str, known: frozenset[str]) -> float:
+        """Return the log-likelihood of a cause; of bands the mean over all lengths alike likely.
+
+        Their variances cost both the same. What may be there besides, and is not known, costs half
+        of the logarithm of how many numbers show it (Schwarz, 1978).
+        """
+        if kind == "pink_noise":
+            return self._best(pink(self.size), known)
+        lengths = np.geomspace(_SHORTEST, _LONGEST * self.size.rows, _LENGTHS)
+        each = [self._best(bands(self.size, float(length)), known) for length in lengths]
+        return float(logsumexp(each)) - log(_LENGTHS)
+
+    def _best(self, own: Cause, known: frozenset[str]) -> float:
+        found = -np.inf
+        for others, cost in self._others(known):
+            fit = fitted(self.powers, self.size, [own, *others])
+            if fit is not None:
+                found = max(found, fit[0] - cost)
+        return found
+
+    def _others(self, known: frozenset[str]) -> Iterator[tuple[list[Cause], float]]:
+        """Yield what may be there besides, and what it costs."""
+        causes = beside(self.size)
+        frames = sum(own.frames for own in self.powers)
+        numbers = dict.fromkeys(causes, frames) | {"row_noise": frames * (self.size.rows - 1)}
+        for count in range(len(causes) + 1):
+            for kinds in combinations(causes, count):
+                cost = sum(log(numbers[kind]) / 2 for kind in kinds if kind not in known)
+                yield [causes[kind] for kind in kinds], cost

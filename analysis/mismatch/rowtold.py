@@ -1,0 +1,71 @@
+"""Bands of rows and 1/f noise: which of them is claimed, as whole frames tell them apart."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from math import exp
+
+from analysis.mismatch.contradicted import Denial
+from analysis.mismatch.mapped import as_maps_show
+from analysis.mismatch.phase import WholeFrames
+from analysis.mismatch.rank import LEAST_GAIN, TOLD_APART, Ranked, alike
+from analysis.mismatch.state import State
+
+_OTHER = {"pink_noise": "row_banding", "row_banding": "pink_noise"}
+_LARGEST = 700.0  # of an exponent
+_WORDS = {"pink_noise": "1/f noise", "row_banding": "bands of rows"}
+
+
+def as_shown(state: State, frames: WholeFrames | None, fitted: Sequence[Ranked]) -> list[Ranked]:
+    """Return ranked effects, the best first, where maps of the gain and whole frames had their say.
+
+    Frames are asked where the best is one of both and the other was fitted as well. The numbers of
+    both are much alike, and simulated: what frames say decides, at odds of 20; below that both tie.
+    """
+    fitted = as_maps_show(state, fitted)
+    odds = None if not fitted else _odds(state, frames, fitted[0].kind)
+    if odds is None:
+        return list(fitted)
+    best, other = fitted[0], _OTHER[fitted[0].kind]
+    rival = next((one for one in fitted if one.kind == other), None)
+    if rival is None:
+        return list(fitted)
+    if abs(odds) <= TOLD_APART:
+        tie = alike(state, best.polished.mean, rival.polished.mean)
+        first, second = best, replace(rival, gain=best.gain if tie else rival.gain)
+    else:
+        first, second = (best, rival) if odds > 0 else (replace(rival, gain=best.gain), best)
+        behind = min(second.gain, best.gain - abs(odds))
+        second = replace(second, gain=max(behind, LEAST_GAIN))
+    rest = [one for one in fitted if one.kind not in _OTHER]
+    return sorted([first, second, *rest], key=lambda one: -one.gain)
+
+
+def unlike_frames(
+    state: State, frames: WholeFrames | None, best: Ranked, others: Sequence[Ranked]
+) -> Denial | None:
+    """Return how whole frames deny the best of ranked effects; None: they do not.
+
+    They do where the other of both, which was not fitted or has no word, is as likely.
+    """
+    odds = _odds(state, frames, best.kind)
+    if odds is None or odds > TOLD_APART or _any(others, _OTHER[best.kind]):
+        return None
+    why = f"whole frames may as well show {_WORDS[_OTHER[best.kind]]}"
+    return Denial(1 / (1 + exp(min(-odds, _LARGEST))), why)
+
+
+def _odds(state: State, frames: WholeFrames | None, kind: str) -> float | None:
+    """Return by how much frames prefer one of both, nats; None: it is none, or not asked.
+
+    Beside the other, which the camera has, it is no rival.
+    """
+    if frames is None or kind not in _OTHER:
+        return None
+    there = frozenset(own.kind for own in state.camera.effect)
+    if _OTHER[kind] in there:
+        return None
+    return frames.rows.odds(kind, _OTHER[kind], there)
+
+
+def _any(fitted: Sequence[Ranked], kind: str) -> bool:
+    return any(one.kind == kind for one in fitted)

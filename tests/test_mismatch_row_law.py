@@ -1,0 +1,228 @@
+"""Whole frames that tell bands of rows from 1/f noise: expected powers, sizes, odds."""
+
+from collections.abc import Callable
+from types import SimpleNamespace as Stub
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.linalg import toeplitz
+
+from analysis.mismatch.rank import LEAST_GAIN, TOLD_APART, Ranked
+from analysis.mismatch.rowlaw import RowLaw, bands, beside, constant_of, fitted, pink, waves_of
+from analysis.mismatch.rowpower import SLOW, Powers, Size, powers_of
+from analysis.mismatch.rowtold import as_shown, unlike_frames
+
+SURE = 5.0  # standard errors
+ROWS, COLUMNS, FRAMES = 64, 96, 8
+SIZE = Size(ROWS, COLUMNS)
+ENDS = (-1e9, 1e9)
+NOTHING: frozenset[str] = frozenset()
+Rows = Callable[[np.random.Generator], np.ndarray]
+
+
+def _cosines(count: int) -> np.ndarray:
+    """Return orthonormal cosines of 1, 2, ... half cycles: (wave, sample)."""
+    wave, at = np.arange(1, count)[:, np.newaxis], np.arange(count) + 0.5
+    return np.sqrt(2 / count) * np.cos(np.pi * wave * at / count)
+
+
+def _sines(count: int) -> np.ndarray:
+    """Return orthonormal sines of 1, 2, ... half cycles, without their means."""
+    wave, at = np.arange(1, count)[:, np.newaxis], np.arange(count) + 0.5
+    made = np.sqrt(2 / count) * np.sin(np.pi * wave * at / count)
+    return np.asarray(made - made.mean(1, keepdims=True))
+
+
+def _pink_covariance(lags: np.ndarray, samples: int) -> np.ndarray:
+    """Return the covariance of 1/f noise of unit variance, cosine by cosine.
+
+    Of waves of two frames' length down to two samples: 1 ... n - 1 cycles in 2 n samples.
+    """
+    cycles = np.arange(1, samples)
+    weights = (1 / cycles) / (1 / cycles).sum()
+    angle = np.pi * np.multiply.outer(lags, cycles) / samples
+    return np.asarray(np.cos(angle) @ weights)
+
+
+@pytest.mark.parametrize("length", [0.8, 3.0, 15.0])
+def test_powers_of_a_series_are_those_of_its_covariance_matrix(length: float) -> None:
+    covariance = np.exp(-np.arange(40) / length)
+    basis = _cosines(40)
+    wanted = np.einsum("ki,ij,kj->k", basis, toeplitz(covariance), basis)
+    np.testing.assert_allclose(waves_of(covariance), wanted, rtol=1e-9)
+    assert constant_of(covariance) == pytest.approx(toeplitz(covariance).sum() / 40, rel=1e-12)
+
+
+def test_powers_of_pink_noise_are_those_of_all_pairs_of_pixels() -> None:
+    """The covariance of every pixel with every other, waves along rows and down the frame."""
+    rows, columns = 16, 48
+    size = Size(rows, columns)
+    at = np.arange(rows * columns)
+    covariance = _pink_covariance(np.abs(at[:, np.newaxis] - at), rows * columns)
+    flat = np.full((1, columns), 1 / np.sqrt(columns))
+    along = np.concatenate([flat, _cosines(columns)])
+    down = [_cosines(rows), _sines(rows), _cosines(rows)]
+    shaped = covariance.reshape(rows, columns, rows, columns)
+    mixed = np.einsum("ix,axby,jy->iajb", along, shaped, along, optimize=True)
+    own = pink(size)
+    for i in range(SLOW):
+        for j in range(SLOW):
+            wanted = np.einsum("ka,ab,kb->k", down[i], mixed[i, :, j], down[j])
+            wanted = np.add.reduceat(wanted, size.starts) / size.counts
+            np.testing.assert_allclose(own.slow[:, i, j], wanted, rtol=1e-6, atol=1e-6)
+    fine = np.einsum("iaia->i", mixed)[SLOW : size.waves + 1] / rows
+    np.testing.assert_allclose(own.waves, fine, rtol=1e-6)
+    assert own.whole == pytest.approx(covariance.sum() / (rows * columns), rel=1e-6)
+    assert abs(own.slow[:, 0, 1]).max() > 0.2 * own.slow[:, 1, 1].max()  # slopes go with means
+
+
+def _pink(rng: np.random.Generator) -> np.ndarray:
+    """Return a frame of 1/f noise of unit variance in the order of read-out."""
+    count = 2 * ROWS * COLUMNS
+    size = np.zeros(count // 2 + 1)
+    size[1:-1] = 1 / np.sqrt(np.arange(1, count // 2))
+    size *= count / 2 / np.sqrt((size**2).sum())
+    bins = size * (rng.normal(size=size.size) + 1j * rng.normal(size=size.size))
+    return np.asarray(np.fft.irfft(bins, count)[: ROWS * COLUMNS].reshape(ROWS, COLUMNS))
+
+
+def _bands(length: float) -> Rows:
+    root = np.linalg.cholesky(toeplitz(np.exp(-np.arange(ROWS) / length)))
+
+    def made(rng: np.random.Generator) -> np.ndarray:
+        return np.repeat((root @ rng.normal(size=ROWS))[:, np.newaxis], COLUMNS, 1)
+
+    return made
+
+
+def _powers(cause: Rows, sigma: float, rng: np.random.Generator, **more: Any) -> list[Powers]:
+    """Return the powers of two darks and a flat; `more`: what else there is."""
+    found = []
+    for noise, signal in ((1.0, 0.0), (1.0, 0.0), (6.0, 300.0)):
+        stack = signal + noise * rng.normal(size=(FRAMES, ROWS, COLUMNS))
+        stack += sigma * np.stack([cause(rng) for _ in range(FRAMES)])
+        stack += more.get("columns", 0.0) * rng.normal(size=(FRAMES, 1, COLUMNS))
+        stack += more.get("rows", 0.0) * rng.normal(size=(FRAMES, ROWS, 1))
+        stack *= 1 + more.get("flicker", 0.0) * rng.normal(size=(FRAMES, 1, 1))
+        stack += more.get("spike", 0.0) * (rng.random(stack.shape) < 1e-4)
+        at = np.arange(COLUMNS) * 3 / COLUMNS + 11 * np.arange(ROWS)[:, np.newaxis] / ROWS
+        phase = rng.random((FRAMES, 1, 1))
+        stack += more.get("wave", 0.0) * np.cos(2 * np.pi * (at + phase))
+        flickers = signal > 0
+        own = powers_of(lambda stack=stack: iter(stack), 0.0, ENDS, flickers=flickers)  # type: ignore[misc]
+        assert own is not None
+        found.append(own)
+    return found
+
+
+def test_white_noise_has_its_variance_in_each_wave() -> None:
+    rng = np.random.default_rng(2)
+    made = [_powers(_bands(3.0), 0.0, rng) for _ in range(20)]
+    darks = [one for own in made for one in own[:2]]
+    worth = len(darks) * (FRAMES - 1)
+    means = np.mean([own.slow / own.white[:, np.newaxis] for own in darks], 0)
+    error = np.sqrt(2 / (worth * SIZE.counts))
+    for i in range(SLOW):
+        for j in range(SLOW):
+            assert (np.abs(means[:, i, j] - (i == j)) < SURE * error).all()
+    waves = np.mean([own.waves for own in darks], 0)
+    assert np.abs(waves - 1).max() < SURE * np.sqrt(2 / (worth * (ROWS - 1)))
+    assert np.mean([own.whole for own in darks]) == pytest.approx(1, abs=SURE * np.sqrt(2 / worth))
+
+
+def test_clipped_frames_and_single_ones_tell_nothing() -> None:
+    frames = np.zeros((4, ROWS, COLUMNS))
+    assert powers_of(lambda: iter(frames), 0.0, (0.0, 100.0), flickers=False) is None
+    assert powers_of(lambda: iter(frames[:1]), 0.0, ENDS, flickers=False) is None
+    assert RowLaw(SIZE, []).odds("pink_noise", "row_banding", NOTHING) is None
+
+
+def test_sizes_beside_row_noise_are_those_that_were_drawn() -> None:
+    """Their means over recordings: neither takes the other's share."""
+    rng = np.random.default_rng(4)
+    causes = [bands(SIZE, 3.0), beside(SIZE)["row_noise"]]
+    found = []
+    for _ in range(30):
+        one = fitted(_powers(_bands(3.0), 0.3, rng, rows=0.2), SIZE, causes)
+        assert one is not None
+        found.append(one[1])
+    error = np.std(found, axis=0, ddof=1) / np.sqrt(len(found))
+    assert (np.abs(np.mean(found, 0) - [0.09, 0.04]) < 4 * error).all()
+
+
+@pytest.mark.parametrize(
+    "more",
+    [{}, {"columns": 0.3}, {"rows": 0.2}, {"flicker": 0.01}, {"spike": 60.0}, {"wave": 0.3}],
+    ids=lambda more: next(iter(more), "alone"),
+)
+def test_frames_tell_1_f_noise_from_bands(more: dict[str, float]) -> None:
+    for cause, sigma, likelier in ((_pink, 0.5, 1), (_bands(7.0), 0.3, -1), (_bands(2.0), 0.3, -1)):
+        law = RowLaw(SIZE, _powers(cause, sigma, np.random.default_rng(6), **more))
+        odds = law.odds("pink_noise", "row_banding", NOTHING)
+        assert odds is not None
+        assert likelier * odds > TOLD_APART
+
+
+@pytest.mark.parametrize(("cause", "sigma"), [(_pink, 0.06), (_bands(7.0), 0.04)])
+def test_what_is_weak_is_told_wrongly_no_more_often_than_is_said(cause: Rows, sigma: float) -> None:
+    """Odds of 20 are wrong in one of 20 at most."""
+    rng, wrong, repeats = np.random.default_rng(8), 0, 12
+    for _ in range(repeats):
+        odds = RowLaw(SIZE, _powers(cause, sigma, rng)).odds("pink_noise", "row_banding", NOTHING)
+        assert odds is not None
+        wrong += (odds if cause is _pink else -odds) < -TOLD_APART
+    assert wrong <= 1
+
+
+def _ranked(kind: str, gain: float, *mean: float) -> Ranked:
+    effect = Stub(kind=kind)
+    proposal: Any = Stub(effect=effect)
+    polished: Any = Stub(mean=np.array(mean))
+    return Ranked(gain, kind, proposal, polished)
+
+
+def _state(*there: str) -> Any:
+    null = Stub(mean=np.zeros(2), sd=np.ones(2), known=np.ones(2, bool))
+    return Stub(null=null, camera=Stub(effect=[Stub(kind=kind) for kind in there]))
+
+
+def _frames(odds: float) -> Any:
+    """Return whole frames that prefer 1/f noise by so much."""
+
+    def of(kind: str, _other: str, _known: frozenset[str]) -> float:
+        return odds if kind == "pink_noise" else -odds
+
+    return Stub(rows=Stub(odds=of))
+
+
+BOTH = [_ranked("row_banding", 40.0, 1.0, 0.1), _ranked("pink_noise", 30.0, 1.0, 0.0)]
+OTHERS = [_ranked("row_noise", 35.0, 1.0, 1.0)]
+
+
+def test_the_likelier_of_both_comes_first_and_of_two_as_likely_neither() -> None:
+    def order(odds: float, *there: str) -> list[tuple[str, float]]:
+        shown = as_shown(_state(*there), _frames(odds), [BOTH[0], *OTHERS, BOTH[1]])
+        return [(one.kind, one.gain) for one in shown]
+
+    kept = [("row_banding", 40.0), ("row_noise", 35.0), ("pink_noise", 30.0)]
+    assert order(-20.0) == [*kept[:2], ("pink_noise", 20.0)]
+    assert order(-5.0) == kept
+    assert order(6.0) == [("pink_noise", 40.0), ("row_noise", 35.0), ("row_banding", 34.0)]
+    assert order(90.0)[-1] == ("row_banding", LEAST_GAIN)
+    assert order(1.0) == [("row_banding", 40.0), ("pink_noise", 40.0), ("row_noise", 35.0)]
+    assert order(90.0, "pink_noise") == kept  # beside it nothing is asked
+    nobody = as_shown(_state(), None, BOTH)
+    assert [one.kind for one in nobody] == ["row_banding", "pink_noise"]
+
+
+def test_what_another_is_as_likely_as_that_was_not_fitted_is_denied() -> None:
+    state, (best, other) = _state(), BOTH
+    denial = unlike_frames(state, _frames(0.0), best, OTHERS)
+    assert denial is not None
+    assert denial.share == pytest.approx(0.5)
+    assert "1/f noise" in denial.why
+    assert unlike_frames(state, _frames(0.0), best, [*OTHERS, other]) is None
+    assert unlike_frames(state, _frames(-4.0), best, OTHERS) is None
+    assert unlike_frames(_state("pink_noise"), _frames(9.0), best, OTHERS) is None
+    assert unlike_frames(state, _frames(9.0), OTHERS[0], []) is None

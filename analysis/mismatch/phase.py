@@ -60,7 +60,6 @@ class WholeFrames:
     _looks: dict[Frequency, "Look"] = field(default_factory=dict)
     _gains: dict[tuple[Frequency, bool], float] = field(default_factory=dict)
     _bands: dict[float, float] = field(default_factory=dict)
-    _telegraphs: list[Telegraph | None] = field(default_factory=list)
 
     def shown(self, effect: Effect) -> bool:
         """Return whether an effect is no line of a mosaic, or the one that whole frames show."""
@@ -109,13 +108,10 @@ class WholeFrames:
         line = self.line(effect)
         return None if line is None else (line.values, line.errors)
 
-    @property
+    @cached_property
     def _telegraph(self) -> Telegraph | None:
         """The pixels that jump; of a large recording nothing is asked."""
-        if not self._telegraphs:
-            large = self.layout.large
-            self._telegraphs.append(None if large else telegraph(self.layout, self.frames_of))
-        return self._telegraphs[0]
+        return None if self.layout.large else telegraph(self.layout, self.frames_of)
 
     def line(self, effect: Effect) -> "Line | None":
         """Return amplitude and frequency of a line; None: too little is seen.

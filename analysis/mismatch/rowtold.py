@@ -2,16 +2,14 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from math import exp
 
-from analysis.mismatch.contradicted import Denial
+from analysis.mismatch.contradicted import Denial, rival
 from analysis.mismatch.mapped import as_maps_show
 from analysis.mismatch.phase import WholeFrames
 from analysis.mismatch.rank import LEAST_GAIN, TOLD_APART, Ranked, alike
 from analysis.mismatch.state import State
 
 _OTHER = {"pink_noise": "row_banding", "row_banding": "pink_noise"}
-_LARGEST = 700.0  # of an exponent
 _WORDS = {"pink_noise": "1/f noise", "row_banding": "bands of rows"}
 
 
@@ -26,14 +24,16 @@ def as_shown(state: State, frames: WholeFrames | None, fitted: Sequence[Ranked])
     if odds is None:
         return list(fitted)
     best, other = fitted[0], _OTHER[fitted[0].kind]
-    rival = next((one for one in fitted if one.kind == other), None)
-    if rival is None:
+    second = next((one for one in fitted if one.kind == other), None)
+    if second is None:
         return list(fitted)
+    first = best
     if abs(odds) <= TOLD_APART:
-        tie = alike(state, best.polished.mean, rival.polished.mean)
-        first, second = best, replace(rival, gain=best.gain if tie else rival.gain)
+        tie = alike(state, best.polished.mean, second.polished.mean)
+        second = replace(second, gain=best.gain if tie else second.gain)
     else:
-        first, second = (best, rival) if odds > 0 else (replace(rival, gain=best.gain), best)
+        if odds < 0:
+            first, second = replace(second, gain=best.gain), best
         behind = min(second.gain, best.gain - abs(odds))
         second = replace(second, gain=max(behind, LEAST_GAIN))
     rest = [one for one in fitted if one.kind not in _OTHER]
@@ -51,7 +51,7 @@ def unlike_frames(
     if odds is None or odds > TOLD_APART or _any(others, _OTHER[best.kind]):
         return None
     why = f"whole frames may as well show {_WORDS[_OTHER[best.kind]]}"
-    return Denial(1 / (1 + exp(min(-odds, _LARGEST))), why)
+    return rival(-odds, why)
 
 
 def _odds(state: State, frames: WholeFrames | None, kind: str) -> float | None:

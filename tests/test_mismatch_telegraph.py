@@ -82,6 +82,8 @@ def _recorded(seed: int, kind: str, **how: float) -> Telegraph | None:
         for _ in range(STACK):
             state ^= rng.random(pixels) < how.get("switching", 0.5)
             read = NOISE[0] * spread * rng.normal(size=pixels)
+            if kind == "many tails":  # of pixels that differ, too
+                read *= np.sqrt(3 / rng.chisquare(5, pixels))
             if kind == "tails":
                 read = NOISE[0] * rng.standard_t(5, pixels) * np.sqrt(3 / 5)
             if kind == "spikes":
@@ -112,15 +114,25 @@ def test_a_population_that_jumps_is_told_with_its_numbers(seed: int) -> None:
 @pytest.mark.parametrize(
     ("kind", "how"),
     [("alike", {}), ("tails", {}), ("spikes", {}), ("spread", {"log_sigma": 0.3}),
-     ("spread", {"log_sigma": 0.8})],
+     ("spread", {"log_sigma": 0.8}), ("many tails", {"log_sigma": 0.4})],
 )  # fmt: skip
 @pytest.mark.parametrize("seed", range(3))
 def test_pixels_that_are_noisy_otherwise_do_not_jump(
     kind: str, how: dict[str, float], seed: int
 ) -> None:
     told = _recorded(seed, kind, **how)
-    assert told is not None
-    assert told.gain < np.log(20)
+    assert told is None or told.gain < np.log(20)
+
+
+@pytest.mark.parametrize("share", [0.1, 0.3])
+def test_of_many_pixels_sums_tell_more(share: float) -> None:
+    assert _recorded(1, "telegraph", share=share, amplitude=8.0, switching=0.2) is None
+
+
+def test_codes_that_stand_still_tell_nothing() -> None:
+    taken = Taken("dark", "dark", 0.01, 0.0, tuple(range(STACK)))
+    layout = Layout((taken,), *SHAPE, Cfa.MONO, 64.0, 4095.0, {}, {})
+    assert telegraph(layout, lambda _: [np.full(SHAPE, 64.0)] * STACK) is None
 
 
 def test_coarse_codes_tell_nothing() -> None:

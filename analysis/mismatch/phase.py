@@ -104,7 +104,7 @@ class WholeFrames:
         """
         if isinstance(effect, Rts):
             seen = self._telegraph
-            return None if seen is None or seen.gain <= 0 else (seen.values, seen.errors)
+            return None if seen is None or seen.gain < SURE else (seen.values, seen.errors)
         line = self.line(effect)
         return None if line is None else (line.values, line.errors)
 

@@ -22,16 +22,18 @@ from analysis.mismatch.projections import FramesOf
 Array = NDArray[np.float64]
 _LEAST_FRAMES = 3  # of which a median pixel tells the noise
 _COARSE = 1.0  # step between codes, in standard deviations, from which on codes jump by themselves
-_MOST_LINES = 256
+_MOST_LINES = 160
 _NOISY, _OTHERS = 2.5, 1024  # standard deviations: all such pixels, and so many of the others
 _HEIGHTS: Array = np.geomspace(0.7, 120.0, 24)  # in standard deviations of the least noise
 _SWITCHING = np.array([0.02, 0.05, 0.1, 0.15, 0.2, 0.27, 0.35, 0.5])
 _RATIOS: Array = np.exp(np.arange(-1.4, 4.3, 0.2))  # of a pixel's variance to that noise
 _SPREADS = np.geomspace(0.05, 1.5, 18).tolist()  # of the logarithm of such ratios
+_CENTRES = np.arange(-0.1, 0.101, 0.02).tolist()  # the median pixel's is not quite their median
 _ADDED: Array = np.power(2.0, np.arange(-2, 9), dtype=np.float64)
 _SPIKES: Array = np.power(4.0, np.arange(6), dtype=np.float64)
 _SPIKY = np.array([1e-3, 0.01, 0.05, 0.15])  # shares of frames
 _PARTS: Array = np.geomspace(1e-4, 0.05, 32)  # of pixels: jumps of more are told by sums
+_MANY, _SURELY = 0.03, 0.1  # share of pixels from which they are many, and how likely they may be
 _GRID = 32  # amplitudes
 _STEPS = 200
 
@@ -106,15 +108,20 @@ class _Others:
         """Yield the likelihood of each pixel, over exp(top), under laws of all pixels: (pixel,).
 
         All alike; of a read noise that spreads log-normally; few that grow noisier with time;
-        frames that are noisier now and then.
+        frames that are noisier now and then; any mixture of these.
         """
         alike = np.exp(-top)
         yield alike
-        spread = np.exp(self.own - top[:, None])
-        yield max((spread @ _log_normal(s) for s in _SPREADS), key=lambda own: _sum(own, weight))
-        for some in (self.grown, *np.moveaxis(self.spikes, 2, 0)):
-            classes = np.column_stack([alike, np.exp(some - top[:, None])])
-            yield classes @ _shares(classes, weight)
+        own = np.exp(self.own - top[:, None])
+        some = (own @ _log_normal(s, c) for s in _SPREADS for c in _CENTRES)
+        spread = max(some, key=lambda one: _sum(one, weight))
+        yield spread
+        others = [
+            np.exp(one - top[:, None]) for one in (self.grown, *np.moveaxis(self.spikes, 2, 0))
+        ]
+        for classes in [*([alike, one] for one in others), [spread, *others]]:
+            both = np.column_stack(classes)
+            yield both @ _shares(both, weight)
 
 
 def _sum(own: Array, weight: Array) -> float:
@@ -122,14 +129,14 @@ def _sum(own: Array, weight: Array) -> float:
     return float(weight @ np.log(np.maximum(own, 1e-300)))
 
 
-def _log_normal(spread: float) -> Array:
-    """Return the share of pixels at each ratio of variances."""
+def _log_normal(spread: float, centre: float) -> Array:
+    """Return the share of pixels at each ratio of variances, that of the middle one at `centre`."""
     edges = np.concatenate([[-np.inf], (np.log(_RATIOS[1:]) + np.log(_RATIOS[:-1])) / 2, [np.inf]])
-    return np.asarray(np.diff(ndtr(edges / spread)))
+    return np.asarray(np.diff(ndtr((edges - centre) / spread)))
 
 
 def telegraph(layout: Layout, frames_of: FramesOf) -> Telegraph | None:
-    """Return the pixels that jump, a small share of all; None: too few frames tell.
+    """Return the pixels that jump; None: they may be many, or too few frames, or codes, tell.
 
     Parameters
     ----------
@@ -197,8 +204,9 @@ def _noise(layout: Layout, stack: Array) -> tuple[Array, Array] | None:
         plane -= plane.mean(2, keepdims=True)
         plane -= plane.mean(1, keepdims=True)
         square = float(np.median((plane**2).sum(0))) / chi2.median(dof)
-        step_dn = float(np.median(np.diff(np.unique(stack[:, y::step, x::step]))))
-        if square < (_COARSE * step_dn) ** 2:
+        codes = np.unique(stack[:, y::step, x::step])
+        step_dn = float(np.median(np.diff(codes))) if codes.size > 1 else np.inf
+        if not (square > 0 and square >= (_COARSE * step_dn) ** 2):
             return None
         noise[y::step, x::step] = square
     return rest.reshape(len(rest), -1).T, noise.reshape(-1)
@@ -255,6 +263,8 @@ def _told(likely: Array, amplitudes: Array, alone: float) -> Telegraph | None:
     if not isfinite(gain):
         return None
     chance = np.exp(likely - logsumexp(likely))
+    if chance[:, :, _PARTS > _MANY].sum() > _SURELY:
+        return None
     found = []
     for axis, places in enumerate((_SWITCHING, amplitudes, _PARTS)):
         own = chance.sum(tuple(k for k in range(chance.ndim) if k != axis))

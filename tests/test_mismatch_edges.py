@@ -22,6 +22,7 @@ from analysis.mismatch.bank.parts import parts
 from analysis.mismatch.candidates.edges import CANDIDATES
 from analysis.mismatch.finding import Change, Finding, FittedParameter, Gain, OmittedEffect, Proof
 from analysis.mismatch.jsonfile import finding_values
+from analysis.mismatch.layout import Layout
 from analysis.mismatch.locate import lines_of
 from analysis.mismatch.report.sentences import verdict
 from analysis.mismatch.report.summary import summary
@@ -135,7 +136,7 @@ def _clues(offset: np.ndarray, gain: np.ndarray, *effects: object, top: float = 
     return Stub(
         image=images.__getitem__,
         scale=lambda name, _channel: top if name == "gain" else 1.0,
-        layout=Stub(rows=rows, columns=columns, sites={"MONO": (0, 0)}),
+        layout=Layout((), rows, columns, Cfa.MONO, 0.0, 4095.0, {}, {}),
         shape=lambda _channel: (rows, columns),
         camera=Stub(effect=effects),
     )

@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 from analysis.mismatch.edged import outlined
+from analysis.mismatch.layout import Layout
+from dsis.cfa import Cfa
 from exposing import effect
 
 SHAPE = (96, 64)
@@ -25,10 +27,12 @@ def _state(means: np.ndarray, rng: np.random.Generator, sites: str = "mono") -> 
     """
     image, step = means[:, None] + rng.normal(0, NOISE, SHAPE), 1 + (sites == "mosaic")
     scales = dict(zip(SITES[sites], (500.0, 1000.0, 1000.0, 700.0), strict=False))
+    plain = Layout((), *SHAPE, Cfa.MONO if sites == "mono" else Cfa.RGGB, 0.0, 4095.0, {}, {})
     layout = Stub(
         rows=SHAPE[0],
         columns=SHAPE[1],
-        sites=SITES[sites],
+        sites=plain.sites,
+        from_edge=plain.from_edge,
         regressors=lambda channel: Stub(scales={"gain": scales[channel]}),
     )
     images = {

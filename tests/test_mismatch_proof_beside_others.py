@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from analysis.mismatch.edged import single
+from analysis.mismatch.layout import Layout
 from analysis.mismatch.prove import Loglik, gain_of, heldout_gain
 from analysis.mismatch.prove.learning import law_of
 from analysis.mismatch.prove.proof import loglik_of
@@ -139,12 +140,17 @@ def test_surfaces_that_are_left_are_no_decay(rows: Any, left: str, denied: bool,
     image = np.random.default_rng(2).standard_normal((ROWS, COLUMNS))
     image += rows if edge == "top" else rows[::-1]
     scale = SimpleNamespace(scales={"gain": 100.0})
+    plain = Layout((), ROWS, COLUMNS, Cfa.MONO, 0.0, 4095.0, {}, {})
     state: Any = SimpleNamespace(
         camera=SimpleNamespace(effect=()),
         mismatches=[SimpleNamespace(statistic=left)],
         setting=SimpleNamespace(
             layout=SimpleNamespace(
-                rows=ROWS, columns=COLUMNS, sites={"MONO": (0, 0)}, regressors=lambda _: scale
+                rows=ROWS,
+                columns=COLUMNS,
+                sites=plain.sites,
+                from_edge=plain.from_edge,
+                regressors=lambda _: scale,
             ),
             seen=SimpleNamespace(images={("MONO", "gain"): (image, 1.0)}),
         ),

@@ -107,6 +107,28 @@ class Observation:
         return self.levels.get(place) or self.local.get(place)
 
 
+@dataclass(frozen=True)
+class Kept:
+    """What is made of a recording beyond its numbers, and which of these.
+
+    Attributes
+    ----------
+    images
+        Whether to keep the maps, and of samples those before them.
+    samples
+        Whether to keep the latter, if anything.
+    places
+        Whether to look where spectra are largest: of simulations only numbers are asked for.
+    made
+        Those of `ALL_SUMS` that are made: without one its numbers are unknown, all others the same.
+    """
+
+    images: bool = False
+    samples: bool = True
+    places: bool = True
+    made: frozenset[str] = ALL_SUMS
+
+
 def observe(
     layout: Layout,
     frames_of: Frames,
@@ -127,18 +149,10 @@ def observe(
         Gives the frames (row, column) of an exposure, codes in DN, in the order of its numbers.
     watch
         Sees the measures of every exposure on their way.
-    keep
-        Whether to keep the maps, and of samples those before them.
-    samples
-        Whether to keep the latter, if anything.
-    places
-        Whether to look where spectra are largest: of simulations only numbers are asked for.
-    made
-        Those of `ALL_SUMS` that are made: without one its numbers are unknown, all others the same.
+    keep, samples, places, made
+        See `Kept`.
     """
-    return finished(
-        observing(layout, frames_of, watch, keep=keep, samples=samples, places=places, made=made)
-    )
+    return finished(observing(layout, frames_of, watch, Kept(keep, samples, places, made)))
 
 
 def finished(running: Observing) -> Observation:
@@ -151,21 +165,12 @@ def finished(running: Observing) -> Observation:
             return found
 
 
-def observing(
-    layout: Layout,
-    frames_of: Frames,
-    watch: Watcher | None = None,
-    *,
-    keep: bool = False,
-    samples: bool = True,
-    places: bool = True,
-    made: frozenset[str] = ALL_SUMS,
-) -> Observing:
+def observing(layout: Layout, frames_of: Frames, watch: Watcher | None, kept: Kept) -> Observing:
     """Observe as `observe` does, and pause whenever an exposure of uniform light was looked at."""
     levels: dict[Place, Level] = {}
     found: dict[Place, Mapping[str, Number]] = {}
     sums: dict[str, ChannelSums] = {}
-    whole = SensorSums(layout, samples=keep and samples, made=made)
+    whole = SensorSums(layout, samples=kept.images and kept.samples, made=kept.made)
     for exposure in layout.uniform:
         many, frames = Bulk.of(layout, exposure.name), len(exposure.numbers)
         still = {name for name in layout.channels if (exposure.name, name) in layout.still}
@@ -184,7 +189,9 @@ def observing(
             )
             if name not in sums:
                 n, m = channel.mean_frame.shape
-                sums[name] = ChannelSums(layout.regressors(name), (n, m), waves=SPECTRA in made)
+                sums[name] = ChannelSums(
+                    layout.regressors(name), (n, m), waves=SPECTRA in kept.made
+                )
             if name in still:
                 found[place] = dict.fromkeys(NAMES, UNKNOWN)
                 continue
@@ -192,16 +199,16 @@ def observing(
             variance, signal = layout.variance_dn2[place], layout.signal_dn[place]
             sums[name].add(exposure.name, channel, frames, variance, signal)
         yield
-    local = _scenes(layout, frames_of, watch, found, whole.common, made)
+    local = _scenes(layout, frames_of, watch, found, whole.common, kept.made)
     maps, images = _maps(layout, sums)
-    pooled, peaks = _pooled(sums, whole, places=places)
+    pooled, peaks = _pooled(sums, whole, places=kept.places)
     return Observation(
         levels,
         found,
         maps,
         pooled,
         peaks,
-        images if keep else {},
+        images if kept.images else {},
         whole.common,
         local,
         whole.memory.samples,

@@ -99,11 +99,22 @@ def _sums(x: Any, frames: int, sums: Any, squares: Any, counts: Any) -> None:
 
 
 @kernel
+def _mean(terms: Any, most: float, chances: Any, out: Any) -> None:
+    """Set the log of the mean of exp(term) over all sequences, by each of their probabilities."""
+    out[:] = 0.0
+    for s in range(terms.size):
+        likely = exp(terms[s] - most)
+        for p in range(out.size):
+            out[p] += chances[p, s] * likely
+    for p in range(out.size):
+        out[p] = most + log(max(out[p], 1e-300))
+
+
+@kernel
 def _jumps(x: Any, noise: Any, heights: Any, chances: Any, out: Any) -> None:
     pixels, frames = x.shape
     sums, squares = np.empty(1 << frames), np.empty(1 << frames)
     counts = np.empty(1 << frames, np.int64)
-    total = np.empty(chances.shape[0])
     for i in range(pixels):
         _sums(x[i], frames, sums, squares, counts)
         for h in range(heights.size):
@@ -113,13 +124,7 @@ def _jumps(x: Any, noise: Any, heights: Any, chances: Any, out: Any) -> None:
                 k = counts[s]
                 squares[s] = (a * sums[s] - a * a * k * (frames - k) / (2 * frames)) / noise[i]
                 most = max(most, squares[s])
-            total[:] = 0.0
-            for s in range(sums.size):
-                likely = exp(squares[s] - most)
-                for w in range(total.size):
-                    total[w] += chances[w, s] * likely
-            for w in range(total.size):
-                out[i, h, w] = most + log(max(total[w], 1e-300))
+            _mean(squares, most, chances, out[i, h])
 
 
 @kernel
@@ -128,7 +133,6 @@ def _spikes(x: Any, noise: Any, added: Any, chances: Any, out: Any) -> None:
     sums, squares = np.empty(1 << frames), np.empty(1 << frames)
     counts = np.empty(1 << frames, np.int64)
     terms = np.empty(1 << frames)
-    total = np.empty(chances.shape[0])
     for i in range(pixels):
         _sums(x[i], frames, sums, squares, counts)
         b = 1 / noise[i]
@@ -141,10 +145,4 @@ def _spikes(x: Any, noise: Any, added: Any, chances: Any, out: Any) -> None:
                 bent = (a - b) * squares[s] - (a - b) ** 2 * sums[s] ** 2 / weight
                 terms[s] = (k * log(a / b) - log(weight / (frames * b)) - bent) / 2
                 most = max(most, terms[s])
-            total[:] = 0.0
-            for s in range(sums.size):
-                likely = exp(terms[s] - most)
-                for p in range(total.size):
-                    total[p] += chances[p, s] * likely
-            for p in range(total.size):
-                out[i, v, p] = most + log(max(total[p], 1e-300))
+            _mean(terms, most, chances, out[i, v])

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from analysis.mismatch.layout import Layout, Taken
 from analysis.mismatch.model import Model, simulated
-from analysis.mismatch.observe import Observation, finished, observing
+from analysis.mismatch.observe import Kept, Observation, finished, observing
 from dsis.camera import Camera
 from dsis.exposing import Begun, Shared
 
@@ -39,7 +39,7 @@ def simulated_together(layout: Layout, seed: int, which: Work) -> list[Observati
         return [simulated(layout, seed, (model, replicate, made)) for model, made in some]
     frames = _Frames(models, layout, replicate, seed)
     running = [
-        observing(layout, own, places=False, made=made)
+        observing(layout, own, None, Kept(places=False, made=made))
         for own, (_, made) in zip(frames.of, some, strict=True)
     ]
     for exposure in layout.uniform:

@@ -59,7 +59,7 @@ def test_powers_of_pink_noise_are_those_of_all_pairs_of_pixels() -> None:
     rows, columns = 16, 48
     size = Size(rows, columns)
     at = np.arange(rows * columns)
-    covariance = _pink_covariance(np.abs(at[:, np.newaxis] - at), rows * columns)
+    covariance = _pink_covariance(at, rows * columns)[np.abs(at[:, np.newaxis] - at)]
     flat = np.full((1, columns), 1 / np.sqrt(columns))
     along = np.concatenate([flat, _cosines(columns)])
     down = [_cosines(rows), _sines(rows), _cosines(rows)]

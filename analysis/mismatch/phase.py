@@ -104,7 +104,8 @@ class WholeFrames:
         """
         if isinstance(effect, Rts):
             seen = self._telegraph
-            return None if seen is None or seen.gain < SURE else (seen.values, seen.errors)
+            sure = seen is not None and seen.gain >= SURE and seen.known
+            return (seen.values, seen.errors) if seen is not None and sure else None
         line = self.line(effect)
         return None if line is None else (line.values, line.errors)
 

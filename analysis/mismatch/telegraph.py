@@ -62,6 +62,11 @@ class Telegraph:
     gain: float
 
     @property
+    def known(self) -> bool:
+        """Whether share and amplitude are known better than to their own size."""
+        return self.share_error < self.share and self.amplitude_error_dn < self.amplitude_dn
+
+    @property
     def values(self) -> Mapping[str, object]:
         """Parameters of the effect."""
         return {
@@ -235,16 +240,17 @@ def _fitted(jumps: Array, others: _Others, weight: Array, heights: Array) -> Tel
     top = np.maximum(others.most, jumps.max((1, 2)))
     jumping = np.exp(jumps - top[:, None, None])
     amplitudes = np.geomspace(heights[0], heights[-1] / 2, _GRID)
-    best, alone = np.empty(0), -np.inf
+    found, alone = [], -np.inf
     for beside in others.laws(top, weight):
         alone = max(alone, _sum(beside, weight))
         own = np.array(
             [[_of_shares(_of_heights(jumping[:, :, w], heights, a), beside, weight)
               for a in amplitudes] for w in range(_SWITCHING.size)]
         )  # fmt: skip
-        if not best.size or own.max() > best.max():
-            best = own
-    return _told(best, amplitudes, alone)
+        found.append(own)
+    # A mixture of laws takes some of the jumps; so sizes are those beside the best single law.
+    gain = max(float(logsumexp(own)) for own in found) - log(found[0].size) - alone
+    return _told(max(found[:-1], key=np.max), amplitudes, gain)
 
 
 def _of_shares(own: Array, beside: Array, weight: Array) -> Array:
@@ -253,13 +259,12 @@ def _of_shares(own: Array, beside: Array, weight: Array) -> Array:
     return np.asarray(np.log(np.maximum(likely, 1e-300)) @ weight)
 
 
-def _told(likely: Array, amplitudes: Array, alone: float) -> Telegraph | None:
+def _told(likely: Array, amplitudes: Array, gain: float) -> Telegraph | None:
     """Return the mean telegraph, from log-likelihoods (switching, amplitude, share).
 
     All three are as likely beforehand in their logarithms, and so are means; errors are the root
     mean squares about them.
     """
-    gain = float(logsumexp(likely)) - log(likely.size) - alone
     if not isfinite(gain):
         return None
     chance = np.exp(likely - logsumexp(likely))

@@ -34,7 +34,7 @@ _CLEAR = 0.9  # share of what slopes show that is theirs: more sensors are not n
 _LEAST = 0.05  # of it, from which on errors are said as if it were that much
 _LEAST_SENSORS = 2  # that show a scatter
 _NORMAL = 1.96
-_FARTHEST = 50.0  # end of a logarithm's interval: beyond, nothing is known
+_FARTHEST = 7.0  # end of a logarithm's interval: beyond a factor of 1000 nothing is known
 
 
 def settled(
@@ -79,7 +79,8 @@ def settled(
         corrected = effects
     for (i, name, signed), half in zip(free, reach, strict=True):
         value = abs(float(getattr(corrected[i], name)))
-        own = half if signed else value * np.sinh(min(half, _FARTHEST))
+        far = value * np.sinh(half) if half < _FARTHEST else np.inf
+        own = half if signed else far
         errors[i][name] = float(own) / _NORMAL
     return corrected, errors
 

@@ -142,13 +142,29 @@ def test_sizes_beside_row_noise_are_those_that_were_drawn() -> None:
     """Their means over recordings: neither takes the other's share."""
     rng = np.random.default_rng(4)
     causes = [bands(SIZE, 3.0), beside(SIZE)["row_noise"]]
-    found = []
+    found, off = [], []
     for _ in range(30):
         one = fitted(_powers(_bands(3.0), 0.3, rng, rows=0.2), SIZE, causes)
         assert one is not None
-        found.append(one[1])
+        found.append(one.variances)
+        off.append(one.off)
     error = np.std(found, axis=0, ddof=1) / np.sqrt(len(found))
     assert (np.abs(np.mean(found, 0) - [0.09, 0.04]) < 4 * error).all()
+    # Misfits are standard normal, where nothing is amiss: of few products roughly.
+    assert abs(np.mean(off)) < 4 / np.sqrt(len(off))
+    assert 0.6 < np.std(off, ddof=1) < 1.4
+
+
+def test_of_rows_that_neither_makes_nothing_is_told() -> None:
+    """Rows that tilt each by itself: neither bands nor 1/f noise do that, and keep no level."""
+
+    def tilted(rng: np.random.Generator) -> Any:
+        along = np.linspace(-1, 1, COLUMNS)
+        return _bands(3.0)(rng) + 2 * rng.normal(size=(ROWS, 1)) * along
+
+    law = RowLaw(SIZE, _powers(tilted, 0.5, np.random.default_rng(12)))
+    assert law.odds("pink_noise", "row_banding", NOTHING) is None
+    assert law.odds("row_banding", "pink_noise", NOTHING) is None
 
 
 @pytest.mark.parametrize(

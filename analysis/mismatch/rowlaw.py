@@ -18,13 +18,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 from scipy.linalg import toeplitz
-from scipy.special import logsumexp
+from scipy.special import digamma, logsumexp, polygamma
 
 from analysis.mismatch.rowpower import SLOW, Powers, Size, down
 
 Array = NDArray[np.float64]
 _STEPS, _HALVES = 30, 10
 _ENOUGH = 1e-4  # nats
+_UNLIKE = 5.0  # standard deviations of the misfit: what is farther off, no cause here makes
 _LENGTHS = 24  # of bands, in equal ratios
 _SHORTEST, _LONGEST = 0.72, 1 / 4  # rows, and of the frame's
 BESIDE = frozenset({"row_noise", "black_level_drift", "flicker"})
@@ -148,6 +149,21 @@ class _Part:
         rest += np.trace(np.linalg.solve(expected, self.seen), axis1=1, axis2=2)
         return -float(self.shape @ rest)
 
+    def misfit(self, values: Array) -> tuple[float, float]:
+        """Return by how much the deviance exceeds what it is by chance, nats, and its variance.
+
+        Of products that have as many degrees of freedom as waves: of others it is infinite.
+        """
+        expected = np.einsum("npij,p->nij", self.design, values)
+        size = expected.shape[1]
+        some = 2 * self.shape > size - 1
+        own, shape = np.linalg.solve(expected, self.seen)[some], self.shape[some]
+        deviance = np.trace(own, axis1=1, axis2=2) - np.linalg.slogdet(own)[1] - size
+        halves = shape[:, np.newaxis] - np.arange(size) / 2  # of each chi-squared in a determinant
+        usual = size * np.log(shape) - digamma(halves).sum(1)
+        variance = polygamma(1, halves).sum(1) - size / shape
+        return float(shape @ (deviance - usual)), float(shape**2 @ variance)
+
     def slope(self, values: Array) -> tuple[Array, Array]:
         """Return the gradient of the log-likelihood, and Fisher's information."""
         inverse = np.linalg.inv(np.einsum("npij,p->nij", self.design, values))
@@ -162,10 +178,27 @@ class _Part:
         return gradient, flat @ other.T
 
 
-def fitted(
-    powers: Sequence[Powers], size: Size, causes: Sequence[Cause]
-) -> tuple[float, Array] | None:
-    """Return the log-likelihood, nats, and the variances of causes; None where one is negative.
+@dataclass(frozen=True)
+class Fit:
+    """What causes make of powers at best.
+
+    Attributes
+    ----------
+    loglik
+        nats, but for a constant.
+    variances
+        Of causes: (cause,).
+    off
+        By how many standard deviations powers are farther from it than chance takes them.
+    """
+
+    loglik: float
+    variances: Array
+    off: float
+
+
+def fitted(powers: Sequence[Powers], size: Size, causes: Sequence[Cause]) -> Fit | None:
+    """Return the most likely variances of causes; None where one is negative.
 
     Fisher scoring. Each exposure has its own level of white noise, and a bend of it along rows, for
     neighbouring pixels may be alike.
@@ -201,7 +234,10 @@ def fitted(
     start = np.zeros(total)
     start[count::2] = [float(own.waves.mean()) for own in powers]
     value, found = _scored(parts, start)
-    return None if (found[:count] < 0).any() else (value, found[:count])
+    if (found[:count] < 0).any():
+        return None
+    excess, variance = np.sum([part.misfit(found) for part in parts], 0)
+    return Fit(value, found[:count], float(excess / np.sqrt(variance)))
 
 
 def _scored(parts: Sequence[_Part], found: Array) -> tuple[float, Array]:
@@ -238,10 +274,12 @@ class RowLaw:
 
     size: Size
     powers: Sequence[Powers]
-    _found: dict[tuple[str, frozenset[str]], float] = field(default_factory=dict)
+    _found: dict[tuple[str, frozenset[str]], tuple[float, float]] = field(default_factory=dict)
 
     def odds(self, kind: str, other: str, known: frozenset[str]) -> float | None:
         """Return by how much one cause is likelier than another, nats; None: nothing tells.
+
+        Of what neither makes, no likelihood tells which of them is there.
 
         Parameters
         ----------
@@ -252,16 +290,19 @@ class RowLaw:
         """
         if not self.powers:
             return None
-        return self._evidence(kind, known) - self._evidence(other, known)
+        (one, off), (two, farther) = self._evidence(kind, known), self._evidence(other, known)
+        return None if (off if one > two else farther) > _UNLIKE else one - two
 
-    def _evidence(self, kind: str, known: frozenset[str]) -> float:
+    def _evidence(self, kind: str, known: frozenset[str]) -> tuple[float, float]:
         key = (kind, known & BESIDE)
         if key not in self._found:
             self._found[key] = self._weighed(*key)
         return self._found[key]
 
-    def _weighed(self, kind: str, known: frozenset[str]) -> float:
-        """Return the log-likelihood of a cause; of bands the mean over all lengths alike likely.
+    def _weighed(self, kind: str, known: frozenset[str]) -> tuple[float, float]:
+        """Return the log-likelihood of a cause, and by how much powers are off it.
+
+        Of bands the mean over all lengths, alike likely before, and the misfit of the best.
 
         Their variances cost both the same. What may be there besides, and is not known, costs half
         of the logarithm of how many numbers show it (Schwarz, 1978).
@@ -270,14 +311,15 @@ class RowLaw:
             return self._best(pink(self.size), known)
         lengths = np.geomspace(_SHORTEST, _LONGEST * self.size.rows, _LENGTHS)
         each = [self._best(bands(self.size, float(length)), known) for length in lengths]
-        return float(logsumexp(each)) - log(_LENGTHS)
+        loglik = float(logsumexp([one for one, _ in each])) - log(_LENGTHS)
+        return loglik, max(each)[1]
 
-    def _best(self, own: Cause, known: frozenset[str]) -> float:
-        found = -np.inf
+    def _best(self, own: Cause, known: frozenset[str]) -> tuple[float, float]:
+        found = (-np.inf, np.inf)
         for others, cost in self._others(known):
             fit = fitted(self.powers, self.size, [own, *others])
             if fit is not None:
-                found = max(found, fit[0] - cost)
+                found = max(found, (fit.loglik - cost, fit.off))
         return found
 
     def _others(self, known: frozenset[str]) -> Iterator[tuple[list[Cause], float]]:

@@ -1,5 +1,7 @@
 """Numbers of locked frames: an effect gains by them where it is there, and only there."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -7,10 +9,12 @@ from numpy.typing import NDArray
 from analysis.mismatch import heldnumbers
 from analysis.mismatch.heldnumbers import HeldNumbers
 from analysis.mismatch.observe import observe
+from analysis.mismatch.prove.likelihood import Loglik
 from analysis.mismatch.source import Source
 from analysis.mismatch.split import Split
 from analysis.mismatch.state import Setting, State
 from analysis.mismatch.taking import layout_of
+from analysis.mismatch.trial import Trial
 from analysis.mismatch.vector import vector
 from dsis.camera import Camera
 from dsis.effects.row_noise import RowNoise
@@ -80,3 +84,24 @@ def test_frames_that_are_kept_show_what_they_show_anew(monkeypatch: pytest.Monke
     kept = values()
     monkeypatch.setattr(heldnumbers, "_MOST_KEPT", 0)
     assert kept == pytest.approx(values(), rel=1e-12, nan_ok=True)
+
+
+@pytest.mark.parametrize("jobs", [2, 4])
+def test_log_likelihoods_are_the_same_however_cameras_are_shared_out(jobs: int) -> None:
+    numbers, state = held(camera(EFFECT), camera(), 9)
+    effects = [RowNoise(sigma_dn=size) for size in (0.2, 0.3, 0.5)]
+    some = [state.camera.model_copy(update={"effect": (own,)}) for own in effects]
+    signals = state.calibrated.model.signals
+
+    def logliks(jobs: int) -> list[Loglik]:
+        setting = replace(numbers.setting, jobs=jobs)
+        trial = Trial.of(numbers.recording, numbers.split, numbers.source, setting)
+        assert trial.held is not None
+        return trial._logliks(trial.held, [*some, some[0]], signals)
+
+    plain, shared = logliks(1), logliks(jobs)
+    assert [one.levels for one in shared] == [one.levels for one in plain]
+    for one, other in zip(shared, plain, strict=True):
+        for name, frames in other.frames.items():
+            np.testing.assert_array_equal(one.frames[name], frames, strict=True)
+    assert plain[0].levels != plain[1].levels

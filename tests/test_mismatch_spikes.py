@@ -12,11 +12,12 @@ from analysis.mismatch.recalibrate import calibrate
 from analysis.mismatch.source import Source
 from analysis.mismatch.split import Split
 from analysis.mismatch.taking import layout_of
+from analysis.mismatch.touches import SPIKES
 from dsis.camera import Camera
 from dsis.cfa import Cfa
 from dsis.effects import Effect, registry
 from dsis.measures import Accumulator, Estimate
-from mismatch_recordings import camera, recorded
+from mismatch_recordings import camera, recorded, state_of
 
 ROWS, COLUMNS, FRAMES = 32, 48, 8
 SIGMA = 3.0
@@ -143,3 +144,13 @@ def _imbalance(exact: NDArray[np.float64], uneven: bool) -> Estimate:
     for frame in codes:
         sums.add(np.clip(frame, 0, 65535).astype(np.float32))
     return sums.result().channels["MONO"].estimates["code_imbalance"]
+
+
+def test_base_numbers_of_the_many_are_refitted_to_the_many() -> None:
+    """Simulations of a spiky recording leave spikes out as well."""
+    state = state_of(recorded(camera(IMPULSE), 4, rows=64, columns=96), camera())
+    assert state.calibrated.sums == {SPIKES}
+    own = [key.statistic == "pixel_variance" for key in state.vector.keys]
+    assert np.isfinite(state.simulated[:, own]).all()
+    brighter = state.camera.model_copy(update={"effect": (IMPULSE,)})
+    assert np.isfinite(state.simulations.of(brighter, 1)[:, own]).all()

@@ -1,12 +1,22 @@
 """Sums over simulated frames that an effect cannot change are left out; all others are the same."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from analysis.mismatch.model import simulate
 from analysis.mismatch.simulations import Simulations
 from analysis.mismatch.state import State
-from analysis.mismatch.touches import ALL_SUMS, CARRY_OVER, NEIGHBOURS, SPECTRA, sums_for, touched
+from analysis.mismatch.touches import (
+    ALL_SUMS,
+    CARRY_OVER,
+    NEIGHBOURS,
+    RECORDED,
+    SPECTRA,
+    sums_for,
+    touched,
+)
 from analysis.mismatch.vector import Vector, vector
 from dsis.effects.adc_memory import AdcMemory
 from dsis.effects.nonlinearity import Nonlinearity
@@ -61,6 +71,25 @@ def test_a_sum_left_out_leaves_its_numbers_unknown_and_no_others(
     assert {key.statistic for key, gone in zip(whole.keys, lost, strict=True) if gone} >= {
         *without - {"alternation_variance"}
     }
+
+
+def test_variances_without_spikes_are_made_where_they_are_asked_for(state: State) -> None:
+    """All else is the same with them and without."""
+    layout, model = state.setting.layout, state.calibrated.model
+    (whole,), (some,) = (simulate(model, layout, [0], 5, 1, made) for made in (RECORDED, ALL_SUMS))
+    assert not state.calibrated.sums
+    for place, level in whole.levels.items():
+        assert level.bulk_dn2 == pytest.approx(level.variance_dn2, rel=0.1)
+        own = some.levels[place]
+        assert np.isnan([own.bulk_dn2, own.bulk_dof, own.far]).all()
+        assert replace(level, bulk_dn2=0.0, bulk_dof=0.0, far=0.0) == replace(
+            own, bulk_dn2=0.0, bulk_dof=0.0, far=0.0
+        )
+    values = [
+        vector(layout, seen, state.calibrated.refit(layout, seen.levels)).values
+        for seen in (whole, some)
+    ]
+    np.testing.assert_array_equal(*values, strict=True)
 
 
 @pytest.mark.parametrize("kind", KINDS)

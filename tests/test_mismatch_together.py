@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from analysis.mismatch.layout import Layout
-from analysis.mismatch.model import Model, simulated
+from analysis.mismatch.model import Model, simulate, simulated
 from analysis.mismatch.observe import Observation
 from analysis.mismatch.simulations import _groups
 from analysis.mismatch.state import State
 from analysis.mismatch.together import most_together, shared_links, simulated_together
-from analysis.mismatch.touches import ALL_SUMS, SPECTRA
+from analysis.mismatch.touches import ALL_SUMS, RECORDED, SPECTRA
 from analysis.mismatch.vector import vector
 from dsis.camera import Camera
 from dsis.draw import Draw
@@ -64,6 +64,19 @@ def test_side_by_side_is_as_one_by_one(state: State) -> None:
             numbers(state, layout, seen), numbers(state, layout, alone), strict=True
         )
         assert seen.levels == alone.levels
+
+
+@pytest.mark.parametrize("threads", [2, 5])
+def test_a_lone_recording_is_the_same_in_threads(state: State, threads: int) -> None:
+    """Exposures are looked at in any order and summed in their own."""
+    layout, model = state.setting.layout, state.calibrated.model
+    model = model.with_camera(model.camera.model_copy(update={"effect": SOME[0]}))
+    alone = simulated(layout, 5, (model, 1, RECORDED))
+    (seen,) = simulate(model, layout, [1], 5, threads, RECORDED)
+    np.testing.assert_array_equal(
+        numbers(state, layout, seen), numbers(state, layout, alone), strict=True
+    )
+    assert seen.levels == alone.levels
 
 
 def test_of_other_light_nothing_is_shared(state: State) -> None:

@@ -1,6 +1,6 @@
 """What a camera's own effects add to the level and the variance of every exposure."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from functools import partial
 from itertools import islice
 
@@ -11,7 +11,6 @@ from analysis.mismatch.bank.bulk import Bulk
 from analysis.mismatch.basefit import Offsets
 from analysis.mismatch.layout import Layout, Place, Taken
 from analysis.mismatch.model import Model, each
-from dsis.camera import Camera
 from dsis.compiled import kernel
 from dsis.effects import Effect
 from dsis.effects.quantisation import Quantisation
@@ -49,14 +48,9 @@ def bending_offsets(
     replicates = min(_REPLICATES, 1 + int(_SAMPLES // samples))
 
     parts = [layout.uniform[i::_PARTS] for i in range(_PARTS)]
-    work = [
-        (camera, replicate, part)
-        for replicate in range(replicates)
-        for part in parts
-        for camera in cameras
-    ]
-    made = each(partial(_levels, model, layout, seed, spiky=spiky), work, jobs)
-    pairs = list(zip(made[::2], made[1::2], strict=True))
+    work = [(replicate, part) for replicate in range(replicates) for part in parts]
+    models = [model.with_camera(camera) for camera in cameras]
+    pairs = each(partial(_levels, models, layout, seed, spiky=spiky), work, jobs)
 
     def change(which: int) -> dict[Place, float]:
         found: dict[Place, list[float]] = {}
@@ -69,24 +63,28 @@ def bending_offsets(
 
 
 def _levels(
-    model: Model,
+    models: Sequence[Model],
     layout: Layout,
     seed: int,
-    work: tuple[Camera, int, Sequence[Taken]],
+    work: tuple[int, Sequence[Taken]],
     *,
     spiky: bool,
-) -> Mapping[Place, tuple[float, ...]]:
-    """Return level and variances that a camera's effects give, of one simulated recording."""
-    camera, replicate, exposures = work
-    frames_of = model.with_camera(camera).frames(layout, replicate, seed)
-    found: dict[Place, tuple[float, ...]] = {}
+) -> list[dict[Place, tuple[float, ...]]]:
+    """Return level and variances of one simulated recording of each model.
+
+    Exposure by exposure: what is drawn for one model is at hand for the next.
+    """
+    replicate, exposures = work
+    frames_of = [model.frames(layout, replicate, seed) for model in models]
+    found: list[dict[Place, tuple[float, ...]]] = [{} for _ in models]
     for e in exposures:
-        frames: Iterable[NDArray[np.generic]] = islice(frames_of(e.name), _FRAMES)
-        many = Bulk.of(layout, e.name) if spiky else None
-        pairs = _pairs(layout, frames if many is None else many.watching(frames))
-        for channel, pair in pairs.items():
-            bulk = () if many is None else (many.variance_dn2(channel, pair[1]),)
-            found[e.name, channel] = (*pair, *bulk)
+        for own, of in zip(found, frames_of, strict=True):
+            frames: Iterable[NDArray[np.generic]] = islice(of(e.name), _FRAMES)
+            many = Bulk.of(layout, e.name) if spiky else None
+            pairs = _pairs(layout, frames if many is None else many.watching(frames))
+            for channel, pair in pairs.items():
+                bulk = () if many is None else (many.variance_dn2(channel, pair[1]),)
+                own[e.name, channel] = (*pair, *bulk)
     return found
 
 

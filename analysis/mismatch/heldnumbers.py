@@ -25,7 +25,7 @@ from analysis.mismatch.split import Split
 from analysis.mismatch.state import Setting, State
 from analysis.mismatch.taking import layout_of
 from analysis.mismatch.thinned import Stage, thinned
-from analysis.mismatch.touches import ALL_SUMS, differing, sums_for, touched
+from analysis.mismatch.touches import ALL_SUMS, RECORDED, differing, sums_for, touched
 from analysis.mismatch.vector import Vector, vector
 from dsis.camera import Camera
 from dsis.recording import Recording
@@ -113,9 +113,8 @@ class HeldNumbers:
         if not self.frames:
             return None
         yardstick, effects = _yardstick(final, without), differing(final.camera, without)
-        made = sums_for(effects) if effects else ALL_SUMS
-        cameras = final.camera, without
-        one, other = (self._made(yardstick, final, camera, made) for camera in cameras)
+        made = yardstick.sums | (sums_for(effects) if effects else ALL_SUMS)
+        one, other = self._made(yardstick, final, (final.camera, without), made)
         layout, seen = self.whole
         parts = ((layout, seen), self.rest)
         recorded = [_vector_of(yardstick, *part) for part in parts]
@@ -128,32 +127,35 @@ class HeldNumbers:
         return ratio(whole, rest, [(key.statistic, key.scope) for key in keys], may)
 
     def _made(
-        self, yardstick: Calibrated, final: State, camera: Camera, sums: frozenset[str]
-    ) -> tuple[Array, Array]:
-        """Return the numbers of simulated recordings: of all frames, and without the locked ones.
+        self,
+        yardstick: Calibrated,
+        final: State,
+        cameras: Sequence[Camera],
+        sums: frozenset[str],
+    ) -> list[tuple[Array, Array]]:
+        """Return each camera's numbers of all simulated frames, and without the locked ones.
 
         Each is (recording, number). `sums` are those that the numbers asked for need.
         """
-        judge = yardstick.model.camera.model_dump_json()
-        cameras = f"{judge} {final.camera.model_dump_json()} {camera.model_dump_json()}"
-        key = f"{cameras} {sorted(sums)}"
-        if key not in self.kept:
-            whole, rest = self.whole[0], self.rest[0]
-            count = _FEW if self.setting.large else _SIMULATIONS
-            model, seed = relit(final.calibrated.model, camera, whole), self.setting.seed + 3
+        judges = f"{yardstick.model.camera.model_dump_json()} {final.camera.model_dump_json()}"
+        keys = [f"{judges} {one.model_dump_json()} {sorted(sums)}" for one in cameras]
+        missing = {k: c for k, c in zip(keys, cameras, strict=True) if k not in self.kept}
+        layouts = whole, rest = self.whole[0], self.rest[0]
+        count = _FEW if self.setting.large else _SIMULATIONS
+        models = [relit(final.calibrated.model, camera, whole) for camera in missing.values()]
 
-            work = partial(_two, model, whole, rest, (seed, sums))
-            seen = each(work, range(count), self.setting.jobs)
-            made = [
-                [
-                    _vector_of(yardstick, *part).values
-                    for part in zip((whole, rest), both, strict=True)
-                ]
-                for both in seen
-            ]
-            first, second = (np.stack(part) for part in zip(*made, strict=True))
+        work = partial(_two, whole, rest, (self.setting.seed + 3, sums))
+        # All side by side: a few of one camera would leave processes idle in the end.
+        asked = [(model, number) for model in models for number in range(count)]
+        made = [
+            [_vector_of(yardstick, *part).values for part in zip(layouts, both, strict=True)]
+            for both in each(work, asked, self.setting.jobs)
+        ]
+        for i, key in enumerate(missing):
+            own = made[i * count : (i + 1) * count]
+            first, second = (np.stack(part) for part in zip(*own, strict=True))
             self.kept[key] = first, second
-        return self.kept[key]
+        return [self.kept[key] for key in keys]
 
 
 def _yardstick(final: State, without: Camera) -> Calibrated:
@@ -184,13 +186,13 @@ def _shared(parts: Sequence[Vector]) -> tuple[list[Key], list[list[int]]]:
 
 
 def _two(
-    model: Model, whole: Layout, rest: Layout, how: tuple[int, frozenset[str]], replicate: int
+    whole: Layout, rest: Layout, how: tuple[int, frozenset[str]], which: tuple[Model, int]
 ) -> tuple[Observation, Observation]:
     """Return what all frames of a simulated recording show, and what those of `rest` show.
 
-    `how` are the seed, and which sums are made.
+    `how` are the seed, and which sums are made; `which` are the model and the replicate.
     """
-    seed, sums = how
+    (seed, sums), (model, replicate) = how, which
     frames, again = (model.frames(own, replicate, seed) for own in (whole, rest))
     return _observed(whole, rest, frames, again, sums)
 
@@ -200,7 +202,7 @@ def _observed(
     rest: Layout,
     frames: Simulated,
     again: Simulated,
-    sums: frozenset[str] = ALL_SUMS,
+    sums: frozenset[str] = RECORDED,
 ) -> tuple[Observation, Observation]:
     """Return what all simulated frames show, and what those of `rest` show.
 

@@ -89,10 +89,12 @@ class Model:
             return self.camera, tiled(signal, grid)
 
         def shot(name: str, number: int, shared: Shared | None) -> Image:
-            if name not in lit:
+            own = lit.get(name)  # threads may ask for frames of other exposures meanwhile
+            if own is None:
+                own = light(name)
                 lit.clear()
-                lit[name] = light(name)
-            camera, clean = lit[name]
+                lit[name] = own
+            camera, clean = own
             temporal = Draw(seed).within("exposure", name, str(replicate))
             time_s = times[name]
             image = camera.expose(
@@ -113,18 +115,23 @@ def simulate(
 ) -> list[Observation]:
     """Return the observations of simulated recordings, one for each replicate number.
 
-    `made` as of `observe`.
+    `made` as of `observe`. Of a single one exposures are made, and looked at, side by side.
     """
-    return each(partial(simulated, layout, seed), [(model, one, made) for one in replicates], jobs)
+    threads = jobs if len(replicates) == 1 else 1
+    work = partial(simulated, layout, seed, threads=threads)
+    return each(work, [(model, one, made) for one in replicates], jobs)
 
 
-def simulated(layout: Layout, seed: int, which: tuple[Model, int, frozenset[str]]) -> Observation:
+def simulated(
+    layout: Layout, seed: int, which: tuple[Model, int, frozenset[str]], threads: int = 1
+) -> Observation:
     """Return the observation of one simulated recording, of a model and replicate number.
 
     Last what of it is made: see `observe`.
     """
     model, replicate, made = which
-    return observe(layout, model.frames(layout, replicate, seed), places=False, made=made)
+    frames = model.frames(layout, replicate, seed)
+    return observe(layout, frames, places=False, made=made, threads=threads)
 
 
 @contextmanager

@@ -17,11 +17,12 @@ from analysis.mismatch.bank.local import local_scalars, variances, widened
 from analysis.mismatch.bank.parts import Parts, parts
 from analysis.mismatch.bank.scalars import NAMES, UNKNOWN, Number, scalars
 from analysis.mismatch.bank.together import together
-from analysis.mismatch.layout import Layout, Place
+from analysis.mismatch.layout import Layout, Place, Taken
 from analysis.mismatch.scenes import Local
-from analysis.mismatch.summed import ChannelSums, SensorSums, measure
-from analysis.mismatch.touches import ALL_SUMS, SPECTRA
+from analysis.mismatch.summed import ChannelSums, Looked, SensorSums, measure
+from analysis.mismatch.touches import RECORDED, SPECTRA, SPIKES
 from dsis.measures import Channel, Measured
+from dsis.recording.ahead import in_order
 
 Array = NDArray[np.float64]
 
@@ -120,13 +121,13 @@ class Kept:
     places
         Whether to look where spectra are largest: of simulations only numbers are asked for.
     made
-        Those of `ALL_SUMS` that are made: without one its numbers are unknown, all others the same.
+        Those of `RECORDED` that are made: without one its numbers are unknown, all others the same.
     """
 
     images: bool = False
     samples: bool = True
     places: bool = True
-    made: frozenset[str] = ALL_SUMS
+    made: frozenset[str] = RECORDED
 
 
 def observe(
@@ -137,7 +138,8 @@ def observe(
     keep: bool = False,
     samples: bool = True,
     places: bool = True,
-    made: frozenset[str] = ALL_SUMS,
+    made: frozenset[str] = RECORDED,
+    threads: int = 1,
 ) -> Observation:
     """Return the observation of a recording.
 
@@ -151,8 +153,11 @@ def observe(
         Sees the measures of every exposure on their way.
     keep, samples, places, made
         See `Kept`.
+    threads
+        That look at exposures side by side, if `frames_of` may be asked so; the result is the same.
     """
-    return finished(observing(layout, frames_of, watch, Kept(keep, samples, places, made)))
+    kept = Kept(keep, samples, places, made)
+    return finished(observing(layout, frames_of, watch, kept, threads))
 
 
 def finished(running: Observing) -> Observation:
@@ -165,28 +170,31 @@ def finished(running: Observing) -> Observation:
             return found
 
 
-def observing(layout: Layout, frames_of: Frames, watch: Watcher | None, kept: Kept) -> Observing:
+def observing(
+    layout: Layout, frames_of: Frames, watch: Watcher | None, kept: Kept, threads: int = 1
+) -> Observing:
     """Observe as `observe` does, and pause whenever an exposure of uniform light was looked at."""
     levels: dict[Place, Level] = {}
     found: dict[Place, Mapping[str, Number]] = {}
     sums: dict[str, ChannelSums] = {}
     whole = SensorSums(layout, samples=kept.images and kept.samples, made=kept.made)
-    for exposure in layout.uniform:
-        many, frames = Bulk.of(layout, exposure.name), len(exposure.numbers)
-        still = {name for name in layout.channels if (exposure.name, name) in layout.still}
-        seen = many.watching(frames_of(exposure.name))
-        measured = whole.measured(exposure.name, frames, seen, still=bool(still))
+
+    def look(exposure: Taken) -> tuple[Looked, Bulk | None]:
+        many = Bulk.of(layout, exposure.name) if SPIKES in kept.made else None
+        frames = frames_of(exposure.name)
+        seen = frames if many is None else many.watching(frames)
+        return whole.looked(exposure.name, len(exposure.numbers), seen), many
+
+    # What exposures show is summed in their order, whoever was first to look.
+    for one, many in in_order(look, layout.uniform, threads if threads > 1 else 0):
+        measured, frames = one.measured, one.frames
+        still = {name for name in layout.channels if (one.exposure, name) in layout.still}
+        whole.add(one, still=bool(still))
         if watch is not None:
-            watch(exposure.name, measured)
+            watch(one.exposure, measured)
         for name, channel in measured.channels.items():
-            place = (exposure.name, name)
-            level = _level(channel, frames)
-            levels[place] = replace(
-                level,
-                bulk_dn2=many.variance_dn2(name, level.variance_dn2),
-                bulk_dof=many.dof(name),
-                far=many.far(name),
-            )
+            place = (one.exposure, name)
+            levels[place] = _with_bulk(_level(channel, frames), name, many)
             if name not in sums:
                 n, m = channel.mean_frame.shape
                 sums[name] = ChannelSums(
@@ -197,7 +205,7 @@ def observing(layout: Layout, frames_of: Frames, watch: Watcher | None, kept: Ke
                 continue
             found[place] = scalars(channel, frames)
             variance, signal = layout.variance_dn2[place], layout.signal_dn[place]
-            sums[name].add(exposure.name, channel, frames, variance, signal)
+            sums[name].add(one.exposure, channel, frames, variance, signal)
         yield
     local = _scenes(layout, frames_of, watch, found, whole.common, kept.made)
     maps, images = _maps(layout, sums)
@@ -301,6 +309,18 @@ def _maps(
         if len(by_channel) == len(layout.sites) > 1:
             numbers["", kind] = together(by_channel, sharp[kind], layout.sites)
     return numbers, images
+
+
+def _with_bulk(level: Level, channel: str, many: Bulk | None) -> Level:
+    """Return a level with its variance without single spikes, where that was asked for."""
+    if many is None:
+        return level
+    return replace(
+        level,
+        bulk_dn2=many.variance_dn2(channel, level.variance_dn2),
+        bulk_dof=many.dof(channel),
+        far=many.far(channel),
+    )
 
 
 def _level(channel: Channel, frames: int) -> Level:

@@ -15,6 +15,7 @@ from analysis.mismatch.model import Model, Sites
 from analysis.mismatch.observe import Level, Observation
 from analysis.mismatch.rounding import rounded, unrounded
 from analysis.mismatch.staging import with_pictures
+from analysis.mismatch.touches import SPIKES
 from dsis.camera import BaseNoise, Camera, Segment
 from dsis.effects.quantisation import Quantisation
 from dsis.measures.spikes import SPIKED
@@ -56,6 +57,11 @@ class Calibrated:
     switches: tuple[float, ...]
     left_out: frozenset[str]
     bent: Offsets
+
+    @property
+    def sums(self) -> frozenset[str]:
+        """Sums of simulated frames that a `refit` needs beside those that are always made."""
+        return frozenset({SPIKES} if self.offsets.bulk_dn2 else ())
 
     def refit(self, layout: Layout, levels: Mapping[Place, Level]) -> BaseFit:
         """Return the base numbers of another observation, fitted in the same way."""

@@ -31,6 +31,8 @@ class Simulations:
         Gives the bank's numbers of an observation.
     seed, jobs
         Of the simulations.
+    sums
+        That all numbers need, beside those of `ALL_SUMS`.
     kept
         Numbers by camera, in the order of the replicates. Those that need sums which the effects in
         which it differs from the model's cannot change are unknown.
@@ -41,6 +43,7 @@ class Simulations:
     numbers_of: Callable[[Observation], Array]
     seed: int
     jobs: int
+    sums: frozenset[str] = frozenset()
     kept: dict[str, list[Array]] = field(default_factory=dict)
 
     def keep(self, camera: Camera, numbers: Sequence[Array]) -> None:
@@ -97,7 +100,7 @@ class Simulations:
         own = self.model.camera
         effects = differing(camera, own)
         alike = camera.model_copy(update={"effect": own.effect}) == own
-        return sums_for(effects) if effects and alike else ALL_SUMS
+        return self.sums | (sums_for(effects) if effects and alike else ALL_SUMS)
 
 
 def _groups(

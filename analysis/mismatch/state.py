@@ -18,6 +18,7 @@ from analysis.mismatch.observe import Observation
 from analysis.mismatch.predict import Predictor, Reference
 from analysis.mismatch.recalibrate import Calibrated, calibrate
 from analysis.mismatch.simulations import Simulations
+from analysis.mismatch.touches import ALL_SUMS
 from analysis.mismatch.vector import Vector, vector
 from dsis.camera import Camera
 from dsis.effects import Effect
@@ -145,7 +146,8 @@ class State:
         vectors, fits = [], []
         for first in range(0, nulls, setting.jobs):
             batch = range(first, min(first + setting.jobs, nulls))
-            for one in simulate(calibrated.model, layout, batch, setting.seed, setting.jobs):
+            which = calibrated.model, layout, batch, setting.seed, setting.jobs
+            for one in simulate(*which, made=ALL_SUMS | calibrated.sums):
                 fits.append(calibrated.refit(layout, one.levels))
                 vectors.append(vector(layout, one, fits[-1]))
             progress()
@@ -158,6 +160,7 @@ class State:
             lambda one: numbers(layout, calibrated, one),
             setting.seed,
             setting.jobs,
+            calibrated.sums,
         )
         simulations.keep(calibrated.model.camera, [one.values for one in vectors])
         return cls(

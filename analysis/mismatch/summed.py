@@ -1,6 +1,7 @@
 """Sums over the frames and exposures of a recording, from which an observation follows."""
 
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,6 +50,27 @@ def measure(
     return sums.result()
 
 
+@dataclass(frozen=True)
+class Looked:
+    """What the frames of one exposure show, before it is added to what others show.
+
+    Attributes
+    ----------
+    exposure, frames
+        Its name, and how many frames.
+    measured
+        The measures.
+    lines, after
+        Waves of the whole sensor, and samples by the code before.
+    """
+
+    exposure: str
+    frames: int
+    measured: Measured
+    lines: Waves
+    after: CarryOver
+
+
 class ChannelSums:
     """Sums over exposures of one channel."""
 
@@ -85,10 +107,8 @@ class SensorSums:
         self.waves = WaveSums(self.shape, 1 + self.mosaic, taken=SPECTRA in made)
         self.memory = CarryOverSums()
 
-    def measured(
-        self, exposure: str, frames: int, seen: Iterable[NDArray[np.generic]], *, still: bool
-    ) -> Measured:
-        """Return the measures of an exposure's frames; take what moves in them, unless `still`."""
+    def looked(self, exposure: str, frames: int, seen: Iterable[NDArray[np.generic]]) -> "Looked":
+        """Return what an exposure's frames show; nothing is summed yet."""
         lines, after = Waves(self.shape), CarryOver(keep=self.samples)
         if SPECTRA not in self.made:
             lines.frames = frames
@@ -98,17 +118,22 @@ class SensorSums:
         # The transforms of a sensor without colours are at hand.
         take = None if self.mosaic else lambda one: lines.take(one[0])
         found = measure(self.layout, watched, take, self.made)
-        self.memory.add(after, still=still)
-        if not still:
-            places = {name: (exposure, name) for name in found.channels}
-            expected = {name: self.layout.variance_dn2[place] for name, place in places.items()}
-            self.waves.add(lines, found.channels, expected)
-            if self.mosaic:
-                signals = {name: self.layout.signal_dn[place] for name, place in places.items()}
-                sites = self.layout.sites
-                self.common[exposure] = common(found.channels, signals, frames, sites)
-                self.bands.add(found.channels, expected, signals, frames)
-        return found
+        return Looked(exposure, frames, found, lines, after)
+
+    def add(self, one: "Looked", *, still: bool) -> None:
+        """Take what moves in an exposure's frames, unless it is `still`."""
+        self.memory.add(one.after, still=still)
+        if still:
+            return
+        found = one.measured.channels
+        places = {name: (one.exposure, name) for name in found}
+        expected = {name: self.layout.variance_dn2[place] for name, place in places.items()}
+        self.waves.add(one.lines, found, expected)
+        if self.mosaic:
+            signals = {name: self.layout.signal_dn[place] for name, place in places.items()}
+            sites = self.layout.sites
+            self.common[one.exposure] = common(found, signals, one.frames, sites)
+            self.bands.add(found, expected, signals, one.frames)
 
     def numbers(self) -> dict[str, Number]:
         """Return spectra and memories of the whole sensor."""

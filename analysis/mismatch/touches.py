@@ -69,7 +69,12 @@ _NEED: Mapping[str, frozenset[str]] = {
 }
 ALL_SUMS = frozenset(_NEED)
 """Sums over frames that take long: power of waves, products of neighbours, samples by the code
-before. All other sums are always made."""
+before. All other sums but those of `RECORDED` are always made."""
+
+SPIKES = "spikes"
+RECORDED = ALL_SUMS | {SPIKES}
+"""Those, and variances with single spikes left out: of simulations these are needed only where the
+base numbers are fitted to them."""
 
 
 def differing(one: Camera, other: Camera) -> list[Effect]:

@@ -11,7 +11,7 @@ from analysis.mismatch.bandgain import foretold
 from analysis.mismatch.finding import Change, Gain, Proof
 from analysis.mismatch.given import Ratio
 from analysis.mismatch.heldnumbers import HeldNumbers
-from analysis.mismatch.model import each, in_threads, simulate
+from analysis.mismatch.model import each, simulate
 from analysis.mismatch.null import null_of
 from analysis.mismatch.observe import Observation, observe
 from analysis.mismatch.phase import WholeFrames
@@ -25,6 +25,7 @@ from analysis.mismatch.source import Source
 from analysis.mismatch.split import Split
 from analysis.mismatch.state import Setting, State
 from analysis.mismatch.taking import layout_of
+from analysis.mismatch.touches import ALL_SUMS
 from analysis.mismatch.vector import Vector, vector
 from dsis.camera import Camera
 from dsis.effects import Effect
@@ -75,8 +76,8 @@ def denied(gain: Gain, frames: int) -> bool:
     return sure or not np.isfinite(gain.nats_per_frame)
 
 
-def _loglik(held: Held, signals: Signals, seed: int, camera: Camera) -> Loglik:
-    return loglik_of(held, camera, signals, seed=seed)
+def _logliks_of(held: Held, signals: Signals, seed: int, cameras: Sequence[Camera]) -> list[Loglik]:
+    return [loglik_of(held, camera, signals, seed=seed) for camera in cameras]
 
 
 def _key(camera: Camera, signals: Signals) -> tuple[str, bytes]:
@@ -169,11 +170,13 @@ class Trial:
         """Return the log-likelihood of the locked frames under each camera."""
         keys = [_key(camera, signals) for camera in cameras]
         missing = {k: c for k, c in zip(keys, cameras, strict=True) if k not in self.likely}
-        likely = partial(_loglik, held, signals, self.seed)
-        # Of large frames more would be sent to processes than is won.
-        spread = in_threads if self.numbers.setting.layout.large else each
-        made = spread(likely, list(missing.values()), self.numbers.setting.jobs)
-        self.likely.update(zip(missing, made, strict=True))
+        jobs = self.numbers.setting.jobs
+        # The frames are sent once to each process: they are large.
+        shares = [list(missing)[i::jobs] for i in range(min(jobs, len(missing)))]
+        likely = partial(_logliks_of, held, signals, self.seed)
+        made = each(likely, [[missing[key] for key in share] for share in shares], jobs)
+        for share, some in zip(shares, made, strict=True):
+            self.likely.update(zip(share, some, strict=True))
         return [self.likely[key] for key in keys]
 
     def proof(self, base: State, final: State, step: Callable[[], None], source: Source) -> Proof:
@@ -212,8 +215,9 @@ class Trial:
 
         def simulated(state: State) -> list[Vector]:
             model = state.calibrated.model
-            made = simulate(model, layout, range(_REPLICATES), setting.seed + 2, setting.jobs)
-            return [vector_of(one) for one in made]
+            which = model, layout, range(_REPLICATES), setting.seed + 2, setting.jobs
+            made = ALL_SUMS | final.calibrated.sums
+            return [vector_of(one) for one in simulate(*which, made=made)]
 
         own, before, after = vector_of(seen), simulated(base), simulated(final)
         nulls = [null_of(layout, [*after[:i], *after[i + 1 :]], one) for i, one in enumerate(after)]

@@ -317,7 +317,7 @@ def test_where_nothing_is_left_named_all_frames_still_show_what_they_did(
     """Of fewer frames a weak line may not differ for certain: it would never be looked for."""
     search = _search(monkeypatch, "", "wrong", "other")
     search.whole, search.base = Stub(), Stub(mismatches=[SOMETHING, OTHER])  # type: ignore[assignment] # stubs
-    some = Stub(mismatches=[], calibrated=None)
+    some = Stub(mismatches=[], camera=Stub(effect=()))
     monkeypatch.setattr(search_module, "State", Stub(of=lambda *_, **__: some))
     monkeypatch.setattr(
         search_module, "replace", lambda own, **new: Stub(**{**own.__dict__, **new})

@@ -309,3 +309,20 @@ def test_all_frames_are_asked_once_something_is_named(monkeypatch: pytest.Monkey
         search_module, "replace", lambda own, **new: Stub(**{**own.__dict__, **new})
     )
     assert search._asked_of_all(state).mismatches == [SOMETHING]
+
+
+def test_where_nothing_is_left_named_all_frames_still_show_what_they_did(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Of fewer frames a weak line may not differ for certain: it would never be looked for."""
+    search = _search(monkeypatch, "", "wrong", "other")
+    search.whole, search.base = Stub(), Stub(mismatches=[SOMETHING, OTHER])  # type: ignore[assignment] # stubs
+    some = Stub(mismatches=[], camera=Stub(effect=()))
+    monkeypatch.setattr(search_module, "State", Stub(of=lambda *_, **__: some))
+    monkeypatch.setattr(
+        search_module, "replace", lambda own, **new: Stub(**{**own.__dict__, **new})
+    )
+    monkeypatch.setattr(search, "without", lambda *_: None)
+    search.named = [wrong := _named("wrong")]
+    bare = search.drop(OPEN, wrong, "denied")
+    assert bare.mismatches == [SOMETHING, OTHER]

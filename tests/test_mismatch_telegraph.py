@@ -62,6 +62,7 @@ def test_noisy_frames_are_as_likely_as_all_sequences_say(
 
 
 SHAPE, STACK = (72, 96), 8
+SURE = 7.0  # nats
 NOISE = (2.0, 2.0, 3.0, 6.0)  # DN, of four exposures: two darks, two flats
 
 
@@ -109,6 +110,7 @@ def test_a_population_that_jumps_is_told_with_its_numbers(seed: int) -> None:
     assert abs(told.switching - how["switching"]) < 3.5 * told.switching_error
     assert told.share_error < how["share"]
     assert told.amplitude_error_dn < how["amplitude"] / 2
+    assert told.spread < SURE
 
 
 @pytest.mark.parametrize(
@@ -122,11 +124,26 @@ def test_pixels_that_are_noisy_otherwise_do_not_jump(
 ) -> None:
     told = _recorded(seed, kind, **how)
     assert told is None or told.gain < np.log(20)
+    if kind in ("alike", "tails"):
+        assert told is None or told.spread < SURE
+
+
+@pytest.mark.parametrize("log_sigma", [0.15, 0.3, 0.8])
+@pytest.mark.parametrize("seed", range(3))
+def test_a_read_noise_that_spreads_is_told_from_jumps_of_few_or_many(
+    log_sigma: float, seed: int
+) -> None:
+    told = _recorded(seed, "spread", log_sigma=log_sigma)
+    assert told is not None
+    assert told.spread > SURE
 
 
 @pytest.mark.parametrize("share", [0.1, 0.3])
 def test_of_many_pixels_sums_tell_more(share: float) -> None:
-    assert _recorded(1, "telegraph", share=share, amplitude=8.0, switching=0.2) is None
+    told = _recorded(1, "telegraph", share=share, amplitude=8.0, switching=0.2)
+    assert told is not None
+    assert told.gain == -np.inf
+    assert told.spread < SURE  # many jump: their noise does not spread by itself
 
 
 def test_codes_that_stand_still_tell_nothing() -> None:

@@ -19,6 +19,11 @@ Array = NDArray[np.float64]
 _LEAST_SHARE = 0.5  # of what an effect predicts, that a recording must show
 _SURE = 2.0  # standard errors below it: 3.5 below what the right effect shows
 _ALONE = " alone"
+_SHAPE = frozenset(
+    {"kurtosis", "kurtosis_within_pixels", "one_off_outliers", "skewness", "variance_spread"}
+)
+_WIDER = 0.5  # of a doubling, by which steps between codes are wider than the model's
+_MOST = 0.5  # of what calls for an effect, that codes may shape
 _CLEAR = 3.0  # standard deviations: a predicted change that can be seen at all
 _LARGEST = 700.0  # of an exponent
 
@@ -64,14 +69,46 @@ def refuted(state: State, predictor: Predictor, kind: str, fitted: Polished) -> 
     """Return the same of an effect that a state's camera has not, as it was fitted.
 
     What the effect itself draws makes numbers scatter too: of a few spikes in a recording most
-    exposures have none, and that denies none elsewhere.
+    exposures have none, and that denies none elsewhere. Codes deny it too, see `_of_codes`.
     """
     camera, mean = joined(state.camera, fitted.effects, state.setting.given), fitted.mean
     _, sd, known = predictor.weights(mean)
     change = np.where(known, predictor.forms * (mean - state.null.mean), 0.0)
     drawn = 0.0 * sd if camera is None else np.where(known, predictor.spread(camera), 0.0)
     scatter = np.sqrt(np.maximum(sd**2 - change**2, state.null.sd**2) + drawn**2)
-    return _denied(state, predictor, kind, state.null.mean, mean, scatter)
+    denial = _denied(state, predictor, kind, state.null.mean, mean, scatter)
+    return denial or _of_codes(state, kind, mean)
+
+
+def _of_codes(state: State, kind: str, mean: Array) -> Denial | None:
+    """Return how an effect on the noise's shape is denied by coarse codes; None: it is not.
+
+    The shape of noise that is no wider than a step between codes is the steps': where these are
+    wider than the model's, and unexplained, nothing else is told by it. `mean` are the numbers
+    with the effect; most of what it changes may be such.
+    """
+    if all(m.statistic != "code_spacing" for m in state.mismatches):
+        return None
+    coarse = {
+        key.place
+        for key, log_dn, model in zip(
+            state.vector.keys, state.vector.values, state.null.mean, strict=True
+        )
+        if key.statistic == "code_spacing" and key.place in state.setting.seen.levels
+        if log_dn - model > _WIDER
+        and state.setting.seen.levels[key.place].variance_dn2 <= 4.0**log_dn
+    }
+    known = state.null.known & np.isfinite(mean)
+    change = np.where(known, (np.nan_to_num(mean) - state.null.mean) / state.null.sd, 0.0) ** 2
+    calls = CANDIDATES[kind].calls if kind in CANDIDATES else ()
+    own = np.array([key.statistic in calls for key in state.vector.keys])
+    theirs = np.array(
+        [key.statistic in _SHAPE and key.place in coarse for key in state.vector.keys]
+    )
+    whole, feigned = float(change[own].sum()), float(change[own & theirs].sum())
+    if feigned <= _MOST * whole:
+        return None
+    return Denial(1 - feigned / whole, "codes come in steps no finer than the noise they shape")
 
 
 def _denied(

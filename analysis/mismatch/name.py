@@ -119,10 +119,11 @@ class Search(Fitted):
         Whether something differs is asked of all frames, what it is of those that are not locked:
         effects are judged by the state without, see `_pruned`.
         """
-        if not self.named or self.whole is None:
+        if self.whole is None:
             return state
-        whole = State.of(self.whole, state.camera, self.step)
-        seen = replace(state, mismatches=whole.mismatches)
+        asked = self.named or self.own  # else it was asked before
+        off = State.of(self.whole, state.camera, self.step) if asked else self.base
+        seen = replace(state, mismatches=off.mismatches)
         self.polished = seen if self.polished is state else self.polished
         self.asked = (seen, state)
         return seen
@@ -193,7 +194,7 @@ class Search(Fitted):
     def drop(self, state: State, named: Named, why: str) -> State:
         """Return the state without an effect, which is refused from now on."""
         bare = State.of(self.setting, self.without(state, named), self.step, near=state)
-        return self._dropped(bare, named, why)
+        return self._asked_of_all(self._dropped(bare, named, why))
 
     def _dropped(self, bare: State, named: Named, why: str) -> State:
         self._refuse(named.kind, None if named.proposal is None else named.proposal.effect, why)

@@ -93,8 +93,8 @@ def null_of(layout: Layout, simulated: Sequence[Vector], seen: Vector) -> Null:
     parts = np.where(known, (np.nan_to_num(values) - mean) / sd, 0.0)
     along = parts @ sums.matrix.T
     spread = (along**2).sum(0) / (count - 1)
-    white = 1 / (1 + 1 / count)
-    pooled = (_OWN * np.maximum(white, 0.0) + (count - 1) * spread) / (_OWN + count - 1)
+    expected = _spread(sums, [one.shared for one in simulated], sd) / (1 + 1 / count)
+    pooled = (_OWN * expected + (count - 1) * spread) / (_OWN + count - 1)
     return Null(
         (*seen.keys, *sums.keys),
         mean,
@@ -105,6 +105,21 @@ def null_of(layout: Layout, simulated: Sequence[Vector], seen: Vector) -> Null:
         np.sqrt(np.maximum(pooled, _LEAST_SCALE**2) * (1 + 1 / count)),
         _POOLED + count - 1,
     )
+
+
+def _spread(sums: Contrasts, shared: Sequence[Array], sd: Array) -> Array:
+    """Return the variance of contrasts of numbers that chance draws together, one of no others.
+
+    `shared` are the variances that exposures share, of each simulation: they count as far as these
+    agree on it.
+    """
+    if any(own.size != sd.size for own in shared):
+        return np.ones(len(sums.keys))
+    mean, noise = np.mean(shared, 0), np.var(shared, 0, ddof=1) / len(shared)
+    kept = np.where(mean > 0, mean**3 / np.maximum(mean**2 + noise, 1e-300), 0.0)
+    part = np.minimum(np.sqrt(kept) / sd, 1.0)
+    alike: Array = (sums.matrix @ part) ** 2 - sums.matrix**2 @ part**2
+    return np.asarray(1 + alike)
 
 
 def _by_name(keys: Sequence[Key], own: Array, known: NDArray[np.bool_]) -> Array:

@@ -114,6 +114,16 @@ class WholeFrames:
         """The pixels that jump; of a large recording nothing is asked."""
         return None if self.layout.large else telegraph(self.layout, self.frames_of)
 
+    def spread_rather(self, sure: float) -> float:
+        """Return by how much frames prefer read noises that spread to pixels that jump, nats.
+
+        What one gains that is `sure` where the other is not, negative of jumps; else 0.
+        """
+        seen = self._telegraph
+        if seen is None or (seen.spread > sure) == (seen.gain > sure):
+            return 0.0
+        return seen.spread if seen.spread > sure else -seen.gain
+
     def line(self, effect: Effect) -> "Line | None":
         """Return amplitude and frequency of a line; None: too little is seen.
 

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from analysis.mismatch.contradicted import Denial, rival
+from analysis.mismatch.jumptold import as_pixels_show
 from analysis.mismatch.mapped import as_maps_show
 from analysis.mismatch.phase import WholeFrames
 from analysis.mismatch.rank import LEAST_GAIN, TOLD_APART, Ranked, alike
@@ -19,7 +20,7 @@ def as_shown(state: State, frames: WholeFrames | None, fitted: Sequence[Ranked])
     Frames are asked where the best is one of both and the other was fitted as well. The numbers of
     both are much alike, and simulated: what frames say decides, at odds of 20; below that both tie.
     """
-    fitted = as_maps_show(state, fitted)
+    fitted = as_pixels_show(frames, as_maps_show(state, fitted))
     odds = None if not fitted else _odds(state, frames, fitted[0].kind)
     if odds is None:
         return list(fitted)

@@ -8,7 +8,7 @@ from the best of these laws, and beside the best of them.
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from math import exp, isfinite, log, sqrt
+from math import exp, inf, isfinite, log, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +33,7 @@ _ADDED: Array = np.power(2.0, np.arange(-2, 9), dtype=np.float64)
 _SPIKES: Array = np.power(4.0, np.arange(6), dtype=np.float64)
 _SPIKY = np.array([1e-3, 0.01, 0.05, 0.15])  # shares of frames
 _PARTS: Array = np.geomspace(1e-4, 0.05, 32)  # of pixels: jumps of more are told by sums
+_MORE: Array = np.geomspace(0.07, 1.0, 8)  # which what else spreads the noise is told from
 _MANY, _SURELY = 0.03, 0.1  # share of pixels from which they are many, and how likely they may be
 _GRID = 32  # amplitudes
 _STEPS = 200
@@ -50,7 +51,9 @@ class Telegraph:
         Their standard errors.
     gain
         By how much frames are likelier, in the mean over all telegraphs, than under the best law
-        without, nats.
+        without, nats; minus infinity where the pixels that jump may be many.
+    spread
+        The same of read noises that spread over the pixels, beside jumps, few or many, or without.
     """
 
     share: float
@@ -60,6 +63,7 @@ class Telegraph:
     switching: float
     switching_error: float
     gain: float
+    spread: float
 
     @property
     def known(self) -> bool:
@@ -109,24 +113,27 @@ class _Others:
         every = [own.reshape(len(own), -1).max(1) for own in (self.own, self.grown, self.spikes)]
         return np.asarray(np.maximum(np.max(every, 0), 0.0))
 
-    def laws(self, top: Array, weight: Array) -> Iterator[Array]:
+    def laws(self, top: Array, weight: Array) -> Iterator[tuple[Array, float | None]]:
         """Yield the likelihood of each pixel, over exp(top), under laws of all pixels: (pixel,).
 
         All alike; of a read noise that spreads log-normally; few that grow noisier with time;
-        frames that are noisier now and then; any mixture of these.
+        frames that are noisier now and then; any mixture of these. Beside each what the best of all
+        spreads gains on their mean, nats; None: the law has none.
         """
         alike = np.exp(-top)
-        yield alike
+        yield alike, None
         own = np.exp(self.own - top[:, None])
-        some = (own @ _log_normal(s, c) for s in _SPREADS for c in _CENTRES)
-        spread = max(some, key=lambda one: _sum(one, weight))
-        yield spread
+        some = [own @ _log_normal(s, c) for s in _SPREADS for c in _CENTRES]
+        sums = [_sum(one, weight) for one in some]
+        spread = some[int(np.argmax(sums))]
+        chosen = max(sums) - float(logsumexp(sums)) + log(len(sums))
+        yield spread, chosen
         others = [
             np.exp(one - top[:, None]) for one in (self.grown, *np.moveaxis(self.spikes, 2, 0))
         ]
         for classes in [*([alike, one] for one in others), [spread, *others]]:
             both = np.column_stack(classes)
-            yield both @ _shares(both, weight)
+            yield both @ _shares(both, weight), chosen if classes[0] is spread else None
 
 
 def _sum(own: Array, weight: Array) -> float:
@@ -141,7 +148,7 @@ def _log_normal(spread: float, centre: float) -> Array:
 
 
 def telegraph(layout: Layout, frames_of: FramesOf) -> Telegraph | None:
-    """Return the pixels that jump; None: they may be many, or too few frames, or codes, tell.
+    """Return the pixels that jump; None: too few frames, or codes, tell.
 
     Parameters
     ----------
@@ -240,26 +247,32 @@ def _fitted(jumps: Array, others: _Others, weight: Array, heights: Array) -> Tel
     top = np.maximum(others.most, jumps.max((1, 2)))
     jumping = np.exp(jumps - top[:, None, None])
     amplitudes = np.geomspace(heights[0], heights[-1] / 2, _GRID)
-    found, alone = [], -np.inf
-    for beside in others.laws(top, weight):
-        alone = max(alone, _sum(beside, weight))
+    found, alone, spreading = [], [], []
+    for beside, cost in others.laws(top, weight):
+        alone.append(_sum(beside, weight))
+        parts = np.concatenate([_PARTS, _MORE]) if cost is None else _PARTS
         own = np.array(
-            [[_of_shares(_of_heights(jumping[:, :, w], heights, a), beside, weight)
+            [[_of_shares(_of_heights(jumping[:, :, w], heights, a), beside, weight, parts)
               for a in amplitudes] for w in range(_SWITCHING.size)]
         )  # fmt: skip
-        found.append(own)
+        best = max(alone[-1], float(own.max()))
+        spreading.append((cost is not None, best - (cost or 0.0)))
+        found.append(own[:, :, : _PARTS.size])
+    gain = max(float(logsumexp(own)) for own in found) - log(found[0].size) - max(alone)
+    spread, other = (
+        max(own for there, own in spreading if there == kind) for kind in (True, False)
+    )
     # A mixture of laws takes some of the jumps; so sizes are those beside the best single law.
-    gain = max(float(logsumexp(own)) for own in found) - log(found[0].size) - alone
-    return _told(max(found[:-1], key=np.max), amplitudes, gain)
+    return _told(max(found[:-1], key=np.max), amplitudes, gain, spread - other)
 
 
-def _of_shares(own: Array, beside: Array, weight: Array) -> Array:
+def _of_shares(own: Array, beside: Array, weight: Array, parts: Array) -> Array:
     """Return the log-likelihood of each share of pixels that jump: (share,)."""
-    likely = beside + _PARTS[:, None] * (own - beside)
+    likely = beside + parts[:, None] * (own - beside)
     return np.asarray(np.log(np.maximum(likely, 1e-300)) @ weight)
 
 
-def _told(likely: Array, amplitudes: Array, gain: float) -> Telegraph | None:
+def _told(likely: Array, amplitudes: Array, gain: float, spread: float) -> Telegraph | None:
     """Return the mean telegraph, from log-likelihoods (switching, amplitude, share).
 
     All three are as likely beforehand in their logarithms, and so are means; errors are the root
@@ -268,8 +281,7 @@ def _told(likely: Array, amplitudes: Array, gain: float) -> Telegraph | None:
     if not isfinite(gain):
         return None
     chance = np.exp(likely - logsumexp(likely))
-    if chance[:, :, _PARTS > _MANY].sum() > _SURELY:
-        return None
+    many = chance[:, :, _PARTS > _MANY].sum() > _SURELY
     found = []
     for axis, places in enumerate((_SWITCHING, amplitudes, _PARTS)):
         own = chance.sum(tuple(k for k in range(chance.ndim) if k != axis))
@@ -278,7 +290,7 @@ def _told(likely: Array, amplitudes: Array, gain: float) -> Telegraph | None:
         step = mean * float(np.diff(np.log(places)).mean())
         found.append((mean, sqrt(float(own @ (places - mean) ** 2) + step**2 / 12)))
     (switching, a), (amplitude, b), (share, c) = found
-    return Telegraph(share, c, amplitude, b, switching, a, gain)
+    return Telegraph(share, c, amplitude, b, switching, a, -inf if many else gain, spread)
 
 
 def _of_heights(jumping: Array, heights: Array, amplitude: float) -> Array:

@@ -1,9 +1,9 @@
 """The bank's numbers of one observation in one fixed order."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
-from math import inf, log, nan, sqrt
+from math import inf, isfinite, log, nan, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,17 +37,23 @@ class Vector:
     values
         Transformed, near normal; nan where unknown.
     errors
-        Standard deviations in white noise, closed form; inf where unknown.
+        Standard deviations, closed form; inf where unknown. In white noise; of the greens' ratio
+        also from sensor to sensor.
+    shared
+        What of their squares exposures have in common, as one recording tells it, which may be less
+        than none; empty: nothing.
     """
 
     keys: tuple[Key, ...]
     values: Array
     errors: Array
+    shared: Array = field(default_factory=lambda: np.zeros(0))
 
 
 def vector(layout: Layout, seen: Observation, fit: BaseFit) -> Vector:
     """Return the numbers of an observation beside the base numbers fitted to it."""
     rows: list[tuple[Key, Number]] = []
+    shared: dict[Key, float] = {}
     for exposure in layout.uniform:
         for channel in layout.channels:
             place = (exposure.name, channel)
@@ -57,8 +63,9 @@ def vector(layout: Layout, seen: Observation, fit: BaseFit) -> Vector:
             level = _level(layout, exposure.name, channel, seen, fit)
             rows.append((_key("level", "exposure", *place), level))
         if "Gr" in layout.channels and exposure.kind == "flat":
-            rows.append((_key("channel_ratio", "exposure", exposure.name, "G"),
-                         _ratio(exposure.name, seen, fit)))  # fmt: skip
+            key = _key("channel_ratio", "exposure", exposure.name, "G")
+            shared[key] = _drawn(layout, exposure.name, seen, fit)
+            rows.append((key, _ratio(exposure.name, seen, fit, shared[key])))
         rows += _in_common(exposure.name, seen)
     for exposure in layout.pictures:
         rows += _of_scene(layout, exposure.name, seen, fit)
@@ -74,7 +81,8 @@ def vector(layout: Layout, seen: Observation, fit: BaseFit) -> Vector:
     keys = tuple(key for key, _ in rows)
     values, errors = np.array([number for _, number in rows]).T
     unknown = ~(np.isfinite(values) & np.isfinite(errors) & (errors > 0))
-    return Vector(keys, np.where(unknown, nan, values), np.where(unknown, inf, errors))
+    values, errors = np.where(unknown, nan, values), np.where(unknown, inf, errors)
+    return Vector(keys, values, errors, np.array([shared.get(key, 0.0) for key in keys]))
 
 
 def _in_common(name: str, seen: Observation) -> Iterator[tuple[Key, Number]]:
@@ -147,10 +155,34 @@ def _level(layout: Layout, name: str, channel: str, seen: Observation, fit: Base
     return signal - per_light * exposure.light, error
 
 
-def _ratio(name: str, seen: Observation, fit: BaseFit) -> Number:
-    """Return ln(Gr / Gb)."""
+def _ratio(name: str, seen: Observation, fit: BaseFit, drawn: float) -> Number:
+    """Return ln(Gr / Gb), whose variance over sensors is known."""
     first, second = fit.signal_dn[name, "Gr"], fit.signal_dn[name, "Gb"]
     if min(first, second) <= 0:
         return nan, inf
     a, b = seen.levels[name, "Gr"].level_error_dn, seen.levels[name, "Gb"].level_error_dn
-    return log(first / second), sqrt((a / first) ** 2 + (b / second) ** 2 + RELATIVE_RATIO**2)
+    error = (a / first) ** 2 + (b / second) ** 2 + max(drawn, 0.0) + RELATIVE_RATIO**2
+    return log(first / second), sqrt(error)
+
+
+def _drawn(layout: Layout, name: str, seen: Observation, fit: BaseFit) -> float:
+    """Return the variance of ln(Gr / Gb) over sensors whose rows, columns and pixels scatter so.
+
+    The greens share none of them: means of n rows of variance v have v / n. Each part of a fixed
+    pattern is known by its mean square over that of the next finer one; of no pattern chance makes
+    less than none as often as more.
+    """
+    pixels, total = layout.rows * layout.columns / 4, 0.0
+    frames = next(len(e.numbers) for e in layout.exposures if e.name == name)
+    for place in ((name, "Gr"), (name, "Gb")):
+        signal, own = fit.signal_dn[place], seen.scalars[place]
+        if signal <= 0:
+            return 0.0
+        pixel, row, column = (
+            own[f"fixed_{part}_variance"][0] ** 3 for part in ("pixel", "row", "column")
+        )
+        noise = seen.levels[place].variance_dn2 / frames
+        excess = pixel * (row + column - 1) - 1
+        if isfinite(excess):
+            total += excess * noise / pixels / signal**2
+    return total

@@ -1,0 +1,52 @@
+"""Coarse codes shape the noise: what would explain its shape is not named for them."""
+
+import pytest
+from scipy.stats import norm
+
+from analysis.mismatch import find_mismatch
+from dsis.effects import registry
+from mismatch_recordings import camera, recorded
+
+STEP, INTERCEPT = 8.0, 10.0  # DN and DN^2
+LEVELS = (300.0, 900.0, 2600.0)
+TAILS = frozenset({"heavy_tailed_read_noise", "read_noise_spread", "impulse"})
+CODES = registry()["quantisation"](step_dn=STEP)
+
+
+def _excess_kurtosis(mean_dn: float, sd_dn: float) -> float:
+    """Return that of a normal variate which is rounded to the steps, in closed form."""
+    codes = [STEP * k for k in range(40)]
+    share = norm.cdf([c + STEP / 2 for c in codes], mean_dn, sd_dn)
+    share -= norm.cdf([c - STEP / 2 for c in codes], mean_dn, sd_dn)
+    mean = float(share @ codes)
+    second, fourth = (float(share @ [(c - mean) ** k for c in codes]) for k in (2, 4))
+    return fourth / second**2 - 3
+
+
+@pytest.mark.parametrize("there", [False, True])
+def test_tails_that_rounding_makes_are_not_named(*, there: bool) -> None:
+    """At a black level of 64 DN, the middle of a step, few samples leave their code.
+
+    With its codes in the model the same noise is as it should be.
+    """
+    assert _excess_kurtosis(64.0, INTERCEPT**0.5) > 1
+    true = camera(CODES, segments=((0.5, INTERCEPT, None),))
+    model = true if there else camera(segments=((0.5, INTERCEPT, None),))
+    recording = recorded(true, 4, rows=64, columns=64, levels=LEVELS)
+    found = find_mismatch(model, recording, seed=1, vocabulary=TAILS)
+    assert not found.omitted_physics
+    left = {one.statistic for one in found.mismatches}
+    assert ("kurtosis" in left) == ("code_spacing" in left) == (not there)
+
+
+def test_tails_beside_coarse_codes_that_the_model_has_are_named() -> None:
+    tails = registry()["heavy_tailed_read_noise"](tail_df=5.0)
+    parts = ((0.5, 150.0, None),)  # wider than a step: there tails are seen
+    recording = recorded(
+        camera(CODES, tails, segments=parts), 4, rows=64, columns=64, levels=LEVELS
+    )
+    found = find_mismatch(camera(CODES, segments=parts), recording, seed=1, vocabulary=TAILS)
+    assert [one.effect for one in found.omitted_physics] == ["heavy_tailed_read_noise"]
+    unmodelled = camera(segments=parts)  # steps finer than the noise leave its shape
+    found = find_mismatch(unmodelled, recording, seed=1, vocabulary=TAILS)
+    assert [one.effect for one in found.omitted_physics] == ["heavy_tailed_read_noise"]

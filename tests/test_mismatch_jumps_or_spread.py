@@ -1,0 +1,52 @@
+"""Where numbers tie pixels that jump with a read noise that spreads, frames say which it is."""
+
+from types import SimpleNamespace as Stub
+from typing import Any
+
+import pytest
+
+from analysis.mismatch.jumptold import as_pixels_show
+from analysis.mismatch.phase import WholeFrames
+from analysis.mismatch.rank import Ranked
+
+SURE = 7.0
+
+
+def _ranked(**gains: float) -> list[Ranked]:
+    nothing: Any = None
+    return [Ranked(gain, kind, nothing, nothing) for kind, gain in gains.items()]
+
+
+def _frames(gain: float, spread: float) -> WholeFrames:
+    made = WholeFrames(Stub(), lambda _: [])  # type: ignore[arg-type] # a stub
+    made.__dict__["_telegraph"] = Stub(gain=gain, spread=spread)
+    return made
+
+
+@pytest.mark.parametrize(
+    ("gain", "spread", "first", "second"),
+    [
+        (-1.0, 80.0, "read_noise_spread", 2.0),  # 80 nats behind: as good as none
+        (-1.0, 10.0, "read_noise_spread", 30.0),
+        (15.0, -9.0, "rts", 25.0),
+        (15.0, 80.0, "rts", 38.0),  # both are sure: numbers keep their say
+        (-1.0, 2.0, "rts", 38.0),  # neither is
+    ],
+)
+def test_frames_break_the_tie_that_numbers_leave(
+    gain: float, spread: float, first: str, second: float
+) -> None:
+    fitted = _ranked(rts=40.0, read_noise_spread=38.0, impulse=1.0)
+    best, *others = as_pixels_show(_frames(gain, spread), fitted)
+    assert (best.kind, best.gain) == (first, 40.0)
+    (other,) = (one for one in others if one.kind in ("rts", "read_noise_spread"))
+    assert other.gain == second
+
+
+def test_what_numbers_tell_apart_is_not_asked() -> None:
+    fitted = _ranked(rts=40.0, read_noise_spread=30.0)
+    assert as_pixels_show(_frames(-1.0, 80.0), fitted) == fitted
+    assert as_pixels_show(None, fitted) == fitted
+    assert as_pixels_show(_frames(-1.0, 80.0), []) == []
+    others = _ranked(impulse=5.0, rts=4.0)
+    assert as_pixels_show(_frames(-1.0, 80.0), others) == others

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.special import gammaln
 
 from analysis.mismatch.bank.key import Key
+from analysis.mismatch.combs import unknown_combs
 from analysis.mismatch.counted import Counted
 from analysis.mismatch.null import Null
 from analysis.mismatch.simulations import Simulations
@@ -102,7 +103,8 @@ class Predictor:
         with np.errstate(invalid="ignore", divide="ignore"):
             kept = np.where(mean == 0, 0.0, mean**2 / (mean**2 + noise))
         kept[self.counts.which] = 1.0  # their likelihood knows how many were simulated
-        return np.asarray(self.reference.null.mean + mean * kept)
+        unknown = unknown_combs(camera, self.simulations.layout, self.reference.vector.keys)
+        return np.where(unknown, np.nan, self.reference.null.mean + mean * kept)
 
     def spread(self, camera: Camera) -> Array:
         """Return how far what a camera changes scatters from recording to recording.

@@ -1,13 +1,14 @@
 """A recording beside one model of it: calibrated, simulated, judged."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.basefit import BaseFit
 from analysis.mismatch.clues import Clues
+from analysis.mismatch.combs import unknown_combs
 from analysis.mismatch.finding import Mismatch
 from analysis.mismatch.instance import Frequency
 from analysis.mismatch.layout import Layout
@@ -153,6 +154,8 @@ class State:
             progress()
         own = vector(layout, seen, calibrated.residual)
         null = null_of(layout, vectors, own)
+        untold = unknown_combs(calibrated.model.camera, layout, own.keys)
+        null = replace(null, known=null.known & ~untold)
         z, chances = tested(layout, null, own)
         simulations = Simulations(
             layout,

@@ -1,5 +1,7 @@
 """An effect is not named where what calls for it stays, or was never seen."""
 
+from math import exp
+
 import numpy as np
 import pytest
 
@@ -112,3 +114,14 @@ def test_levels_are_not_what_flicker_explains() -> None:
     """It scatters them; that they are bent besides is another's."""
     flicker = registry()["flicker"](sigma_percent=0.3)
     assert _beside(flicker, registry()["nonlinearity"](percent_full_scale=2.0)) is None
+
+
+def test_tails_that_single_pixels_have_not_are_no_heavy_tails() -> None:
+    """Pixels that are noisy by exp(s z) have a kurtosis of 3 exp(4 s^2) over all, each one 3."""
+    size = 0.3
+    excess = 3 * (exp(4 * size**2) - 1)
+    spread = registry()["read_noise_spread"](log_sigma=size)
+    tails = registry()["heavy_tailed_read_noise"](tail_df=4 + 6 / excess)
+    state = state_of(recorded(camera(spread), 5, levels=LEVELS), camera(tails))
+    without = state.camera.model_copy(update={"effect": ()})
+    assert unmet(state, tails.kind, state.predictor(8).mean(without)) is not None

@@ -41,9 +41,10 @@ def _stays(state: State, calls: Mask, change: Array, departures: Array, off: Mas
     """Return how an effect is denied where most of what calls for it stays; None: it is not.
 
     Of the exposures that it clearly changes, each statistic that calls for it counts with what
-    departs most for certain, without it and with it. Where more than half of them all is left,
-    something else is there that calls for the same, and may be all there is: memory along rows
-    explains no correlation along columns, a smooth bend no noise that leans.
+    departs most for certain, without it and with it; in full what only departs with it. Where more
+    than half of them all is left, something else is there that calls for the same, and may be all
+    there is: memory along rows explains no correlation along columns, a smooth bend no noise that
+    leans, and tails that single pixels have not are none.
     """
     still = calls & (state.chances < FAMILY)
     # Where an effect adds little to a large departure, the rest is another's.
@@ -58,8 +59,9 @@ def _stays(state: State, calls: Mask, change: Array, departures: Array, off: Mas
         name = state.null.keys[i].statistic
         before[name] = max(before.get(name, 0.0), abs(float(departures[i])))
         after[name] = max(after.get(name, 0.0), abs(float(state.departures[i])))
-    left = sum(min(size, before[name]) for name, size in after.items())
-    share = 1 - left / max(sum(before.values()), 1e-9)
+    met = {state.null.keys[i].statistic for i in np.flatnonzero(own & off)}
+    left = sum(min(size, before[name]) if name in met else size for name, size in after.items())
+    share = max(1 - left / max(sum(before.values()), 1e-9), 0.0)
     if share >= 1 - _LEFT:
         return None
     most = max(after, key=lambda name: after[name])

@@ -146,7 +146,7 @@ def test_a_proposal_has_the_law_per_second_and_is_fitted_no_more(name: str) -> N
     first, *_ = CANDIDATES["hot_pixels"].propose(_clues(_maps(1, 0.01, 2.0), name=name))
     value = first.effect.model_dump()
     assert first.free == ()
-    assert first.numbers == 2
+    assert first.price == 2
     assert first.of_pixels is not None
     assert first.of_pixels > 100
     for parameter, planted in (("pixel_fraction", 0.01), ("mean_dn_per_s", 4.0)):

@@ -36,7 +36,7 @@ def shown_by_all(search: Search, final: State, named: Named, without: Camera, tr
         return False
     state, bare = (State.of(search.whole, c, search.step) for c in (final.camera, without))
     replicates = replicates_for(search.setting, [own.effect])
-    return gained(state, bare, own.effect, replicates) - own.numbers >= SURE_GAIN
+    return gained(state, bare, own.effect, replicates) - own.price >= SURE_GAIN
 
 
 def once_a_frame(effect: Effect) -> bool:

@@ -149,10 +149,10 @@ def _in_order(state: State, found: Sequence[Fit], shown: Callable[[Effect], floa
     judged = ~_others(state, [own.mean for _, _, own in found])
     fitted, there = [], state.camera.effect
     for kind, start, own in found:
-        gain = predictor.gain(own.mean, start.of_pixels, judged) - start.numbers
+        gain = predictor.gain(own.mean, start.of_pixels, judged) - start.price
         # Frames tell a wave from noise, and not from one that the camera has there already.
         if not any(same_place(start.effect, one, state.setting.layout) for one in there):
-            paid = 0 if kind in _BY_JUMPS else start.numbers  # odds of all sizes have paid for them
+            paid = 0 if kind in _BY_JUMPS else start.price  # odds of all sizes have paid for them
             gain = max(gain, shown(start.effect) - paid)
         fitted.append(Ranked(gain, kind, start, own))
     return sorted(fitted, key=lambda one: -one.gain)
@@ -327,13 +327,19 @@ def twin(
 
     Amplifiers of even and odd rows do nearly what greens that differ do to a mosaic whose light
     is of unknown colour: only the noise of each channel tells. Correlations have no side: memory of
-    the sample before may be charge that neighbours exchange.
+    the sample before may be charge that neighbours exchange. Where that explains more, and also
+    what the best leaves alone, so much the more.
     """
     other = _TWINS.get(best.kind)
     if other is None or other in vocabulary:
         return None
     return next(
-        (one for one in ranked(state, [other], memory, step) if ties(state, best, one)), None
+        (
+            one
+            for one in ranked(state, [other], memory, step)
+            if ties(state, best, one) or one.gain > best.gain + TOLD_APART
+        ),
+        None,
     )
 
 

@@ -19,6 +19,9 @@ from dsis.compiled import kernel
 PERIODS = (8, 16, 32, 64, 128, 256, 512, 1024)
 """Codes of a residue's period that are looked at: the steps of converters are powers of two."""
 
+PLACES = 32
+"""Places of a step in its period that are looked at."""
+
 AXES = ("rows", "columns")
 PHASES = ("cosine", "sine")
 _BEFORE = {"rows": (0, 1), "columns": (1, 0)}
@@ -29,7 +32,7 @@ _SAMPLES = 2**16  # of a difference, roughly: every so many lines are looked at
 _KEPT = 2**15  # samples of a difference of frames that are kept one by one
 _FARTHEST = 6.0  # standard deviations of a change of samples: beyond it is a spike
 _ASKED = 4096  # samples that tell how far changes scatter
-_PLACES, _FINER = 32, 8  # of a step in its period that are looked at, and between two of them
+_FINER = 8  # places of a step between two of `PLACES`
 Array = NDArray[np.float64]
 Frame = NDArray[np.int32]
 
@@ -207,8 +210,8 @@ def sawteeth(samples: tuple[Samples, ...], *, whole: bool = False) -> tuple[Sawt
     """
     found = []
     for period in PERIODS:
-        best, coarse = Sawtooth(0.0, period, 0.0, 0.0), period / _PLACES
-        for at in coarse * np.arange(_PLACES):
+        best, coarse = Sawtooth(0.0, period, 0.0, 0.0), period / PLACES
+        for at in coarse * np.arange(PLACES):
             best = _better(samples, best, float(at), whole=whole)
         for at in best.at_code + coarse / _FINER * np.arange(1 - _FINER, _FINER):
             best = _better(samples, best, float(at) % period, whole=whole)

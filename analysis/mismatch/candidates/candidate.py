@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from math import log
 
 from pydantic import ValidationError
 
@@ -26,6 +27,8 @@ class Proposal:
         Standard errors of parameters that the proposal has measured by itself.
     of_pixels
         What single pixels gain by the effect, nats, in place of counts of them; None: not asked.
+    best_of
+        How many were measured, of which this one explains most: one of its numbers says which.
     """
 
     effect: Effect
@@ -33,11 +36,17 @@ class Proposal:
     signed: frozenset[str] = field(default_factory=frozenset)
     errors: Mapping[str, float] = field(default_factory=dict)
     of_pixels: float | None = None
+    best_of: int = 1
 
     @property
-    def numbers(self) -> int:
-        """How many numbers the recording has chosen, or will."""
-        return len({*self.free, *self.errors})
+    def price(self) -> float:
+        """Nats that must be gained before anything is: chance gains them too.
+
+        One for each number that the recording has chosen, or will; the log of how many the best
+        was chosen of, in place of the number that says which.
+        """
+        numbers = len({*self.free, *self.errors})
+        return numbers if self.best_of == 1 else numbers - 1 + log(self.best_of)
 
 
 @dataclass(frozen=True)

@@ -1,10 +1,11 @@
 """Pixels that know of others: crosstalk, brighter-fatter, filtering, memory, lag."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from analysis.mismatch.bank.carryover import Sawtooth, sawteeth
+from analysis.mismatch.bank.carryover import PLACES, Sawtooth, sawteeth
 from analysis.mismatch.candidates.candidate import Candidate, Proposal, proposals
 from analysis.mismatch.clues import Clues, alike
 
@@ -152,7 +153,7 @@ def _residues(tried: Sequence[tuple[str, Sawtooth]]) -> list[Proposal]:
     for axis, own in tried:
         if own.chi2 <= 0 or own.chi2 < best - _AS_LIKELY:
             continue
-        found += proposals(
+        start = proposals(
             "adc_memory",
             ["step_dn", "at_code"],
             ["step_dn", "at_code"],
@@ -161,6 +162,7 @@ def _residues(tried: Sequence[tuple[str, Sawtooth]]) -> list[Proposal]:
             at_code=own.at_code,
             along=axis,
         )
+        found += [replace(one, best_of=PLACES * len(tried)) for one in start]
     return found
 
 

@@ -1,4 +1,4 @@
-"""Memory along rows is not named where what neighbours exchange explains as much, or more."""
+"""What is not told from a rival is not named: memory from exchange, a bend from a second path."""
 
 from collections.abc import Sequence
 from types import SimpleNamespace
@@ -9,7 +9,8 @@ import pytest
 
 from analysis.mismatch import rank
 from analysis.mismatch.memory import Memory
-from analysis.mismatch.rank import Ranked, twin
+from analysis.mismatch.rank import Ranked, bends_as_well, twin
+from analysis.mismatch.segments import Path
 
 MEMORY = (5.0, 0.0)  # changes of two numbers, in standard deviations
 
@@ -18,6 +19,11 @@ def _ranked(kind: str, gain: float, mean: Sequence[float]) -> Ranked:
     proposal: Any = SimpleNamespace(effect=SimpleNamespace(kind=kind))
     polished: Any = SimpleNamespace(mean=np.array(mean))
     return Ranked(gain, kind, proposal, polished)
+
+
+def _state() -> Any:
+    null = SimpleNamespace(mean=np.zeros(2), sd=np.ones(2), known=np.ones(2, bool))
+    return SimpleNamespace(null=null, setting=SimpleNamespace(layout=None))
 
 
 @pytest.mark.parametrize(
@@ -32,11 +38,30 @@ def _ranked(kind: str, gain: float, mean: Sequence[float]) -> Ranked:
 def test_memory_is_not_told_from_exchange_that_explains_as_much(
     monkeypatch: pytest.MonkeyPatch, gain: float, mean: tuple[float, float], *, told: bool
 ) -> None:
-    null = SimpleNamespace(mean=np.zeros(2), sd=np.ones(2), known=np.ones(2, bool))
-    state: Any = SimpleNamespace(null=null, setting=SimpleNamespace(layout=None))
+    state = _state()
     other = _ranked("crosstalk", gain, mean)
     monkeypatch.setattr(rank, "ranked", lambda *_: [other])
     best = _ranked("readout_memory", 37.0, MEMORY)
     assert twin(state, best, {"crosstalk"}, Memory(), lambda: None) is None  # a rival anyway
     found = twin(state, best, {"readout_memory"}, Memory(), lambda: None)
     assert found is (None if told else other)
+
+
+@pytest.mark.parametrize(
+    ("gain", "mean", "told"),
+    [
+        (11.9, (5.0, 1.0), False),
+        (13.0, (5.0, 1.0), False),  # a little ahead is no more told than a little behind
+        (8.9, (5.0, 1.0), True),
+        (15.1, (5.0, 1.0), True),
+        (11.9, (0.5, 9.0), True),  # what explains other numbers is no rival
+    ],
+)
+def test_a_bend_and_a_second_path_that_tie_are_told_by_nothing(
+    gain: float, mean: tuple[float, float], *, told: bool
+) -> None:
+    best = _ranked("nonlinearity", 12.0, (4.0, 0.0))
+    camera: Any = None
+    path = Path(camera, 900.0, 50.0, gain, np.array(mean))
+    assert bends_as_well(_state(), best, path) is (None if told else path)
+    assert bends_as_well(_state(), best, None) is None

@@ -10,6 +10,7 @@ from analysis.mismatch.own import Own, called, explained, refitted, resized, siz
 from analysis.mismatch.polish import polish, with_effects
 from analysis.mismatch.predict import Predictor
 from analysis.mismatch.rank import Ranked, replicates_for
+from analysis.mismatch.segments import Path
 from analysis.mismatch.state import Setting, State
 from analysis.mismatch.uncertainty import settled
 from dsis.camera import Camera
@@ -54,7 +55,7 @@ class Fitted:
     vocabulary: frozenset[str]
     step: Step
     named: list[Named] = field(default_factory=list)
-    ties: list[tuple[Ranked, Ranked]] = field(default_factory=list)
+    ties: list[tuple[Ranked, Ranked | Path]] = field(default_factory=list)
     own: list[Own] = field(default_factory=list)
     sized: set[int] = field(default_factory=set)
     polished: State | None = None

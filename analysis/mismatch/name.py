@@ -23,6 +23,7 @@ from analysis.mismatch.rank import (
     SURE_GAIN,
     TOLD_APART,
     Ranked,
+    bends_as_well,
     plainest,
     ranked,
     replicates_for,
@@ -31,7 +32,7 @@ from analysis.mismatch.rank import (
 )
 from analysis.mismatch.resolved import calls_alone, differ, explains, gained, opened
 from analysis.mismatch.rowtold import as_shown, unlike_frames
-from analysis.mismatch.segments import second_path
+from analysis.mismatch.segments import Path, second_path, spiky
 from analysis.mismatch.state import State
 from dsis.camera import Camera
 from dsis.effects import Effect
@@ -42,8 +43,6 @@ _MOST_EFFECTS = 20  # some may have to go again
 _CHOSEN = frozenset({"adc_memory", "dual_gain"})  # a period, a gap between levels
 _MOST_LINES = 5  # further ones stay unexplained, located
 _ROUNDS = 3  # of a search that goes on
-_SPIKY = 10.0  # standard errors from which tails bend the variances
-_TAILS = frozenset({"kurtosis", "kurtosis_within_pixels", "one_off_outliers"})
 
 
 @dataclass
@@ -51,7 +50,7 @@ class Search(Fitted):
     """The search from a base state; `run` leaves the result in the attributes."""
 
     refused: dict[str, str] = field(default_factory=dict)
-    tied: dict[str, Ranked] = field(default_factory=dict)
+    tied: dict[str, Ranked | Path] = field(default_factory=dict)
     doubted: dict[str, str] = field(default_factory=dict)
     settled: list[tuple[str, Frequency]] = field(default_factory=list)
     absent: set[Frequency] = field(default_factory=set)  # peaks that were no line
@@ -217,24 +216,23 @@ class Search(Fitted):
 
     def _best(self, state: State) -> tuple[Named, Camera] | None:
         """Return the effect that explains most, and the camera with it."""
-        fitted = self._decided(state)
         left = self._left()
         off = {m.statistic for m in state.mismatches}
         path = second_path(state) if "dual_gain" in left and "pixel_variance" in off else None
+        silent = spiky(state)  # its variances say nothing yet, unless there is nothing else
+        fitted = self._decided(state, None if silent else path)
+        if (fitted and silent) or any(pair[1] is path for pair in self.ties):
+            path = None
         most = fitted[0].gain if fitted else 0.0
-        spiky = {m.statistic for m in state.mismatches if abs(m.z) > _SPIKY} & _TAILS
-        if path is not None and fitted and spiky:
-            path = None  # variances of spiky noise say nothing yet
         undecided = [one for pair in self.ties for one in pair]
-        bent = [one for one in undecided if "pixel_variance" in CANDIDATES[one.kind].calls]
-        tied = max((one.gain for one in bent), default=0.0)
+        fits = [one for one in undecided if one.kind in CANDIDATES]
+        bent = [one.gain for one in fits if "pixel_variance" in CANDIDATES[one.kind].calls]
+        tied = max(bent, default=0.0)
         if path is not None and path.gain > max(self.least, most, tied):
             rivals = tuple((one.kind, path.gain - one.gain) for one in fitted[:3])
             error = {"switch_dn": path.error_dn}
-            return (
-                Named("dual_gain", None, error, path.gain, rivals, path.switch_dn),
-                path.camera,
-            )
+            found = Named(path.kind, None, error, path.gain, rivals, path.switch_dn)
+            return found, path.camera
         if not fitted or most < self._least(state, fitted[0].kind):
             return None
         best = fitted[0]
@@ -277,7 +275,7 @@ class Search(Fitted):
     def _done(self) -> frozenset[str]:
         return frozenset({*(n.name for n in self.named), *self.refused})
 
-    def _decided(self, state: State) -> list[Ranked]:
+    def _decided(self, state: State, path: Path | None) -> list[Ranked]:
         """Return the effects that may be claimed; the best of pairs that tie are put aside.
 
         Neither of two that tie over the same numbers is claimed, nor what explains the same, and
@@ -286,7 +284,7 @@ class Search(Fitted):
         self.ties = []
         self.doubted = {}
         while True:
-            apart = [one.polished.mean for pair in self.ties for one in pair]
+            apart = [one.mean for pair in self.ties for one in pair]
             settled = tuple(self.settled)
             left = self._left() - self.doubted.keys()
             fitted = ranked(
@@ -301,15 +299,17 @@ class Search(Fitted):
                 continue  # all that was fitted of a kind is denied: others were too far behind it
             if not fitted or fitted[0].gain < LEAST_GAIN:
                 return fitted
+            rival: Ranked | Path | None
             rival = next((one for one in fitted[1:] if ties(state, fitted[0], one)), None)
             rival = rival or self._named_otherwise(fitted[0])
+            rival = rival or bends_as_well(state, fitted[0], path)
             rival = rival or twin(state, fitted[0], self.vocabulary, self.memory, self.step)
             if rival is None:
                 return fitted
             self.ties.append((fitted[0], rival))
             self.tied |= {fitted[0].kind: rival, rival.kind: fitted[0]}
 
-    def _named_otherwise(self, best: Ranked) -> Ranked | None:
+    def _named_otherwise(self, best: Ranked) -> Ranked | Path | None:
         """Return the rival that tied before, if it only is no rival since its kind was named.
 
         Amplifiers of the two halves say nothing of those of even and odd rows.

@@ -18,6 +18,7 @@ from analysis.mismatch.instance import (
 )
 from analysis.mismatch.memory import Memory, words
 from analysis.mismatch.polish import Polished, needed, polish, stepped, with_effects
+from analysis.mismatch.segments import Path
 from analysis.mismatch.state import Setting, State
 from dsis.effects import Effect
 
@@ -82,6 +83,11 @@ class Ranked:
     def name(self) -> str:
         """Its kind, and of a line its frequency, of a decay its edge."""
         return instance(self.kind, self.proposal.effect)
+
+    @property
+    def mean(self) -> Array:
+        """The numbers it predicts."""
+        return self.polished.mean
 
 
 def ranked(
@@ -318,6 +324,13 @@ def ties(state: State, best: Ranked, other: Ranked) -> bool:
     if not near or _SAYS_LESS.get(best.kind) == other.kind or _other_line(state, best, other):
         return False
     return alike(state, best.polished.mean, other.polished.mean)
+
+
+def bends_as_well(state: State, best: Ranked, path: Path | None) -> Path | None:
+    """Return the second read-out path if neither it nor the best is told from the other."""
+    if path is None or abs(path.gain - best.gain) >= TOLD_APART:
+        return None
+    return path if alike(state, best.mean, path.mean) else None
 
 
 def twin(

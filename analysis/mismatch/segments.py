@@ -15,17 +15,26 @@ from dsis.camera import Camera
 _NU = 6.0
 _SHAPES = frozenset({"skewness", "kurtosis", "kurtosis_within_pixels"})
 _OFF, _CLEAR = 4.0, 10.0  # standard errors of a variance that departs, and of a shape
+_SPIKY = 10.0  # standard errors from which tails bend the variances
+_TAILS = frozenset({"kurtosis", "kurtosis_within_pixels", "one_off_outliers"})
 _PENALTY = 4.0  # two numbers, and the choice among the gaps
 
 
 @dataclass(frozen=True)
 class Path:
-    """A second segment: the camera with it, its switch and error, and what it gains."""
+    """A second segment: the camera with it, its switch and error, what it gains and predicts."""
 
     camera: Camera
     switch_dn: float
     error_dn: float
     gain: float
+    mean: NDArray[np.float64]
+    kind: str = "dual_gain"
+
+    @property
+    def name(self) -> str:
+        """Its kind."""
+        return self.kind
 
 
 def second_path(state: State) -> Path | None:
@@ -52,6 +61,11 @@ def second_path(state: State) -> Path | None:
     chances = np.exp([path.gain - best.gain for path in paths])
     squares = [path.error_dn**2 + (path.switch_dn - best.switch_dn) ** 2 for path in paths]
     return replace(best, error_dn=sqrt(float(np.average(squares, weights=chances))))
+
+
+def spiky(state: State) -> bool:
+    """Return whether the tails of the noise depart so far that its variances say nothing yet."""
+    return any(abs(m.z) > _SPIKY and m.statistic in _TAILS for m in state.mismatches)
 
 
 def _misshapen(state: State) -> bool:
@@ -98,7 +112,9 @@ def _path(state: State, low: float, high: float) -> Path | None:
     camera = with_numbers(state.camera, fit, (switch,), layout.black_dn)
     # Anywhere between the levels: about the place that is taken, their geometric middle.
     error = sqrt((high - low) ** 2 / 12 + ((low + high) / 2 - switch) ** 2)
-    return Path(camera, switch, error, gain)
+    mean = state.null.mean.copy()
+    mean[which] += state.vector.values[which] - own
+    return Path(camera, switch, error, gain, mean)
 
 
 def _loglik(z: np.ndarray) -> float:

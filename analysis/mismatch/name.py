@@ -275,7 +275,7 @@ class Search(Fitted):
     def _done(self) -> frozenset[str]:
         return frozenset({*(n.name for n in self.named), *self.refused})
 
-    def _decided(self, state: State, path: Path | None) -> list[Ranked]:
+    def _decided(self, state: State, path: Path | None = None) -> list[Ranked]:
         """Return the effects that may be claimed; the best of pairs that tie are put aside.
 
         Neither of two that tie over the same numbers is claimed, nor what explains the same, and

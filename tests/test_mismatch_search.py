@@ -36,6 +36,7 @@ def _ranked(kind: str, gain: float, *changed: int) -> Any:
         name=kind,
         gain=gain,
         polished=SimpleNamespace(mean=mean),
+        mean=mean,
         proposal=SimpleNamespace(effect=None),
     )
 

@@ -8,7 +8,7 @@ it, and of noise beside it, by Whittle's likelihood (1953) of expected powers th
 frames so large (Sykulski et al., Biometrika 106, 2019).
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from itertools import combinations
@@ -129,20 +129,29 @@ class _Part:
     Attributes
     ----------
     design
-        (product, parameter, wave, wave).
+        Of the parameters that each product has: (product, own parameter, wave, wave).
+    which
+        Places of those among all, the same for all products of an exposure: (exposure, own
+        parameter).
     seen
-        (product, wave, wave).
+        (product, wave, wave), exposure by exposure.
     shape
         Half of the degrees of freedom: (product,).
     """
 
     design: Array
+    which: NDArray[np.intp]
     seen: Array
     shape: Array
 
+    def expected(self, values: Array) -> Array:
+        """Return the expectation of each product: (product, wave, wave)."""
+        own = np.repeat(values[self.which], len(self.design) // len(self.which), axis=0)
+        return np.asarray(np.einsum("npij,np->nij", self.design, own))
+
     def likelihood(self, values: Array) -> float:
         """Return the log-likelihood but for a constant; minus infinity: values are impossible."""
-        expected = np.einsum("npij,p->nij", self.design, values)
+        expected = self.expected(values)
         if not (np.linalg.eigvalsh(expected)[:, 0] > 0).all():
             return -np.inf
         rest = np.linalg.slogdet(expected)[1]
@@ -154,7 +163,7 @@ class _Part:
 
         Of products that have as many degrees of freedom as waves: of others it is infinite.
         """
-        expected = np.einsum("npij,p->nij", self.design, values)
+        expected = self.expected(values)
         size = expected.shape[1]
         some = 2 * self.shape > size - 1
         own, shape = np.linalg.solve(expected, self.seen)[some], self.shape[some]
@@ -166,16 +175,21 @@ class _Part:
 
     def slope(self, values: Array) -> tuple[Array, Array]:
         """Return the gradient of the log-likelihood, and Fisher's information."""
-        inverse = np.linalg.inv(np.einsum("npij,p->nij", self.design, values))
+        inverse = np.linalg.inv(self.expected(values))
         own = inverse[:, np.newaxis] @ self.design
         left = np.eye(inverse.shape[1]) - inverse @ self.seen
-        count = own.shape[1]
         # tr(P A - P S P A) = tr((1 - P S) P A), with P the inverse and A the design.
-        gradient = -np.einsum("n,nij,npji->p", self.shape, left, own)
-        weighed = own * self.shape[:, np.newaxis, np.newaxis, np.newaxis]
-        flat = weighed.swapaxes(0, 1).reshape(count, -1)
-        other = own.swapaxes(2, 3).swapaxes(0, 1).reshape(count, -1)
-        return gradient, flat @ other.T
+        exposures, count = self.which.shape
+        each = -np.einsum("nij,npji->np", left, own) * self.shape[:, np.newaxis]
+        flat = own.reshape(*own.shape[:2], -1) * self.shape[:, np.newaxis, np.newaxis]
+        other = own.swapaxes(2, 3).reshape(*own.shape[:2], -1)
+        both = flat @ other.swapaxes(1, 2)
+        gradient: Array = np.zeros(values.size)
+        information: Array = np.zeros((values.size, values.size))
+        np.add.at(gradient, self.which, each.reshape(exposures, -1, count).sum(1))
+        rows, columns = self.which[:, :, np.newaxis], self.which[:, np.newaxis, :]
+        np.add.at(information, (rows, columns), both.reshape(exposures, -1, count, count).sum(1))
+        return gradient, information
 
 
 @dataclass(frozen=True)
@@ -207,26 +221,31 @@ def fitted(powers: Sequence[Powers], size: Size, causes: Sequence[Cause]) -> Fit
     total = count + 2 * len(powers)
     bend = (np.arange(SLOW, size.waves + 1) / size.waves) ** 2
     bands_, waves = size.counts.size, bend.size
-    slow = np.zeros((len(powers), bands_, total, SLOW, SLOW))
-    rest = np.zeros((len(powers), waves + 1, total, 1, 1))
+    # Of each exposure: what the causes make, its white noise, and for waves along rows its bend.
+    slow = np.zeros((len(powers), bands_, count + 1, SLOW, SLOW))
+    rest = np.zeros((len(powers), waves + 1, count + 2, 1, 1))
     for i, own in enumerate(powers):
         for j, cause in enumerate(causes):
             scale = (own.signal_dn / 100) ** 2 if cause.of_light else 1.0
             slow[i, :, j] = scale * cause.slow
             rest[i, :, j, 0, 0] = scale * np.append(cause.waves, cause.whole)
-        slow[i, :, count + 2 * i] = own.white[:, np.newaxis] * np.eye(SLOW)
-        rest[i, :, count + 2 * i, 0, 0] = np.append(np.ones(waves), own.white[0, 0])
-        rest[i, :-1, count + 2 * i + 1, 0, 0] = bend
+        slow[i, :, count] = own.white[:, np.newaxis] * np.eye(SLOW)
+        rest[i, :, count, 0, 0] = np.append(np.ones(waves), own.white[0, 0])
+        rest[i, :-1, count + 1, 0, 0] = bend
+    common = np.tile(np.arange(count), (len(powers), 1))
+    places = np.hstack([common, np.arange(count, total).reshape(-1, 2)])
     frames = np.array([own.frames for own in powers])
     along = np.append(np.full(waves, size.rows - 1.0), 1.0)
     parts = [
         _Part(
             slow.reshape(-1, *slow.shape[2:]),
+            places[:, :-1],
             np.concatenate([own.slow for own in powers]),
             np.outer(frames, size.counts).reshape(-1) / 2,
         ),
         _Part(
             rest.reshape(-1, *rest.shape[2:]),
+            places,
             np.concatenate([[*own.waves, own.whole] for own in powers])[:, np.newaxis, np.newaxis],
             np.outer(frames, along).reshape(-1) / 2,
         ),
@@ -274,7 +293,7 @@ class RowLaw:
 
     size: Size
     powers: Sequence[Powers]
-    _found: dict[tuple[str, frozenset[str]], tuple[float, float]] = field(default_factory=dict)
+    _found: dict[str, list[list["_Beside"]]] = field(default_factory=dict)
 
     def odds(self, kind: str, other: str, known: frozenset[str]) -> float | None:
         """Return by how much one cause is likelier than another, nats; None: nothing tells.
@@ -294,12 +313,6 @@ class RowLaw:
         return None if (off if one > two else farther) > _UNLIKE else one - two
 
     def _evidence(self, kind: str, known: frozenset[str]) -> tuple[float, float]:
-        key = (kind, known & BESIDE)
-        if key not in self._found:
-            self._found[key] = self._weighed(*key)
-        return self._found[key]
-
-    def _weighed(self, kind: str, known: frozenset[str]) -> tuple[float, float]:
         """Return the log-likelihood of a cause, and by how much powers are off it.
 
         Of bands the mean over all lengths, alike likely before, and the misfit of the best.
@@ -307,27 +320,37 @@ class RowLaw:
         Their variances cost both the same. What may be there besides, and is not known, costs half
         of the logarithm of how many numbers show it (Schwarz, 1978).
         """
-        if kind == "pink_noise":
-            return self._best(pink(self.size), known)
-        lengths = np.geomspace(_SHORTEST, _LONGEST * self.size.rows, _LENGTHS)
-        each = [self._best(bands(self.size, float(length)), known) for length in lengths]
-        loglik = float(logsumexp([one for one, _ in each])) - log(_LENGTHS)
+        if kind not in self._found:
+            self._found[kind] = [self._fitted(own) for own in self._causes(kind)]
+        each = [self._best(own, known) for own in self._found[kind]]
+        loglik = float(logsumexp([one for one, _ in each])) - log(len(each))
         return loglik, max(each)[1]
 
-    def _best(self, own: Cause, known: frozenset[str]) -> tuple[float, float]:
-        found = (-np.inf, np.inf)
-        for others, cost in self._others(known):
-            fit = fitted(self.powers, self.size, [own, *others])
-            if fit is not None:
-                found = max(found, (fit.loglik - cost, fit.off))
-        return found
+    def _causes(self, kind: str) -> list[Cause]:
+        """Return a cause of each length it may have."""
+        if kind == "pink_noise":
+            return [pink(self.size)]
+        lengths = np.geomspace(_SHORTEST, _LONGEST * self.size.rows, _LENGTHS)
+        return [bands(self.size, float(length)) for length in lengths]
 
-    def _others(self, known: frozenset[str]) -> Iterator[tuple[list[Cause], float]]:
-        """Yield what may be there besides, and what it costs."""
-        causes = beside(self.size)
-        frames = sum(own.frames for own in self.powers)
-        numbers = dict.fromkeys(causes, frames) | {"row_noise": frames * (self.size.rows - 1)}
+    def _fitted(self, own: Cause) -> list["_Beside"]:
+        """Return the fits of a cause beside whatever else may be there."""
+        causes, found = beside(self.size), []
         for count in range(len(causes) + 1):
             for kinds in combinations(causes, count):
-                cost = sum(log(numbers[kind]) / 2 for kind in kinds if kind not in known)
-                yield [causes[kind] for kind in kinds], cost
+                fit = fitted(self.powers, self.size, [own, *(causes[kind] for kind in kinds)])
+                found += [] if fit is None else [(kinds, fit)]
+        return found
+
+    def _best(self, fits: list["_Beside"], known: frozenset[str]) -> tuple[float, float]:
+        frames = sum(own.frames for own in self.powers)
+        numbers = dict.fromkeys(BESIDE, frames) | {"row_noise": frames * (self.size.rows - 1)}
+        best = (-np.inf, np.inf)
+        for kinds, fit in fits:
+            cost = sum(log(numbers[kind]) / 2 for kind in kinds if kind not in known)
+            best = max(best, (fit.loglik - cost, fit.off))
+        return best
+
+
+_Beside = tuple[tuple[str, ...], Fit]
+"""What else is there beside a cause, and the fit of all."""

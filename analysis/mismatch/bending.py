@@ -24,9 +24,15 @@ Pair = tuple[float, float]
 """Level and variance."""
 
 
-def bends(effects: Iterable[Effect], bending: frozenset[str] = _BENT) -> bool:
+def bends(effects: Iterable[Effect]) -> bool:
     """Return whether effects change levels or variances; of coarse codes that is known exactly."""
-    return any(e.measures & bending for e in effects if not isinstance(e, Quantisation))
+    return any(e.measures & _BENT for e in effects if not isinstance(e, Quantisation))
+
+
+def bent_by(effects: Iterable[Effect], *, spiky: bool) -> tuple[Effect, ...]:
+    """Return the effects that are simulated to know what they add; see `bending_offsets`."""
+    bending = _BENT | {"kurtosis"} if spiky else _BENT
+    return tuple(e for e in effects if isinstance(e, Quantisation) or e.measures & bending)
 
 
 def bending_offsets(
@@ -37,12 +43,11 @@ def bending_offsets(
     Only effects that change either are simulated, with and without: the draws are the same. Where
     recordings are `spiky`, the variance of the many counts as well, which tails change.
     """
-    bending = _BENT | {"kurtosis"} if spiky else _BENT
-    if not bends(model.camera.effect, bending):
+    bent = bent_by(model.camera.effect, spiky=spiky)
+    codes = tuple(e for e in bent if isinstance(e, Quantisation))
+    if len(codes) == len(bent):
         return Offsets()
-    codes = [e for e in model.camera.effect if isinstance(e, Quantisation)]
-    bent = [e for e in model.camera.effect if isinstance(e, Quantisation) or e.measures & bending]
-    cameras = [model.camera.model_copy(update={"effect": tuple(own)}) for own in (bent, codes)]
+    cameras = [model.camera.model_copy(update={"effect": own}) for own in (bent, codes)]
     samples = sum(min(len(e.numbers), _FRAMES) for e in layout.uniform)
     samples *= layout.rows * layout.columns
     replicates = min(_REPLICATES, 1 + int(_SAMPLES // samples))

@@ -8,7 +8,7 @@ import multiprocessing
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from contextvars import ContextVar
+from contextvars import ContextVar, copy_context
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TypeVar
@@ -36,6 +36,7 @@ R = TypeVar("R")
 _KEPT_BYTES = 400 << 20  # of pink noise, in each process: 300 frames of VGA
 _FIELDS_BYTES = 256 << 20  # of shot and read noise: cheaper to make
 _pool: ContextVar[Workers | None] = ContextVar("pool", default=None)
+_alone: ContextVar[bool] = ContextVar("alone", default=True)
 
 
 @dataclass(frozen=True)
@@ -117,7 +118,7 @@ def simulate(
 
     `made` as of `observe`. Of a single one exposures are made, and looked at, side by side.
     """
-    threads = jobs if len(replicates) == 1 else 1
+    threads = jobs if len(replicates) == 1 and _alone.get() else 1
     work = partial(simulated, layout, seed, threads=threads)
     return each(work, [(model, one, made) for one in replicates], jobs)
 
@@ -161,7 +162,7 @@ def each(work: Callable[[T], R], items: Sequence[T], jobs: int) -> list[R]:
     pickled.
     """
     pool = _pool.get()
-    if pool is None or jobs <= 1 or len(items) < 2:
+    if pool is None or jobs <= 1 or (len(items) < 2 and _alone.get()):
         return in_threads(work, items, jobs)
     running = [pool.submit(work, item) for item in items]
     try:
@@ -169,6 +170,27 @@ def each(work: Callable[[T], R], items: Sequence[T], jobs: int) -> list[R]:
     finally:
         for one in running:
             one.cancel()
+
+
+def side_by_side(work: Callable[[T], R], items: Sequence[T], jobs: int) -> list[R]:
+    """Return `work` of each item, in order: work that mostly waits for `each`, by threads.
+
+    Each item's single simulations go to a process; without processes items follow one another.
+    """
+    if _pool.get() is None or jobs <= 1 or len(items) < 2:
+        return [work(item) for item in items]
+
+    def beside_others(item: T) -> R:
+        _alone.set(False)
+        return work(item)
+
+    with ThreadPoolExecutor(jobs) as threads:
+        running = [threads.submit(copy_context().run, beside_others, item) for item in items]
+        try:
+            return [one.result() for one in running]
+        finally:
+            for one in running:
+                one.cancel()
 
 
 def in_threads(work: Callable[[T], R], items: Sequence[T], jobs: int) -> list[R]:

@@ -160,7 +160,8 @@ class Search(Fitted):
             some = [] if later else self._called(state, less=added is not None)
             sized = self._resized(state, some, least) if some else state
             if sized is not state:
-                state = sized
+                rough = self.setting.large and self.rough and added is not None and least < _WEAK
+                state = self._polished(sized) if rough else sized
                 continue
             if added is None:
                 break

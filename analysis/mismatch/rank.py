@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Container, Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from math import log
 
 import numpy as np
@@ -17,6 +18,7 @@ from analysis.mismatch.instance import (
     same_place,
 )
 from analysis.mismatch.memory import Memory, words
+from analysis.mismatch.model import side_by_side
 from analysis.mismatch.polish import Polished, needed, polish, stepped, with_effects
 from analysis.mismatch.segments import Path
 from analysis.mismatch.state import Setting, State
@@ -127,16 +129,14 @@ def ranked(
         if state.setting.jobs > 1 and len(starts) > 1:
             asked.ready(stepped(asked, *fit) for fit in fits)
     found: list[Fit] = []
-    given = state.setting.given
+    made = side_by_side(partial(_fitted, state), likely, state.setting.jobs)
+    at_hand = {id(start): polished for start, polished in zip(likely, made, strict=True)}
     for value, kind, proposal in tried:
         kinds_so_far = {one[0] for one in found}
         if value < best - far or (len(kinds_so_far) >= _MOST and kind not in kinds_so_far):
             continue
-        own = state.predictor(replicates_for(state.setting, [proposal.effect]))
-        rounds = 1 + len(proposal.free)
-        if state.setting.large:  # of a large recording steps are long and sure
-            rounds = min(rounds, _ROUNDS)
-        polished = polish(own, *together(state.camera, proposal, given), rounds=rounds)
+        known = id(proposal) in at_hand
+        polished = at_hand[id(proposal)] if known else _fitted(state, proposal)
         step()
         if polished is None or not CANDIDATES[kind].sane(state.setting.layout, polished.effects[0]):
             continue
@@ -147,6 +147,15 @@ def ranked(
     if best >= SURE_GAIN or state.setting.large:
         return fitted
     return _in_order(state, _once_more(state, found), shown)
+
+
+def _fitted(state: State, proposal: Proposal) -> Polished | None:
+    """Return an effect fitted beside the camera's; None: it is no camera."""
+    own = state.predictor(replicates_for(state.setting, [proposal.effect]))
+    rounds = 1 + len(proposal.free)
+    if state.setting.large:  # of a large recording steps are long and sure
+        rounds = min(rounds, _ROUNDS)
+    return polish(own, *together(state.camera, proposal, state.setting.given), rounds=rounds)
 
 
 def _in_order(state: State, found: Sequence[Fit], shown: Callable[[Effect], float]) -> list[Ranked]:

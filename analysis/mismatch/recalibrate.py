@@ -9,7 +9,7 @@ from math import inf, isfinite, nan, sqrt
 import numpy as np
 
 from analysis.mismatch.basefit import BaseFit, Offsets, colour, fit_base
-from analysis.mismatch.bending import bending_offsets, bends
+from analysis.mismatch.bending import bending_offsets, bends, bent_by
 from analysis.mismatch.layout import Layout, Place, sites
 from analysis.mismatch.model import Model, Sites
 from analysis.mismatch.observe import Level, Observation
@@ -48,6 +48,8 @@ class Calibrated:
         Exposures that were not fitted.
     bent
         What the camera's own effects add, of the offsets.
+    settled
+        Whether another round would change nothing.
     """
 
     model: Model
@@ -57,6 +59,7 @@ class Calibrated:
     switches: tuple[float, ...]
     left_out: frozenset[str]
     bent: Offsets
+    settled: bool = False
 
     @property
     def sums(self) -> frozenset[str]:
@@ -99,6 +102,7 @@ def calibrate(
     undone = _undone(layout, seen.levels, code_step(camera), spiky=spiky)
     bending = spiky or bends(camera.effect)
     effects = near.bent if near is not None and bending else Offsets()
+    known = near is not None and _bends_alike(near, camera, spiky=spiky)
 
     def fitted(
         offsets: Offsets, at: tuple[float, ...], levels: Mapping[Place, Level] = seen.levels
@@ -109,10 +113,11 @@ def calibrate(
 
     before: BaseFit | None = None
     change = nan
+    settled = False
     for _ in range(_ROUNDS if bending else 1):
         recorded = _sum(undone, effects)
         fit = fitted(recorded, switches)
-        settled = False
+        settled = known
         if before is not None:
             last, change = change, _change(before, fit, seen.levels)
             settled = change <= _SAME or _left(change, last) <= _SAME
@@ -129,7 +134,19 @@ def calibrate(
     if layout.scenes:
         model = with_pictures(model, layout, fit, effects, seed=seed + 1, jobs=jobs)
     offsets = _sum(_rounding(model, layout, fit, spiky=spiky), effects)
-    return Calibrated(model, fit, fitted(offsets, switches), offsets, switches, left_out, effects)
+    final = fitted(offsets, switches)
+    return Calibrated(model, fit, final, offsets, switches, left_out, effects, settled)
+
+
+def _bends_alike(near: Calibrated, camera: Camera, *, spiky: bool) -> bool:
+    """Return whether a model that has settled differs in no effect that bends, nor in a switch."""
+    own = near.model.camera
+    return (
+        near.settled
+        and spiky == bool(near.offsets.bulk_dn2)
+        and [s.upper_dn for s in own.noise.segment] == [s.upper_dn for s in camera.noise.segment]
+        and bent_by(own.effect, spiky=spiky) == bent_by(camera.effect, spiky=spiky)
+    )
 
 
 def _change(one: BaseFit, other: BaseFit, levels: Mapping[Place, Level]) -> float:

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from analysis.mismatch.jumptold import as_pixels_show
+from analysis.mismatch.jumptold import as_pixels_show, unlike_pixels
 from analysis.mismatch.phase import WholeFrames
 from analysis.mismatch.rank import Ranked
 
@@ -50,3 +50,36 @@ def test_what_numbers_tell_apart_is_not_asked() -> None:
     assert as_pixels_show(_frames(-1.0, 80.0), []) == []
     others = _ranked(impulse=5.0, rts=4.0)
     assert as_pixels_show(_frames(-1.0, 80.0), others) == others
+
+
+@pytest.mark.parametrize(
+    ("gain", "spread", "best", "why"),
+    [
+        (-1.0, 80.0, "rts", "differs"),
+        (15.0, -9.0, "read_noise_spread", "jump"),
+        (45.0, -9.0, "hot_pixels", "jump"),
+        (15.0, -9.0, "hot_pixels", None),  # jumps do not tell more than hot pixels explain
+        (-1.0, 80.0, "hot_pixels", None),
+        (15.0, -9.0, "rts", None),
+        (-1.0, 80.0, "read_noise_spread", None),
+        (15.0, 80.0, "rts", None),  # both are sure
+        (-1.0, 80.0, "impulse", None),
+    ],
+)
+def test_pixels_deny_what_stands_in_for_another(
+    gain: float, spread: float, best: str, why: str | None
+) -> None:
+    """Where the word for what they show is missing nothing else is named for it."""
+    (first,) = _ranked(**{best: 40.0})
+    bare: Any = Stub(effect=())
+    denial = unlike_pixels(bare, _frames(gain, spread), first, _ranked(impulse=3.0))
+    assert (denial is not None and denial.why.endswith(why)) if why else denial is None
+
+
+def test_pixels_deny_nothing_beside_the_other() -> None:
+    (rts, spread), frames = _ranked(rts=40.0, read_noise_spread=30.0), _frames(-1.0, 80.0)
+    bare: Any = Stub(effect=())
+    there: Any = Stub(effect=(Stub(kind="read_noise_spread"),))
+    assert unlike_pixels(bare, frames, rts, [spread]) is None  # it was fitted as well
+    assert unlike_pixels(there, frames, rts, []) is None
+    assert unlike_pixels(bare, None, rts, []) is None

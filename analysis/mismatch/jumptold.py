@@ -3,10 +3,16 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
+from analysis.mismatch.contradicted import Denial, rival
 from analysis.mismatch.phase import WholeFrames
 from analysis.mismatch.rank import LEAST_GAIN, SURE_GAIN, TOLD_APART, Ranked
+from dsis.camera import Camera
 
 _OTHER = {"read_noise_spread": "rts", "rts": "read_noise_spread"}
+_HOT = "hot_pixels"  # what jumps seldom stays where it is in few frames
+_RIVALS = {**_OTHER, _HOT: "rts"}
+PIXELS = frozenset(_RIVALS)
+_WORDS = {"read_noise_spread": "pixels whose read noise differs", "rts": "pixels that jump"}
 
 
 def as_pixels_show(frames: WholeFrames | None, fitted: Sequence[Ranked]) -> list[Ranked]:
@@ -35,3 +41,23 @@ def as_pixels_show(frames: WholeFrames | None, fitted: Sequence[Ranked]) -> list
         if one is not top
     ]
     return sorted([replace(top, gain=first.gain), *placed], key=lambda one: -one.gain)
+
+
+def unlike_pixels(
+    camera: Camera, frames: WholeFrames | None, best: Ranked, others: Sequence[Ranked]
+) -> Denial | None:
+    """Return how single pixels deny the best of ranked effects; None: they do not.
+
+    They do where they are sure of another, which was not fitted or has no word: of the other of
+    both, or, of hot pixels, that pixels jump, by more than those explain. Beside that other, which
+    the camera has, it is no rival.
+    """
+    other = _RIVALS.get(best.kind)
+    there = {own.kind for own in camera.effect} | {one.kind for one in others}
+    if frames is None or other is None or other in there:
+        return None
+    odds = frames.spread_rather(SURE_GAIN)
+    against = odds if other == "read_noise_spread" else -odds
+    if against <= (best.gain if best.kind == _HOT else TOLD_APART):
+        return None
+    return rival(against, f"frames of single pixels rather show {_WORDS[other]}")

@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 from analysis.mismatch.bank.edges import edge_shapes
 from analysis.mismatch.bank.seams import SMOOTH_DEGREE, beyond_smooth, seam_shapes
 from analysis.mismatch.contradicted import Denial
+from analysis.mismatch.displaced import displaced
 from analysis.mismatch.edged import STATISTIC, edged, single
 from analysis.mismatch.recalibrate import code_step
 from analysis.mismatch.rivalled import rivalled
@@ -47,6 +48,7 @@ def of_another(state: State, effect: Effect, without: Array) -> Denial | None:
         or uneven(state, effect)
         or coded(state, kind, without)
         or lopsided(state, kind)
+        or displaced(state, kind, without)
     )
 
 

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.candidates import CANDIDATES
-from analysis.mismatch.contradicted import contradicted
+from analysis.mismatch.contradicted import Denial, contradicted
+from analysis.mismatch.displaced import displaced
 from analysis.mismatch.edged import outlined
 from analysis.mismatch.feigned import of_another
 from analysis.mismatch.instance import LINES
@@ -105,9 +106,8 @@ class Judge:
         asked = [
             one
             for one in some
-            if one.proposal is not None and one.kind in CANDIDATES
             if one.kind not in LINES and not one.measured
-            if left or CANDIDATES[one.kind].hints or one.kind in _OF_TIME or not _called(one, first)
+            if left or one.kind in _OF_TIME or _hinted(one) or not _called(one, first)
         ]
         return self._worst(partial(self._left_open, first), asked)
 
@@ -138,17 +138,19 @@ class Judge:
     def _denial(self, predictor: Predictor, named: Named) -> Verdict | None:
         if named.measured:
             return None  # what correlates pixels besides may hide it in numbers, not in frames
+        if named.proposal is None:
+            return _verdict(displaced(self.state, named.kind, self.state.null.mean))
         without = self.without(named)
         denial = contradicted(self.state, predictor, named.kind, without)
-        if denial is None and named.proposal is not None:
+        if denial is None:
             denial = of_another(self.state, named.proposal.effect, predictor.mean(without))
-        return None if denial is None else (denial.share, denial.why)
+        return _verdict(denial)
 
     def _left_open(
         self, first: frozenset[str], predictor: Predictor, named: Named
     ) -> Verdict | None:
         if named.proposal is None:
-            return None
+            return _verdict(displaced(self.state, named.kind, self.state.null.mean))
         mean = predictor.mean(self.without(named))
         denial = of_another(self.state, named.proposal.effect, mean)
         denial = denial or mirrored(self.state, named.proposal.effect, mean)
@@ -156,7 +158,7 @@ class Judge:
         denial = denial or unmet(self.state, named.kind, mean, shown=shown)
         if denial is None and not (_called(named, first) or locates(self.state, mean)):
             return 1.0, NOTHING
-        return None if denial is None else (denial.share, denial.why)
+        return _verdict(denial)
 
     def _needless(self, predictor: Predictor, named: Named) -> Verdict | None:
         if named.proposal is None:
@@ -174,7 +176,19 @@ class Judge:
         return None
 
 
+def _verdict(denial: Denial | None) -> Verdict | None:
+    """Return a denial as a verdict."""
+    return None if denial is None else (denial.share, denial.why)
+
+
+def _hinted(named: Named) -> bool:
+    """Return whether more than what calls for an effect leads to it."""
+    return named.kind in CANDIDATES and bool(CANDIDATES[named.kind].hints)
+
+
 def _called(named: Named, first: frozenset[str]) -> bool:
     """Return whether any of some statistics calls for an effect, or hints at it."""
+    if named.kind not in CANDIDATES:
+        return True
     own = CANDIDATES[named.kind]
     return not first.isdisjoint({*own.calls, *own.hints})

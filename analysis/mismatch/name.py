@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from analysis.mismatch.candidates import CANDIDATES, measured
 from analysis.mismatch.contradicted import refuted
 from analysis.mismatch.credited import joined, kept_up
+from analysis.mismatch.displaced import displaced
 from analysis.mismatch.fitted import Fitted
 from analysis.mismatch.instance import LINES, Frequency, frequency_of, instance
 from analysis.mismatch.judge import INSTEAD, LITTLE, NEEDLESS, NOTHING, Judge
@@ -220,6 +221,7 @@ class Search(Fitted):
         left = self._left()
         off = {m.statistic for m in state.mismatches}
         path = second_path(state) if "dual_gain" in left and "pixel_variance" in off else None
+        path = None if path and displaced(state, path.kind, state.null.mean) else path
         silent = spiky(state)  # its variances say nothing yet, unless there is nothing else
         fitted = self._decided(state, None if silent else path)
         if (fitted and silent) or any(pair[1] is path for pair in self.ties):
@@ -269,8 +271,7 @@ class Search(Fitted):
         return min(TOLD_APART + log(rivals), self.least)
 
     def _left(self) -> frozenset[str]:
-        lines = sum(n.kind in LINES for n in self.named)
-        full = LINES if lines >= _MOST_LINES else frozenset()
+        full = LINES if sum(n.kind in LINES for n in self.named) >= _MOST_LINES else frozenset()
         return self.vocabulary - self._done() - full
 
     def _done(self) -> frozenset[str]:
@@ -315,8 +316,7 @@ class Search(Fitted):
 
         Amplifiers of the two halves say nothing of those of even and odd rows.
         """
-        rival = self.tied.get(best.kind)
-        named = {n.kind for n in self.named}
+        rival, named = self.tied.get(best.kind), {n.kind for n in self.named}
         return rival if rival is not None and rival.kind in named - LINES else None
 
     def _undoubted(self, state: State, fitted: list[Ranked]) -> list[Ranked]:
@@ -330,7 +330,7 @@ class Search(Fitted):
             predictor = state.predictor(replicates_for(self.setting, [best.proposal.effect]))
             denial = refuted(state, predictor, best.kind, best.polished)
             denial = denial or unlike_frames(state, self.lines, best, others)
-            if denial is None:
+            if (denial := denial or displaced(state, best.kind, state.null.mean)) is None:
                 break
             fitted = others
             if all(one.name != best.name for one in others):
@@ -371,7 +371,7 @@ class Search(Fitted):
         """
         state = self.asked[1] if self.asked and state is self.asked[0] else state
         needed: set[str] = set()
-        while any(n.proposal is not None for n in self.named):
+        while self.named:
             judge = self._judge(state)
             # Denied ones first: they may explain what is another's.
             worst = judge.denied(self.named, needed)

@@ -1,0 +1,209 @@
+"""What something unexplained makes as well: variances that bend, rows that differ.
+
+Each law is of the statistics alone, whatever makes them: physics without a word, too.
+"""
+
+from collections.abc import Callable, Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+from scipy.stats import norm
+
+from analysis.mismatch.candidates.response import skewness_below
+from analysis.mismatch.contradicted import Denial
+from analysis.mismatch.state import State
+
+Array = NDArray[np.float64]
+Place = tuple[str, str]
+_BENDS = frozenset({"nonlinearity", "dual_gain", "dual_gain_mismatch"})
+_PAIRS = {"correlation_0_1": 2, "correlation_1_0": 2, "correlation_1_1": 4}
+"""How many neighbours of a pixel a correlation is that of."""
+_LINES = {"row_fpn": "row", "row_prnu": "row", "column_fpn": "column", "column_prnu": "column"}
+_MOST = 0.5  # of a misfit, or of what white rows explain, that something else may make
+_FAR_OFF = 8.0  # standard deviations that no chance has
+_LEAST_LEVELS = 4  # two of which a line takes
+_LIMITS = (-1.5, 4.0)  # standard deviations at which noise may be cut
+
+
+def displaced(state: State, kind: str, without: Array) -> Denial | None:
+    """Return how an effect is denied by what is left and changes the same; None: it is not.
+
+    Of bends of the photon transfer curve, asked is whether variances lie on a line once they are
+    what they would be without: by covariances that neighbours have instead, or by what is cut off
+    of noise that leans. Where that leaves half of the misfit or less, there may be no bend.
+    `without` are the numbers predicted without the effect.
+    """
+    if kind in _BENDS:
+        return _of_neighbours(state) or _of_limits(state)
+    if kind in _LINES:
+        return _of_new_lines(state, _LINES[kind], without)
+    return _of_alike_rows(state) if kind == "row_noise" else None
+
+
+def _of_neighbours(state: State) -> Denial | None:
+    """Return how a bend is denied by pixels that share what they collect; None: it is not.
+
+    Charge that is shared is not lost: the variance of sums over pixels, v (1 + sum of correlations
+    with all neighbours), remains, whatever the law by which it is shared.
+    """
+    left = _left(state, _PAIRS)
+    if not left:
+        return None
+    factors: dict[Place, float] = {}
+    for (place, statistic), (rest, _) in left.items():
+        factors[place] = factors.get(place, 1.0) + _PAIRS[statistic] * rest
+    why = "neighbours are alike for another reason, and have as covariance what variances lack"
+    return _straightened(state, factors.get, why)
+
+
+def _of_limits(state: State) -> Denial | None:
+    """Return how a bend is denied by noise that is cut off on one side; None: it is not.
+
+    What a limit takes of the variance of normal noise is known from the skewness that it leaves.
+    """
+    cut = {
+        place: 1 / _variance_below(brentq(lambda z, g=rest: skewness_below(z) + abs(g), *_LIMITS))
+        for (place, _), (rest, sd) in _left(state, ("skewness",)).items()
+        if abs(rest) > _FAR_OFF * sd and -skewness_below(_LIMITS[1]) < abs(rest)
+        if abs(rest) < -skewness_below(_LIMITS[0])
+    }
+    why = "noise leans to one side for another reason, and what cuts it off lessens variances"
+    return _straightened(state, cut.get, why) if cut else None
+
+
+def _variance_below(limit: float) -> float:
+    """Return the variance of a standard normal variate that is cut at a limit."""
+    density, below = float(norm.pdf(limit)), float(norm.cdf(limit))
+    mean = -density + limit * (1 - below)
+    return below - limit * density + limit**2 * (1 - below) - mean**2
+
+
+def _left(state: State, statistics: Iterable[str]) -> dict[tuple[Place, str], tuple[float, float]]:
+    """Return what is left of statistics that differ for certain, and its standard deviation."""
+    certain = {m.statistic for m in state.mismatches}.intersection(statistics)
+    return {
+        ((key.exposure, key.channel), key.statistic): (float(rest), float(sd))
+        for key, rest, sd, known in zip(
+            state.vector.keys,
+            state.vector.values - state.null.mean,
+            state.null.sd,
+            state.null.known,
+            strict=True,
+        )
+        if known and key.statistic in certain and key.scope == "exposure"
+    }
+
+
+def _straightened(state: State, factor: Callable[[Place, float], float], why: str) -> Denial | None:
+    """Return how a bend is denied where variances times a factor lie on lines; None: they do not.
+
+    A line is that of a channel: variance against signal, weighted by how well variances are known.
+    """
+    before = after = 0.0
+    levels, signals = state.setting.seen.levels, state.calibrated.fit.signal_dn
+    uniform = {e.name for e in state.setting.layout.uniform}
+    for channel in state.setting.layout.channels:
+        places = [at for at in levels if at[0] in uniform and at[1] == channel and at in signals]
+        if len(places) < _LEAST_LEVELS:
+            continue
+        signal = np.array([signals[at] for at in places])
+        variance = np.array([levels[at].variance_dn2 for at in places])
+        weight = np.array([levels[at].dof / 2 for at in places])
+        factors = np.array([factor(at, 1.0) for at in places])
+        before += _misfit(signal, variance, weight)
+        after += _misfit(signal, variance * factors, weight)
+    if before <= 0 or after > _MOST * before:
+        return None
+    return Denial(after / before, why)
+
+
+def _misfit(signal: Array, variance: Array, weight: Array) -> float:
+    """Return chi-squared of variances about the line through them; `weight` of their logarithms."""
+    root = np.sqrt(weight) / variance
+    design = np.stack([np.ones_like(signal), signal], 1) * root[:, np.newaxis]
+    target = variance * root
+    found = design @ np.linalg.lstsq(design, target, rcond=None)[0]
+    return float(((target - found) ** 2).sum())
+
+
+def _of_new_lines(state: State, axis: str, without: Array) -> Denial | None:
+    """Return how fixed lines are denied by lines that differ anew in each frame; None: not.
+
+    Of n frames the mean keeps 1 / n of their variance. Ratios of lines' variances to those of
+    pixels, less one, are the same of frames and of their mean, but for the pixels' own pattern.
+    """
+    left = _left(state, (f"{axis}_variance",))
+    if not left:
+        return None
+    numbers: dict[tuple[Place, str], int] = {
+        ((key.exposure, key.channel), key.statistic): i
+        for i, key in enumerate(state.vector.keys)
+        if key.scope == "exposure" and state.null.known[i]
+    }
+    seen = fake = 0.0
+    for place, statistic in left:
+        new = numbers[place, statistic]
+        fixed = numbers.get((place, f"fixed_{axis}_variance"))
+        pattern = numbers.get((place, "fixed_pixel_variance"))
+        if fixed is None or pattern is None or not state.vector.values[pattern] > 0:
+            continue
+        values, expected = state.vector.values, state.null.mean
+        weight = 1 / float(state.null.sd[fixed]) ** 2
+        seen += weight * float(values[fixed] ** 3 - without[fixed] ** 3)
+        anew = float(values[new] ** 3 - expected[new] ** 3)
+        fake += weight * anew / float(values[pattern]) ** 3
+    if seen <= 0 or fake <= _MOST * seen:
+        return None
+    return Denial(1 - fake / seen, f"{axis}s that differ anew in each frame leave as much in means")
+
+
+def _of_alike_rows(state: State) -> Denial | None:
+    """Return how white noise of rows is denied by rows that are alike; None: it is not.
+
+    Correlations that fall as any mixture of exponentials are log-convex: at lag 0 they have r1^2 /
+    r2 at least, of lags 1 and 2. Where that is half of what is not noise of single pixels, there
+    may be no more.
+    """
+    if all(m.statistic != "row_correlation" for m in state.mismatches):
+        return None
+    lags: dict[str, dict[str, float]] = {}
+    for key, value, known in zip(
+        state.vector.keys, state.vector.values, state.null.known, strict=True
+    ):
+        if known and key.statistic == "row_correlation" and key.detail in ("lag 1", "lag 2"):
+            lags.setdefault(key.scope + key.channel, {})[key.detail] = float(value)
+    shares = [
+        one["lag 1"] ** 2 / one["lag 2"]
+        for one in lags.values()
+        if len(one) == 2 and 0 < one["lag 2"] < one["lag 1"]
+    ]
+    if not shares:
+        return None
+    alike, whole = min(max(shares), 1.0), _beyond_pixels(state)
+    if whole <= 0 or alike < _MOST * whole:
+        return None
+    return Denial(
+        max(1 - alike / whole, 0.0), "rows are alike for another reason, and differ by as much"
+    )
+
+
+def _beyond_pixels(state: State) -> float:
+    """Return which share of the variance of rows' means is not that of noise of single pixels.
+
+    Exposures are weighted as the correlations are: by the inverse variance of their pixels.
+    """
+    total = weights = 0.0
+    frames = {e.name: len(e.numbers) for e in state.setting.layout.uniform}
+    for key, value, known in zip(
+        state.vector.keys, state.vector.values, state.null.known, strict=True
+    ):
+        place = (key.exposure, key.channel)
+        if known and key.statistic == "row_variance" and place in state.setting.seen.levels:
+            weight = (frames.get(key.exposure, 1) - 1) / state.setting.seen.levels[
+                place
+            ].variance_dn2
+            total += weight * value**3
+            weights += weight
+    ratio = total / weights if weights else 1.0
+    return max(1 - 1 / ratio, 0.0) if ratio > 0 else 0.0

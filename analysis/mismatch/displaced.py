@@ -3,15 +3,16 @@
 Each law is of the statistics alone, whatever makes them: physics without a word, too.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
-from scipy.stats import norm
+from scipy.stats import chi2, norm
 
 from analysis.mismatch.candidates.response import skewness_below
 from analysis.mismatch.contradicted import Denial
+from analysis.mismatch.recalibrate import code_step
 from analysis.mismatch.state import State
 
 Array = NDArray[np.float64]
@@ -22,23 +23,46 @@ _PAIRS = {"correlation_0_1": 2, "correlation_1_0": 2, "correlation_1_1": 4}
 _LINES = {"row_fpn": "row", "row_prnu": "row", "column_fpn": "column", "column_prnu": "column"}
 _MOST = 0.5  # of a misfit, or of what white rows explain, that something else may make
 _FAR_OFF = 8.0  # standard deviations that no chance has
+_CHANCE = 1e-3  # that variances on a line misfit more
 _LEAST_LEVELS = 4  # two of which a line takes
 _LIMITS = (-1.5, 4.0)  # standard deviations at which noise may be cut
 
 
-def displaced(state: State, kind: str, without: Array) -> Denial | None:
+def displaced(state: State, kind: str, mean: Array, without: Array | None = None) -> Denial | None:
     """Return how an effect is denied by what is left and changes the same; None: it is not.
 
     Of bends of the photon transfer curve, asked is whether variances lie on a line once they are
     what they would be without: by covariances that neighbours have instead, or by what is cut off
-    of noise that leans. Where that leaves half of the misfit or less, there may be no bend.
-    `without` are the numbers predicted without the effect.
+    of noise that leans. Where that leaves half of the misfit or less, there may be no bend; nor
+    where variances scatter no more than codes that are not equally wide make them. Of a bend that
+    levels show nothing is asked.
+
+    Parameters
+    ----------
+    state
+        With the effect, or before it is taken in.
+    kind
+        The effect.
+    mean, without
+        The numbers predicted with it, and without it; None: those of the state.
     """
+    without = state.null.mean if without is None else without
     if kind in _BENDS:
-        return _of_neighbours(state) or _of_limits(state)
+        if _seen_in_levels(state, without, mean):
+            return None
+        return _of_neighbours(state) or _of_limits(state) or _of_codes(state)
     if kind in _LINES:
         return _of_new_lines(state, _LINES[kind], without)
     return _of_alike_rows(state) if kind == "row_noise" else None
+
+
+def _seen_in_levels(state: State, without: Array, mean: Array) -> bool:
+    """Return whether means of exposures are off without an effect, and half as far with it."""
+    levels = np.array([key.statistic == "level" for key in state.vector.keys]) & state.null.known
+    levels &= np.isfinite(without) & np.isfinite(mean)
+    values, sd = state.vector.values[levels], state.null.sd[levels]
+    before, after = np.abs(values - without[levels]), np.abs(values - mean[levels])
+    return bool(((before > _FAR_OFF * sd) & (after < _MOST * before)).any())
 
 
 def _of_neighbours(state: State) -> Denial | None:
@@ -72,6 +96,45 @@ def _of_limits(state: State) -> Denial | None:
     return _straightened(state, cut.get, why) if cut else None
 
 
+def _of_codes(state: State) -> Denial | None:
+    """Return how a bend is denied by codes that are not equally wide; None: it is not.
+
+    Codes whose widths scatter by d (of a code) bend the converter at random: by Stein's lemma the
+    variance of noise of s codes changes by 2 d sum(w phi) of itself, w of unit variance and phi
+    the noise's density at each code, whose standard deviation is d (sqrt(pi) s)^-1/2 sqrt(2).
+    """
+    found = {
+        place: max(rest * (2 * expected + rest), 0.0) ** 0.5
+        for place, (rest, expected) in _left_of_codes(state).items()
+    }
+    if not found:
+        return None
+    typical, step = float(np.median(list(found.values()))), code_step(state.camera)
+
+    def scatter(place: Place, variance_dn2: float) -> float:
+        return float(2 * found.get(place, typical) ** 2 * step / (np.pi * variance_dn2) ** 0.5)
+
+    misfit = free = 0.0
+    for signal, variance, weight, places in _curves(state):
+        extra = np.array([scatter(at, v) for at, v in zip(places, variance, strict=True)])
+        misfit += _misfit(signal, variance, 1 / (1 / weight + extra))
+        free += signal.size - 2
+    if free <= 0 or misfit > float(chi2.isf(_CHANCE, free)):
+        return None
+    return Denial(0.0, "codes are not equally wide, and scatter the variances by as much")
+
+
+def _left_of_codes(state: State) -> dict[Place, tuple[float, float]]:
+    """Return what is left of how unevenly codes are used, and what is expected, by place."""
+    expected = {
+        (key.exposure, key.channel): max(float(mean), 0.0)
+        for key, mean in zip(state.vector.keys, state.null.mean, strict=True)
+        if key.statistic == "code_imbalance" and key.scope == "exposure"
+    }
+    left = _left(state, ("code_imbalance",))
+    return {place: (rest, expected[place]) for (place, _), (rest, _) in left.items()}
+
+
 def _variance_below(limit: float) -> float:
     """Return the variance of a standard normal variate that is cut at a limit."""
     density, below = float(norm.pdf(limit)), float(norm.cdf(limit))
@@ -101,21 +164,28 @@ def _straightened(state: State, factor: Callable[[Place, float], float], why: st
     A line is that of a channel: variance against signal, weighted by how well variances are known.
     """
     before = after = 0.0
-    levels, signals = state.setting.seen.levels, state.calibrated.fit.signal_dn
-    uniform = {e.name for e in state.setting.layout.uniform}
-    for channel in state.setting.layout.channels:
-        places = [at for at in levels if at[0] in uniform and at[1] == channel and at in signals]
-        if len(places) < _LEAST_LEVELS:
-            continue
-        signal = np.array([signals[at] for at in places])
-        variance = np.array([levels[at].variance_dn2 for at in places])
-        weight = np.array([levels[at].dof / 2 for at in places])
+    for signal, variance, weight, places in _curves(state):
         factors = np.array([factor(at, 1.0) for at in places])
         before += _misfit(signal, variance, weight)
         after += _misfit(signal, variance * factors, weight)
     if before <= 0 or after > _MOST * before:
         return None
     return Denial(after / before, why)
+
+
+def _curves(state: State) -> Iterator[tuple[Array, Array, Array, list[Place]]]:
+    """Yield signals, variances, weights of their logarithms and places of each channel."""
+    levels, signals = state.setting.seen.levels, state.calibrated.fit.signal_dn
+    uniform = {e.name for e in state.setting.layout.uniform}
+    for channel in state.setting.layout.channels:
+        places = [at for at in levels if at[0] in uniform and at[1] == channel and at in signals]
+        if len(places) >= _LEAST_LEVELS:
+            yield (
+                np.array([signals[at] for at in places]),
+                np.array([levels[at].variance_dn2 for at in places]),
+                np.array([levels[at].dof / 2 for at in places]),
+                places,
+            )
 
 
 def _misfit(signal: Array, variance: Array, weight: Array) -> float:

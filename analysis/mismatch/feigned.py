@@ -48,7 +48,7 @@ def of_another(state: State, effect: Effect, without: Array) -> Denial | None:
         or uneven(state, effect)
         or coded(state, kind, without)
         or lopsided(state, kind)
-        or displaced(state, kind, without)
+        or displaced(state, kind, state.null.mean, without)
     )
 
 

@@ -221,7 +221,7 @@ class Search(Fitted):
         left = self._left()
         off = {m.statistic for m in state.mismatches}
         path = second_path(state) if "dual_gain" in left and "pixel_variance" in off else None
-        path = None if path and displaced(state, path.kind, state.null.mean) else path
+        path = None if path and displaced(state, path.kind, path.mean) else path
         silent = spiky(state)  # its variances say nothing yet, unless there is nothing else
         fitted = self._decided(state, None if silent else path)
         if (fitted and silent) or any(pair[1] is path for pair in self.ties):
@@ -330,7 +330,7 @@ class Search(Fitted):
             predictor = state.predictor(replicates_for(self.setting, [best.proposal.effect]))
             denial = refuted(state, predictor, best.kind, best.polished)
             denial = denial or unlike_frames(state, self.lines, best, others)
-            if (denial := denial or displaced(state, best.kind, state.null.mean)) is None:
+            if (denial := denial or displaced(state, best.kind, best.polished.mean)) is None:
                 break
             fitted = others
             if all(one.name != best.name for one in others):

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
+from analysis.mismatch.prove.cells import Cells
 from analysis.mismatch.prove.held import Codes, Held, HeldExposure
 from analysis.mismatch.prove.law import (
     Array,
@@ -33,12 +34,14 @@ from analysis.mismatch.prove.law import (
 )
 from analysis.mismatch.prove.learning import law_of
 from analysis.mismatch.prove.levels import frame_means, level_loglik
+from analysis.mismatch.prove.shape import Shape
 from analysis.mismatch.prove.sites import means_of_most, site_places, spread_over
 from analysis.mismatch.prove.virtual import Signals
 from analysis.mismatch.prove.whittle import bin_counts, whittle_gain
 from dsis.camera import Camera
 
 _GROSS = 1e-9  # chance of a gross error: any code alike
+_BLOCK = 256  # knots at a time: of a bright scene there are 1e5, among as many codes
 _FARTHEST = 1e-9  # probability: scores end at six standard deviations
 
 
@@ -156,14 +159,20 @@ def _norm(law: Law, name: str, centre: Array, sd: Array, held: Held) -> Array:
         shape, own = law.exposures[name].shapes[site], float(np.median(sd[place]))
         low, high = float(centre[place].min()), float(centre[place].max())
         knots = np.linspace(low, high, max(int((high - low) * 4 / min(own, 1.0)), 1) + 1)
-        edges = law.cells.upper_dn
-        first, last = np.searchsorted(edges, [low - 8 * own, high + 8 * own])
-        near = slice(first, last + 1)
-        chance = shape.below((edges[near] - knots[:, np.newaxis]) / own)
-        mass = np.diff(chance, prepend=0.0)
-        sums = mass @ law.cells.weight[near] + 1 - chance[:, -1]
-        made[place] = np.interp(centre[place], knots, sums)
+        parts = np.array_split(knots, -(-knots.size // _BLOCK))
+        sums = [_sums(law.cells, shape, some, own) for some in parts]
+        made[place] = np.interp(centre[place], knots, np.concatenate(sums))
     return made
+
+
+def _sums(cells: Cells, shape: Shape, knots: Array, sd: float) -> Array:
+    """Return the same at means `knots`, in order: codes farther off than 8 sd have no chance."""
+    edges = cells.upper_dn
+    first, last = np.searchsorted(edges, [knots[0] - 8 * sd, knots[-1] + 8 * sd])
+    near = slice(first, last + 1)
+    chance = shape.below((edges[near] - knots[:, np.newaxis]) / sd)
+    mass = np.diff(chance, prepend=0.0)
+    return np.asarray(mass @ cells.weight[near] + 1 - chance[:, -1])
 
 
 def total_pixels(held: Held) -> int:

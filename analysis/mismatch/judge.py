@@ -18,7 +18,7 @@ from analysis.mismatch.predict import Predictor
 from analysis.mismatch.rank import LEAST_GAIN
 from analysis.mismatch.resolved import locates, resolved
 from analysis.mismatch.state import State
-from analysis.mismatch.unmet import mirrored, unmet
+from analysis.mismatch.unmet import alike, mirrored, unmet
 from dsis.camera import Camera
 
 Array = NDArray[np.float64]
@@ -154,6 +154,7 @@ class Judge:
         mean = predictor.mean(self.without(named))
         denial = of_another(self.state, named.proposal.effect, mean)
         denial = denial or mirrored(self.state, named.proposal.effect, mean)
+        denial = denial or alike(self.state, named.proposal.effect, mean)
         shown = outlined(self.state, named.proposal.effect)
         denial = denial or unmet(self.state, named.kind, mean, shown=shown)
         if denial is None and not (_called(named, first) or locates(self.state, mean)):

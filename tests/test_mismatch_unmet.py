@@ -10,7 +10,7 @@ from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.judge import Judge
 from analysis.mismatch.named import Named
 from analysis.mismatch.state import State
-from analysis.mismatch.unmet import mirrored, unmet
+from analysis.mismatch.unmet import alike, mirrored, unmet
 from dsis.effects import Effect, registry
 from mismatch_recordings import camera, recorded, state_of
 
@@ -59,6 +59,38 @@ def test_memory_along_rows_is_denied_by_as_much_along_columns(columns: float, de
     said = mirrored(state, MEMORY, state.predictor(8).mean(without))
     assert (said is not None) == denied
     assert said is None or "the next pixel of the column" in said.why
+
+
+@pytest.mark.parametrize(
+    ("together", "denied"), [(0.0, False), (0.15, False), (0.8, True), (1.5, True)]
+)
+def test_memory_of_one_lag_is_denied_where_a_line_has_as_much_in_common(
+    together: float, denied: bool
+) -> None:
+    """An offset that a row has anew in each frame makes its samples alike at all distances."""
+    lag = 7
+    memory = registry()["readout_memory"](fraction=SHARE, lag_pixels=lag, along="rows")
+    recording = recorded(camera(), 5, levels=LEVELS)
+    assert recording.stacks is not None
+    rng = np.random.default_rng(9)
+    for name, frames in recording.stacks.items():
+        level = frames.mean()
+        white = rng.normal(0, (0.5 * (level - 64) + 20) ** 0.5, frames.shape)
+        rows = rng.normal(0, (together * SHARE) ** 0.5 * white.std(), (*frames.shape[:2], 1))
+        noise = white + rows + SHARE * np.roll(white, lag, 2)
+        recording.stacks[name] = np.rint(level + noise).astype(np.uint16)
+    state = state_of(recording, camera(memory))
+    without = state.camera.model_copy(update={"effect": ()})
+    said = alike(state, memory, state.predictor(8).mean(without))
+    assert (said is not None) == denied
+    assert said is None or "at other distances" in said.why
+
+
+def test_what_has_no_lag_is_not_asked_of_lags() -> None:
+    effect = registry()["row_noise"](sigma_dn=1.0)
+    state = _state(effect)
+    without = state.camera.model_copy(update={"effect": ()})
+    assert alike(state, effect, state.predictor(8).mean(without)) is None
 
 
 @pytest.mark.parametrize("columns", [0.0, 0.2 * SHARE])

@@ -13,6 +13,7 @@ from scipy.stats import chi2, norm
 from analysis.mismatch.candidates.response import skewness_below
 from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.recalibrate import code_step
+from analysis.mismatch.sharing import shared_otherwise
 from analysis.mismatch.state import State
 
 Array = NDArray[np.float64]
@@ -35,7 +36,7 @@ def displaced(state: State, kind: str, mean: Array, without: Array | None = None
     what they would be without: by covariances that neighbours have instead, or by what is cut off
     of noise that leans. Where that leaves half of the misfit or less, there may be no bend; nor
     where variances scatter no more than codes that are not equally wide make them. Of a bend that
-    levels show nothing is asked.
+    levels show nothing is asked. Of filters and crosstalk, how alike neighbours are at each level.
 
     Parameters
     ----------
@@ -53,7 +54,9 @@ def displaced(state: State, kind: str, mean: Array, without: Array | None = None
         return _of_neighbours(state) or _of_limits(state) or _of_codes(state)
     if kind in _LINES:
         return _of_new_lines(state, _LINES[kind], without)
-    return _of_alike_rows(state) if kind == "row_noise" else None
+    if kind == "row_noise":
+        return _of_alike_rows(state)
+    return shared_otherwise(state, kind, without)
 
 
 def _seen_in_levels(state: State, without: Array, mean: Array) -> bool:

@@ -32,6 +32,8 @@ REFERENCE = "real-reference"
 def concealed(options: argparse.Namespace) -> dict[str, dict[str, Any]]:
     """Write all recordings and the key; print its hash; return it."""
     deals = deal(options.seed, options.cases, options.only)
+    if options.no_word:
+        deals = [d for d in deals if d.out is not None]
     ccd = options.ccd / "EMVA1288_Data.txt" if options.ccd.is_dir() else options.ccd
     if not ccd.exists():
         print(f"no real recording at {ccd}: those cases are simulated")
@@ -82,6 +84,9 @@ def main() -> None:
     parser.add_argument("--cases", type=int, default=200)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--only", choices=sorted(KINDS), help="this effect alone")
+    parser.add_argument(
+        "--no-word", action="store_true", help="of these only cases with an effect without a word"
+    )
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--work", type=Path)
     parser.add_argument("--ccd", type=Path, default=CCD)
@@ -89,6 +94,7 @@ def main() -> None:
     options = parser.parse_args()
     if options.work is None:
         drawn = f"{options.seed}-{options.cases}" + (f"-{options.only}" if options.only else "")
+        drawn += "-no-word" if options.no_word else ""
         options.work = Path(gettempdir()) / f"dsis-concealed-{drawn}"
     options.work.mkdir(parents=True, exist_ok=True)
     key = concealed(options)

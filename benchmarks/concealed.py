@@ -110,7 +110,7 @@ def main() -> None:
     }
     if any(entry["real"] for entry in key.values()):
         folder = str(options.work / REFERENCE)
-        tasks[REFERENCE] = {**tasks["case-000"], "folder": folder, "vocabulary": None}
+        tasks[REFERENCE] = {**tasks[min(tasks)], "folder": folder, "vocabulary": None}
     found = work_through(options.work / "found.jsonl", tasks, examined, options.jobs)
     cases = opened_key(key, found)
     lines = (json.dumps(case, sort_keys=True) + "\n" for case in cases)

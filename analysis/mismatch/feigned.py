@@ -1,11 +1,14 @@
 """Patterns and pixels that something else feigns: alike frames, halves, dark current."""
 
+from math import log
+
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.mismatch.bank.carryover import PLACES, sawteeth
 from analysis.mismatch.bank.edges import edge_shapes
 from analysis.mismatch.bank.seams import SMOOTH_DEGREE, beyond_smooth, seam_shapes
-from analysis.mismatch.contradicted import Denial
+from analysis.mismatch.contradicted import Denial, rival
 from analysis.mismatch.displaced import displaced
 from analysis.mismatch.edged import STATISTIC, edged, single
 from analysis.mismatch.recalibrate import code_step
@@ -14,6 +17,7 @@ from analysis.mismatch.state import State
 from analysis.mismatch.uneven import uneven
 from dsis.effects import Effect
 from dsis.effects.black_level_drift import BlackLevelDrift
+from dsis.effects.readout_memory import ReadoutMemory
 from dsis.measures.spikes import variance_of_quartiles
 
 Array = NDArray[np.float64]
@@ -48,6 +52,7 @@ def of_another(state: State, effect: Effect, without: Array) -> Denial | None:
         or uneven(state, effect)
         or coded(state, kind, without)
         or lopsided(state, kind)
+        or carried(state, effect)
         or displaced(state, kind, state.null.mean, without)
     )
 
@@ -245,6 +250,30 @@ def lopsided(state: State, kind: str) -> Denial | None:
         if leans
         else None
     )
+
+
+def carried(state: State, effect: Effect) -> Denial | None:
+    """Return how memory of the sample before is denied by what follows its code; None: it is not.
+
+    The residue of a converter makes neighbours alike, too, as its steps lie in the noise. Where
+    what samples have from the code before is left unexplained, and the best of all residues
+    explains as much as memory in proportion, whatever their sizes, at odds that allow for all
+    that were looked at, there may be no such memory.
+    """
+    called = {m.statistic for m in state.mismatches}
+    if not (
+        isinstance(effect, ReadoutMemory) and effect.lag_pixels == 1 and "carry_over" in called
+    ):
+        return None
+    samples = state.setting.seen.carried.get(effect.along, ())
+    square = sum(own.square_dn2 / own.variance_dn2 for own in samples)
+    if square <= 0:
+        return None
+    through = sum(own.follows * own.square_dn2 / own.variance_dn2 for own in samples)
+    tried = sawteeth(samples, whole=True)
+    best = max(one.chi2 for one in tried)
+    behind = (best - through**2 / square) / 2 - log(PLACES * len(tried))
+    return rival(behind, "samples follow the codes before them, which explains it as well")
 
 
 def outlying(state: State, kind: str) -> Denial | None:

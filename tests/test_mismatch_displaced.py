@@ -66,12 +66,20 @@ def _state(
         means.append((expected or {}).get((statistic, place), 0.0))
     at = {(name, "MONO"): SIGNALS[name] for name in variances}
     levels = {
-        (name, "MONO"): SimpleNamespace(variance_dn2=v, dof=DOF) for name, v in variances.items()
+        (name, "MONO"): SimpleNamespace(variance_dn2=v, dof=DOF, clipped_low=0.0, clipped_high=0.0)
+        for name, v in variances.items()
     }
     uniform = [SimpleNamespace(name=name, numbers=tuple(range(FRAMES))) for name in variances]
     segment = SimpleNamespace(bits=12)
+    clues = SimpleNamespace(
+        signal=lambda place: at[place],
+        shot_share=lambda place: max(1 - READ / levels[place].variance_dn2, 0.0),
+        seen=SimpleNamespace(levels=levels),
+        camera=SimpleNamespace(effect=(), noise=segment),
+    )
     return SimpleNamespace(
         camera=SimpleNamespace(effect=(), noise=segment),
+        clues=lambda: clues,
         calibrated=SimpleNamespace(fit=SimpleNamespace(signal_dn=at)),
         setting=SimpleNamespace(
             seen=SimpleNamespace(levels=levels),
@@ -122,8 +130,21 @@ def test_neighbours_that_are_explained_deny_nothing() -> None:
     made = {name: _shared(f, 1e-5 * SIGNALS[name]) for name, f in _frames(1).items()}
     variances = {name: float(f.var()) for name, f in made.items()}
     values = {(s, name): r for name, f in made.items() for s, r in _correlations(f).items()}
-    state = _state(variances, values, left=())
+    state = _state(variances, values, left=(), expected=values)
     assert displaced(state, "nonlinearity", _none(state)) is None
+
+
+@pytest.mark.parametrize("kind", BENDS)
+def test_a_law_that_no_correlation_shows_by_itself_denies_a_bend(kind: str) -> None:
+    """Charge that is shared as it grows, and the share that is the same at all levels."""
+    for share, denied in ((1e-5, True), (0.0, False)):
+        made = {name: _shared(f, share * SIGNALS[name]) for name, f in _frames(1).items()}
+        variances = {name: float(f.var()) for name, f in made.items()}
+        if not denied:  # as much less, with no covariance
+            variances = {name: v * (1 - 2e-5 * SIGNALS[name]) for name, v in variances.items()}
+        values = {(s, name): r for name, f in made.items() for s, r in _correlations(f).items()}
+        state = _state(variances, values, left=())
+        assert (displaced(state, kind, _none(state)) is not None) == denied
 
 
 @pytest.mark.parametrize("limit", [0.2, 1.0, 2.0])

@@ -3,7 +3,7 @@
 Each law is of the statistics alone, whatever makes them: physics without a word, too.
 """
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,12 +12,13 @@ from scipy.stats import chi2, norm
 
 from analysis.mismatch.candidates.response import skewness_below
 from analysis.mismatch.contradicted import Denial
+from analysis.mismatch.layout import Place
 from analysis.mismatch.recalibrate import code_step
-from analysis.mismatch.sharing import shared_otherwise
+from analysis.mismatch.sharing import of_charge, shared_otherwise
 from analysis.mismatch.state import State
+from analysis.mismatch.straight import curves, misfit, misfits
 
 Array = NDArray[np.float64]
-Place = tuple[str, str]
 _BENDS = frozenset({"nonlinearity", "dual_gain", "dual_gain_mismatch"})
 _PAIRS = {"correlation_0_1": 2, "correlation_1_0": 2, "correlation_1_1": 4}
 """How many neighbours of a pixel a correlation is that of."""
@@ -25,7 +26,6 @@ _LINES = {"row_fpn": "row", "row_prnu": "row", "column_fpn": "column", "column_p
 _MOST = 0.5  # of a misfit, or of what white rows explain, that something else may make
 _FAR_OFF = 8.0  # standard deviations that no chance has
 _CHANCE = 1e-3  # that variances on a line misfit more
-_LEAST_LEVELS = 4  # two of which a line takes
 _LIMITS = (-1.5, 4.0)  # standard deviations at which noise may be cut
 
 
@@ -76,12 +76,23 @@ def _of_neighbours(state: State) -> Denial | None:
     """
     left = _left(state, _PAIRS)
     if not left:
-        return None
+        return _of_charge(state)
     factors: dict[Place, float] = {}
     for (place, statistic), (rest, _) in left.items():
         factors[place] = factors.get(place, 1.0) + _PAIRS[statistic] * rest
     why = "neighbours are alike for another reason, and have as covariance what variances lack"
     return _straightened(state, factors.get, why)
+
+
+def _of_charge(state: State) -> Denial | None:
+    """Return how a bend is denied by pixels that share the more the brighter; None: it is not.
+
+    Of correlations that are not certain one by one, or that crosstalk of the camera explains as
+    well: by the law that they follow, see `sharing`.
+    """
+    shared = of_charge(state)
+    why = "neighbours are alike the more the brighter, and have as covariance what variances lack"
+    return _straightened(state, shared, why) if shared is not None else None
 
 
 def _of_limits(state: State) -> Denial | None:
@@ -117,14 +128,22 @@ def _of_codes(state: State) -> Denial | None:
     def scatter(place: Place, variance_dn2: float) -> float:
         return float(2 * found.get(place, typical) ** 2 * step / (np.pi * variance_dn2) ** 0.5)
 
-    misfit = free = 0.0
-    for signal, variance, weight, places in _curves(state):
+    apart = free = 0.0
+    for signal, variance, weight, places in curves(state):
         extra = np.array([scatter(at, v) for at, v in zip(places, variance, strict=True)])
-        misfit += _misfit(signal, variance, 1 / (1 / weight + extra))
+        apart += misfit(signal, variance, 1 / (1 / weight + extra))
         free += signal.size - 2
-    if free <= 0 or misfit > float(chi2.isf(_CHANCE, free)):
+    if free <= 0 or apart > float(chi2.isf(_CHANCE, free)):
         return None
     return Denial(0.0, "codes are not equally wide, and scatter the variances by as much")
+
+
+def _straightened(state: State, factor: Callable[[Place, float], float], why: str) -> Denial | None:
+    """Return how a bend is denied where variances times a factor lie on lines; None: not."""
+    before, after = misfits(state, factor)
+    if before <= 0 or after > _MOST * before:
+        return None
+    return Denial(after / before, why)
 
 
 def _left_of_codes(state: State) -> dict[Place, tuple[float, float]]:
@@ -159,45 +178,6 @@ def _left(state: State, statistics: Iterable[str]) -> dict[tuple[Place, str], tu
         )
         if known and key.statistic in certain and key.scope == "exposure"
     }
-
-
-def _straightened(state: State, factor: Callable[[Place, float], float], why: str) -> Denial | None:
-    """Return how a bend is denied where variances times a factor lie on lines; None: they do not.
-
-    A line is that of a channel: variance against signal, weighted by how well variances are known.
-    """
-    before = after = 0.0
-    for signal, variance, weight, places in _curves(state):
-        factors = np.array([factor(at, 1.0) for at in places])
-        before += _misfit(signal, variance, weight)
-        after += _misfit(signal, variance * factors, weight)
-    if before <= 0 or after > _MOST * before:
-        return None
-    return Denial(after / before, why)
-
-
-def _curves(state: State) -> Iterator[tuple[Array, Array, Array, list[Place]]]:
-    """Yield signals, variances, weights of their logarithms and places of each channel."""
-    levels, signals = state.setting.seen.levels, state.calibrated.fit.signal_dn
-    uniform = {e.name for e in state.setting.layout.uniform}
-    for channel in state.setting.layout.channels:
-        places = [at for at in levels if at[0] in uniform and at[1] == channel and at in signals]
-        if len(places) >= _LEAST_LEVELS:
-            yield (
-                np.array([signals[at] for at in places]),
-                np.array([levels[at].variance_dn2 for at in places]),
-                np.array([levels[at].dof / 2 for at in places]),
-                places,
-            )
-
-
-def _misfit(signal: Array, variance: Array, weight: Array) -> float:
-    """Return chi-squared of variances about the line through them; `weight` of their logarithms."""
-    root = np.sqrt(weight) / variance
-    design = np.stack([np.ones_like(signal), signal], 1) * root[:, np.newaxis]
-    target = variance * root
-    found = design @ np.linalg.lstsq(design, target, rcond=None)[0]
-    return float(((target - found) ** 2).sum())
 
 
 def _of_new_lines(state: State, axis: str, without: Array) -> Denial | None:

@@ -1,6 +1,6 @@
 """By which law neighbours are alike: filters smooth all noise, crosstalk that of light alone."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from enum import StrEnum
 
 import numpy as np
@@ -12,9 +12,12 @@ from analysis.mismatch.layout import Place
 from analysis.mismatch.rank import TOLD_APART
 from analysis.mismatch.recalibrate import code_step
 from analysis.mismatch.state import State
+from analysis.mismatch.straight import misfits
 
 Array = NDArray[np.float64]
-_PAIRS = frozenset({"correlation_0_1", "correlation_1_0", "correlation_0_2", "correlation_2_0"})
+Left = dict[tuple[str, str], list[tuple[Place, float, float]]]
+_BESIDE = frozenset({"correlation_0_1", "correlation_1_0"})
+_PAIRS = _BESIDE | {"correlation_0_2", "correlation_2_0"}
 _ROUNDING = 1 / 12  # of a step between codes, squared: noise that comes after any filter
 _CLIPPED = 1e-3  # share of samples at an end of the converter, from which variances are not noise's
 
@@ -37,17 +40,42 @@ def shared_otherwise(state: State, kind: str, without: Array) -> Denial | None:
     """Return how a filter or crosstalk is denied by the law of what is shared; None: it is not.
 
     Where another law is likelier at odds of 20, whatever follows it, word or none, is there
-    instead. `without` are the numbers predicted without the effect.
+    instead. What charge takes from variances counts where these are left unexplained. `without`
+    are the numbers predicted without the effect.
     """
     own = _LAWS.get(kind)
     if own is None:
         return None
-    found = evidences(state, without)
+    left = _left(state, without, _PAIRS)
+    found = _gains(state.clues(), left)
+    if any(m.statistic == "pixel_variance" for m in state.mismatches):
+        before, after = misfits(state, _factor(state.clues(), left))
+        found[Law.CHARGE] += max(before - after, 0.0) / 2
     best = max(found, key=lambda law: found[law])
     behind = found[best] - found[own]
     if behind <= TOLD_APART:
         return None
     return rival(behind, f"neighbours share {best.value}, by how alike they are at each level")
+
+
+def of_charge(state: State) -> Callable[[Place, float], float] | None:
+    """Return by what variances lack what neighbours share as charge does; None: they do not.
+
+    The factor of a place, or a default: what restores its variance. The camera's own crosstalk or
+    filter is taken for what it is put in for: charge may be shared by another law, as long as that
+    is not less likely, at odds of 20, than any other.
+    """
+    camera = state.camera
+    others = tuple(own for own in camera.effect if own.kind not in _LAWS)
+    without = state.null.mean
+    if len(others) < len(camera.effect):
+        without = state.predictor().mean(camera.model_copy(update={"effect": others}))
+    left = _left(state, without, _BESIDE)
+    found = _gains(state.clues(), left)
+    charge = found[Law.CHARGE]
+    if charge <= TOLD_APART or charge < max(found.values()) - TOLD_APART:
+        return None
+    return _factor(state.clues(), left)
 
 
 def evidences(state: State, without: Array) -> dict[Law, float]:
@@ -65,21 +93,51 @@ def evidences(state: State, without: Array) -> dict[Law, float]:
     without
         The numbers predicted without it.
     """
-    clues = state.clues()
-    shapes: dict[Law, Callable[[Place], float]] = {
+    return _gains(state.clues(), _left(state, without, _PAIRS))
+
+
+def _gains(clues: Clues, left: Left) -> dict[Law, float]:
+    shapes = _shapes(clues)
+    return {
+        law: sum(_fitted(own, shape)[1] for own in left.values()) for law, shape in shapes.items()
+    }
+
+
+def _shapes(clues: Clues) -> dict[Law, Callable[[Place], float]]:
+    """Return how large correlations are by each law, but for a factor."""
+    return {
         Law.ALL: lambda place: _unrounded(clues, place),
         Law.LIGHT: clues.shot_share,
         Law.CHARGE: lambda place: clues.signal(place) * clues.shot_share(place),
     }
-    rows = _left(state, without)
-    gains = dict.fromkeys(shapes, 0.0)
-    for one in rows.values():
-        values = np.array([value / sd for _, value, sd in one])
-        for law, shape in shapes.items():
-            own = np.array([shape(place) / sd for place, _, sd in one])
-            square = float(own @ own)
-            gains[law] += float(own @ values) ** 2 / (2 * square) if square > 0 else 0.0
-    return gains
+
+
+def _fitted(
+    seen: Sequence[tuple[Place, float, float]], shape: Callable[[Place], float]
+) -> tuple[float, float]:
+    """Return the factor of a shape, by least squares, and the log-likelihood it gains."""
+    values = np.array([value / sd for _, value, sd in seen])
+    own = np.array([shape(place) / sd for place, _, sd in seen])
+    square, through = float(own @ own), float(own @ values)
+    return (through / square, through**2 / (2 * square)) if square > 0 else (0.0, 0.0)
+
+
+def _factor(clues: Clues, left: Left) -> Callable[[Place, float], float]:
+    """Return what restores variances of places whose neighbours share charge.
+
+    Each place by the correlations of its channel with the next pixels along rows and columns, as
+    the law has them.
+    """
+    shape = _shapes(clues)[Law.CHARGE]
+    sizes: dict[str, float] = {}
+    for (statistic, channel), own in left.items():
+        if statistic in _BESIDE:
+            sizes[channel] = sizes.get(channel, 0.0) + 2 * _fitted(own, shape)[0]
+
+    def factor(place: Place, default: float) -> float:
+        return default + sizes.get(place[1], 0.0) * shape(place)
+
+    return factor
 
 
 def _unrounded(clues: Clues, place: Place) -> float:
@@ -88,16 +146,16 @@ def _unrounded(clues: Clues, place: Place) -> float:
     return max(1 - _ROUNDING * code_step(clues.camera) ** 2 / total, 0.0)
 
 
-def _left(state: State, without: Array) -> dict[tuple[str, str], list[tuple[Place, float, float]]]:
+def _left(state: State, without: Array, statistics: frozenset[str]) -> Left:
     """Return place, value and its error of each correlation and channel: what an effect is to make.
 
     Not where the converter cuts noise off.
     """
     levels, uniform = state.setting.seen.levels, {e.name for e in state.setting.layout.uniform}
-    found: dict[tuple[str, str], list[tuple[Place, float, float]]] = {}
+    found: Left = {}
     for i, key in enumerate(state.vector.keys):
         place = (key.exposure, key.channel)
-        if key.statistic not in _PAIRS or key.scope != "exposure" or place not in levels:
+        if key.statistic not in statistics or key.scope != "exposure" or place not in levels:
             continue
         known = state.null.known[i] and np.isfinite(without[i]) and place[0] in uniform
         clipped = max(levels[place].clipped_low, levels[place].clipped_high) > _CLIPPED

@@ -1,0 +1,50 @@
+"""Whether variances lie on a line against signal: a photon transfer curve without a bend."""
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.mismatch.layout import Place
+from analysis.mismatch.state import State
+
+Array = NDArray[np.float64]
+_LEAST_LEVELS = 4  # two of which a line takes
+
+
+def misfits(state: State, factor: Callable[[Place, float], float]) -> tuple[float, float]:
+    """Return chi-squared of variances about lines, as they are and times a factor.
+
+    A line is that of a channel: variance against signal, weighted by how well variances are known.
+    `factor` gives that of a place, or the default it is handed.
+    """
+    before = after = 0.0
+    for signal, variance, weight, places in curves(state):
+        factors = np.array([factor(at, 1.0) for at in places])
+        before += misfit(signal, variance, weight)
+        after += misfit(signal, variance * factors, weight)
+    return before, after
+
+
+def curves(state: State) -> Iterator[tuple[Array, Array, Array, list[Place]]]:
+    """Yield signals, variances, weights of their logarithms and places of each channel."""
+    levels, signals = state.setting.seen.levels, state.calibrated.fit.signal_dn
+    uniform = {e.name for e in state.setting.layout.uniform}
+    for channel in state.setting.layout.channels:
+        places = [at for at in levels if at[0] in uniform and at[1] == channel and at in signals]
+        if len(places) >= _LEAST_LEVELS:
+            yield (
+                np.array([signals[at] for at in places]),
+                np.array([levels[at].variance_dn2 for at in places]),
+                np.array([levels[at].dof / 2 for at in places]),
+                places,
+            )
+
+
+def misfit(signal: Array, variance: Array, weight: Array) -> float:
+    """Return chi-squared of variances about the line through them; `weight` of their logarithms."""
+    root = np.sqrt(weight) / variance
+    design = np.stack([np.ones_like(signal), signal], 1) * root[:, np.newaxis]
+    target = variance * root
+    found = design @ np.linalg.lstsq(design, target, rcond=None)[0]
+    return float(((target - found) ** 2).sum())

@@ -3,13 +3,13 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
-from analysis.mismatch.candidates import Proposal
+from analysis.mismatch.candidates import CANDIDATES, Proposal
 from analysis.mismatch.credited import given_back
 from analysis.mismatch.named import Named, camera_without, renewed
 from analysis.mismatch.own import Own, called, explained, refitted, resized, sizes, without_own
 from analysis.mismatch.polish import polish, with_effects
 from analysis.mismatch.predict import Predictor
-from analysis.mismatch.rank import Ranked, replicates_for
+from analysis.mismatch.rank import LEAST_GAIN, Ranked, replicates_for
 from analysis.mismatch.segments import Path
 from analysis.mismatch.state import Setting, State
 from analysis.mismatch.uncertainty import settled
@@ -17,6 +17,9 @@ from dsis.camera import Camera
 from dsis.effects import Effect
 
 Step = Callable[[], None]
+WEAK = 30.0  # gain below which an effect may be what others, fitted one by one, left over
+_FAR_OFF = 8.0  # standard deviations that no chance has
+_POLISHES = 3  # of what is strong
 
 
 @dataclass
@@ -124,6 +127,15 @@ class Fitted:
             return camera  # levels and variances know nothing of it
         return self.setting.calibrated(camera, state.calibrated).model.camera
 
+    def _feigned(self, state: State, gain: float) -> bool:
+        """Return whether an effect of some gain may be what others, fitted one by one, left over.
+
+        Of a large recording, only if it is weak: there to fit all together takes long.
+        """
+        if not self.rough or self.setting.large:
+            return self.rough and gain < WEAK
+        return gain < WEAK or self._depart(state, _FAR_OFF)
+
     def _own(self, named: Named) -> Own | None:
         """Return the camera's own effect that one named is like, as large as both; None: none."""
         effect = None if named.proposal is None else named.proposal.effect
@@ -174,23 +186,45 @@ class Fitted:
         return replace(state, mismatches=whole.mismatches)
 
     def _polished(self, state: State) -> State:
-        """Fit the parameters of all effects together, and judge the result once more."""
+        """Fit the parameters of all effects together, and judge the result once more.
+
+        What is strong is far off by a small share of it: as long as that much is gained, and what
+        calls for an effect still departs, once more, about the parameters found.
+        """
         self.rough = False
-        bare, mine = self._parts(state)
-        if not mine or state is self.polished:
+        if state is self.polished:
             return state
+        for _ in range(1 if self.setting.large else _POLISHES):
+            state, gain = self._polished_once(state)
+            if gain < LEAST_GAIN or not self._depart(state):
+                break
+        self.polished = state
+        return state
+
+    def _polished_once(self, state: State) -> tuple[State, float]:
+        """Return the state with parameters fitted about the present ones, and what that gained."""
+        bare, mine = self._parts(state)
+        if not mine:
+            return state, 0.0
         sparse = replicates_for(self.setting, [p.effect for p in mine])
         predictor = state.predictor(max(self.setting.polishing, sparse))
         # Of a large recording each simulation tells much and costs much: `settle` steps once more.
         rounds = 1 if self.setting.large else 2
         polished = polish(predictor, bare, mine, rounds, self._slopes(state))
-        self.polished = state
-        if polished is None:
-            return state
-        camera = self._fitted(bare, polished.effects, polished.errors)
-        if camera is not None:
-            self.polished = State.of(self.setting, camera, self.step, near=state)
-        return self.polished
+        camera = None if polished is None else self._fitted(bare, polished.effects, polished.errors)
+        if polished is None or camera is None:
+            return state, 0.0
+        gain = polished.loglik - predictor.loglik(state.null.mean)
+        return State.of(self.setting, camera, self.step, near=state), gain
+
+    def _depart(self, state: State, least: float = 0.0) -> bool:
+        """Return whether statistics differ for certain that call for effects taken in.
+
+        By `least` standard deviations or more.
+        """
+        calls = {name for one in self.named if one.kind in CANDIDATES
+                 for name in CANDIDATES[one.kind].calls}  # fmt: skip
+        return any(m.statistic in calls and abs(m.z) >= least for m in state.mismatches)
 
     def _slopes(self, state: State) -> Callable[[Effect], Predictor]:
         """Return what tells how numbers move with an effect: few simulations, where they do."""

@@ -11,7 +11,7 @@ from analysis.mismatch.candidates import CANDIDATES, measured
 from analysis.mismatch.contradicted import refuted
 from analysis.mismatch.credited import joined, kept_up
 from analysis.mismatch.displaced import displaced
-from analysis.mismatch.fitted import Fitted
+from analysis.mismatch.fitted import WEAK, Fitted
 from analysis.mismatch.instance import LINES, Frequency, frequency_of, instance
 from analysis.mismatch.judge import INSTEAD, LITTLE, NEEDLESS, NOTHING, Judge
 from analysis.mismatch.memory import Memory
@@ -39,7 +39,6 @@ from dsis.camera import Camera
 from dsis.effects import Effect
 
 Array = NDArray[np.float64]
-_WEAK = 30.0  # gain below which an effect may be what others, fitted one by one, left over
 _MOST_EFFECTS = 20  # some may have to go again
 _CHOSEN = frozenset({"adc_memory", "dual_gain"})  # a period, a gap between levels
 _MOST_LINES = 5  # further ones stay unexplained, located
@@ -157,22 +156,22 @@ class Search(Fitted):
                 state = self._resized(state, [again])
                 continue
             least = 0.0 if added is None else added[0].gain
-            later = strong or (self.setting.large and least >= _WEAK)  # simulations take long
+            later = strong or (self.setting.large and least >= WEAK)  # simulations take long
             some = [] if later else self._called(state, less=added is not None)
             sized = self._resized(state, some, least) if some else state
             if sized is not state:
-                rough = self.setting.large and self.rough and added is not None and least < _WEAK
+                rough = self.setting.large and self.rough and added is not None and least < WEAK
                 state = self._polished(sized) if rough else sized
                 continue
             if added is None:
                 break
-            if added[0].gain < _WEAK and self.rough:  # what is large, and rough, feigns a little
+            if self._feigned(state, added[0].gain):
                 state, before = self._polished(state), state
                 if state is not before:
                     continue
             self._take(added[0])
             self.named = kept_up(self.named, added[1], self.setting.given)
-            self.rough |= added[0].gain >= _WEAK
+            self.rough |= added[0].gain >= WEAK
             state = State.of(self.setting, added[1], self.step, draft=True, near=state)
         if not state.mismatches:
             self.ties = []  # what was undecided on the way is explained

@@ -23,8 +23,11 @@ from dsis.effects import registry
 NUMBERS = 12
 STATE: Any = SimpleNamespace(
     null=SimpleNamespace(known=np.ones(NUMBERS, bool), mean=np.zeros(NUMBERS), sd=np.ones(NUMBERS)),
+    vector=SimpleNamespace(keys=()),
     predictor=lambda _: None,
-    setting=SimpleNamespace(layout=SimpleNamespace(rows=64, columns=96)),
+    setting=SimpleNamespace(
+        layout=SimpleNamespace(rows=64, columns=96, uniform=()), seen=SimpleNamespace(levels={})
+    ),
 )
 
 

@@ -47,6 +47,8 @@ def shared_otherwise(state: State, kind: str, without: Array) -> Denial | None:
     if own is None:
         return None
     left = _left(state, without, _PAIRS)
+    if not left:
+        return None
     found = _gains(state.clues(), left)
     if any(m.statistic == "pixel_variance" for m in state.mismatches):
         before, after = misfits(state, _factor(state.clues(), left))

@@ -12,7 +12,12 @@ TOGETHER = {
 }
 """Files, by the beginning of their names, that one process runs one after the other."""
 
-FIRST = (*TOGETHER, "test_every_effect.py", "test_votes_survive", "test_startup", "test_workers_")
+LONG = ("row_banding", "smooth_prnu", "uneven_light", "edges", "greens", "own_sizes", "carry_over")
+FIRST = (
+    *TOGETHER,
+    *(f"test_mismatch_{name}" for name in LONG),
+    *("test_every_effect.py", "test_votes_survive", "test_startup", "test_workers_"),
+)
 """Files that take long: begun early, none is left to one process at the end."""
 
 

@@ -58,16 +58,26 @@ def _carrying(frames: Frames) -> Frames:
     return made
 
 
-def _observed(levels: list[Frames]) -> tuple[dict[str, tuple[float, float]], list[Samples]]:
-    sums, samples = CarryOverSums(), []
+def _watched(levels: list[Frames]) -> list[tuple[CarryOver, Samples]]:
+    watched = []
     for frames in levels:
         own = CarryOver(keep=True)
         assert len(list(own.watching(np.rint(frames)))) == len(frames)
-        sums.add(own)
         kept = own.samples("rows")
         assert kept is not None
-        samples.append(kept)
-    return sums.numbers(), samples
+        watched.append((own, kept))
+    return watched
+
+
+def _samples(levels: list[Frames]) -> list[Samples]:
+    return [kept for _, kept in _watched(levels)]
+
+
+def _observed(levels: list[Frames]) -> tuple[dict[str, tuple[float, float]], list[Samples]]:
+    sums, watched = CarryOverSums(), _watched(levels)
+    for own, _ in watched:
+        sums.add(own)
+    return sums.numbers(), [kept for _, kept in watched]
 
 
 def test_white_noise_carries_nothing_over() -> None:
@@ -132,7 +142,7 @@ def test_a_residue_whose_steps_noise_does_not_reach_is_found_by_its_slope() -> N
     rng = np.random.default_rng(11)
     between = [(AT + PERIOD * k + place, 3.0) for k, place in ((0, 20.0), (1, 32.0), (4, 45.0))]
     levels = [_carrying(mean + sd * rng.standard_normal((6, 200, 200))) for mean, sd in between]
-    _, samples = _observed(levels)
+    samples = _samples(levels)
     hidden = max(sawteeth(tuple(samples)), key=lambda one: one.chi2)
     shown = max(sawteeth(tuple(samples), whole=True), key=lambda one: one.chi2)
     pairs = sum(own.moved.size for own in samples)
@@ -142,7 +152,7 @@ def test_a_residue_whose_steps_noise_does_not_reach_is_found_by_its_slope() -> N
 
 
 def test_white_noise_has_no_slope() -> None:
-    _, samples = _observed(_white(12))
+    samples = _samples(_white(12))
     assert max(one.chi2 for one in sawteeth(tuple(samples), whole=True)) < 30
 
 
@@ -150,7 +160,7 @@ def test_the_best_of_many_residues_pays_for_the_others() -> None:
     """Of white noise alone it gains 3 nats more than its price once in 20 times (e to the -3)."""
     gains, free = [], 1
     for seed in range(200):
-        _, samples = _observed(_white(1000 + seed))
+        samples = _samples(_white(1000 + seed))
         tried = sawteeth(tuple(samples))
         one = Proposal(
             effect("adc_memory", step_dn=1.0, period_codes=64, at_code=1.0, along="rows"),
@@ -185,7 +195,7 @@ def test_spikes_do_not_hide_a_residue() -> None:
 def test_the_profile_is_the_sawtooth() -> None:
     levels = [(mean, 20.0) for mean in (120.0, 150.0, 180.0)]
     rng = np.random.default_rng(10)
-    _, samples = _observed(
+    samples = _samples(
         [_carrying(mean + sd * rng.standard_normal((6, 200, 200))) for mean, sd in levels]
     )
     parts = 16

@@ -26,11 +26,12 @@ from analysis.mismatch.layout import Layout
 from analysis.mismatch.locate import lines_of
 from analysis.mismatch.report.sentences import verdict
 from analysis.mismatch.report.summary import summary
+from dsis.camera import Camera
 from dsis.cfa import Cfa
 from dsis.grid import PixelGrid
 from dsis.simulate.maps import SensorMaps, with_maps
 from exposing import apply, effect
-from mismatch_recordings import camera, recorded
+from mismatch_recordings import FEW_LEVELS, camera, recorded
 
 NAMED = Finding(
     "omitted_physics",
@@ -189,11 +190,16 @@ def test_a_decay_over_much_of_the_sensor_is_uneven_light(
     )
 
 
+def _found(true: Camera, words: frozenset[str]) -> Finding:
+    recording = recorded(true, 9, levels=FEW_LEVELS)
+    return find_mismatch(camera(), recording, seed=1, vocabulary=words)
+
+
 def test_lines_that_have_not_settled_are_named_with_their_numbers() -> None:
     own = {"offset_dn": -1.0, "gain_percent": 1.0, "length_pixels": 5.0}
     true = camera(effect("line_settling", edge="right", **own))
     words = frozenset({"line_settling", "column_prnu", "column_fpn", "shading", "amp_glow"})
-    found = find_mismatch(camera(), recorded(true, 9), seed=1, vocabulary=words)
+    found = _found(true, words)
     (named,) = found.omitted_physics
     assert named.effect == "line_settling"
     assert not found.unexplained
@@ -215,7 +221,7 @@ def test_two_edges_are_two_effects_and_offset_and_gain_have_lengths_of_their_own
     top = {"gain_percent": 1.0, "length_pixels": 3.0}
     effects = effect("line_settling", **left), effect("line_settling", edge="top", **top)
     words = frozenset({"line_settling", "row_prnu", "column_prnu", "shading", "amp_glow"})
-    found = find_mismatch(camera(), recorded(camera(*effects), 9), seed=1, vocabulary=words)
+    found = _found(camera(*effects), words)
     assert {one.effect for one in found.omitted_physics} == {"line_settling"}
     assert not found.unexplained
     by_edge = {one.choices["edge"]: one.parameters for one in found.omitted_physics}
@@ -229,7 +235,7 @@ def test_two_edges_are_two_effects_and_offset_and_gain_have_lengths_of_their_own
 def test_without_its_word_nothing_else_is_named() -> None:
     one = effect("line_settling", gain_percent=1.0, length_pixels=5.0)
     words = frozenset({"column_prnu", "column_fpn", "shading", "amp_glow", "tap_mismatch"})
-    found = find_mismatch(camera(), recorded(camera(one), 9), seed=1, vocabulary=words)
+    found = _found(camera(one), words)
     assert not [one.effect for one in found.omitted_physics]
     assert any(m.statistic == "fixed_edge" for m in found.unexplained)
 

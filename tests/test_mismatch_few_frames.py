@@ -1,5 +1,6 @@
 """Means of few frames: their mean square is chi-squared, and is judged as that."""
 
+from functools import cache
 from types import SimpleNamespace
 from typing import Any
 
@@ -17,18 +18,22 @@ NAMES = ("flat-0", "flat-1", "flat-2")
 LAYOUT = SimpleNamespace(rows=64, columns=96)
 
 
+@cache
+def moment(dof: int, power: int) -> float:
+    """Return the mean of a power of the cube root of a mean square of white noise: an integral."""
+    chi2 = scipy.stats.chi2(dof)
+    return float(chi2.expect(lambda x: np.cbrt(x / dof) ** power))
+
+
 def roots(variances: np.ndarray) -> np.ndarray:
     """Return the means of cube roots of mean squares, as simulations have them."""
-    chi2 = scipy.stats.chi2(DOF)
-    one = float(chi2.expect(lambda x: np.cbrt(x / DOF)))
-    return np.asarray(one * np.cbrt(variances))
+    return np.asarray(moment(DOF, 1) * np.cbrt(variances))
 
 
 def predictor(squares: np.ndarray, statistic: str = "frame_variance") -> Predictor:
     """Return what judges mean squares of frame means, in units of white noise: (exposure,)."""
     keys = tuple(Key(statistic, "exposure", name, "MONO", "") for name in NAMES)
-    square = float(scipy.stats.chi2(DOF).expect(lambda x: np.cbrt(x / DOF) ** 2))
-    sd = np.sqrt(square - roots(np.ones(3)) ** 2)
+    sd = np.sqrt(moment(DOF, 2) - roots(np.ones(3)) ** 2)
     null: Any = SimpleNamespace(mean=roots(np.ones(3)), sd=sd, known=np.ones(len(NAMES), bool))
     vector: Any = SimpleNamespace(keys=keys, values=np.cbrt(squares))
     simulations: Any = SimpleNamespace(layout=LAYOUT, of=lambda *_: np.ones((2, len(NAMES))))
@@ -71,8 +76,7 @@ def test_what_many_pixels_make_keeps_its_heavy_tails() -> None:
 @pytest.mark.parametrize("dof", [1, 2, 3, 5])
 def test_a_little_wander_is_not_preferred_to_none(dof: int) -> None:
     """A model with frames that vary a little more than they do gains nothing on average."""
-    chi2 = scipy.stats.chi2(dof)
-    one, square = (float(chi2.expect(lambda x, k=k: np.cbrt(x / dof) ** k)) for k in (1, 2))
+    one, square = moment(dof, 1), moment(dof, 2)
     names = tuple(f"flat-{i}" for i in range(12))
     keys = tuple(Key("frame_variance", "exposure", name, "MONO", "") for name in names)
     sd = np.full(len(names), np.sqrt(square - one**2))

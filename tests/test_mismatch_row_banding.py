@@ -12,7 +12,6 @@ import pytest
 from planter.offsets import row_banding as planted_banding
 from scipy.linalg import toeplitz
 
-from analysis.mismatch import find_mismatch
 from analysis.mismatch.bank.bands import Bands
 from analysis.mismatch.bank.coherent import SpectrumSums
 from analysis.mismatch.bank.rowlags import ROW_LAGS, row_lags
@@ -25,13 +24,10 @@ from dsis.effects import OperatingPoint, registry
 from dsis.grid import PixelGrid
 from dsis.measures import Accumulator, Channel
 from exposing import apply, effect, flat
-from mismatch_recordings import camera, recorded
+from mismatch_recordings import camera
+from mismatch_rows import diagnosed
 
 SURE = 5.0  # standard errors
-WORDS = frozenset(
-    {"row_banding", "row_noise", "pink_noise", "line_flicker", "black_level_drift", "crosstalk",
-     "spatial_filtering", "readout_memory"}
-)  # fmt: skip
 ROWS, COLUMNS, FRAMES = 64, 48, 40
 
 
@@ -180,14 +176,10 @@ def test_the_planters_rows_have_the_covariance_that_is_stated() -> None:
     assert np.abs((made.T @ made / frames - wanted) / error).max() < SURE
 
 
-def _named(true: Any, base: Any, seed: int, words: frozenset[str] = WORDS) -> Any:
-    return find_mismatch(base, recorded(true, seed), seed=1, vocabulary=words)
-
-
 @pytest.mark.parametrize("cfa", ["MONO", "RGGB"])
 def test_it_is_named_with_its_numbers(cfa: str) -> None:
     own = {"sigma_dn": 0.8, "length_rows": 3.0}
-    found = _named(camera(effect("row_banding", **own), cfa=cfa), camera(cfa=cfa), 9)
+    found = diagnosed(camera(effect("row_banding", **own), cfa=cfa), camera(cfa=cfa), 9)
     (named,) = found.omitted_physics
     assert named.effect == "row_banding"
     assert not found.unexplained
@@ -201,7 +193,7 @@ def test_beside_white_rows_both_are_named() -> None:
         effect("row_noise", sigma_dn=1.0),
         effect("row_banding", sigma_dn=0.7, length_rows=2.5),
     )
-    found = _named(camera(*both), camera(), 9)
+    found = diagnosed(camera(*both), camera(), 9)
     assert {one.effect for one in found.omitted_physics} == {"row_noise", "row_banding"}
 
 
@@ -215,28 +207,8 @@ def test_beside_white_rows_both_are_named() -> None:
     ],
 )
 def test_what_resembles_it_is_not_it(kind: str, values: dict[str, float]) -> None:
-    found = _named(camera(effect(kind, **values)), camera(), 10)
+    found = diagnosed(camera(effect(kind, **values)), camera(), 10)
     assert [one.effect for one in found.omitted_physics] == [kind]
-
-
-@pytest.mark.parametrize("kind", ["row_noise", "crosstalk", "spatial_filtering", "line_flicker"])
-def test_it_takes_no_place_of_what_has_no_word(kind: str) -> None:
-    values: dict[str, dict[str, float]] = {
-        "row_noise": {"sigma_dn": 0.8},
-        "crosstalk": {"fraction": 0.03},
-        "spatial_filtering": {"fraction": 0.03},
-        "line_flicker": {"depth_percent": 0.3, "cycles_per_frame": 2.3},
-    }
-    found = _named(camera(effect(kind, **values[kind])), camera(), 10, WORDS - {kind})
-    assert "row_banding" not in {one.effect for one in found.omitted_physics}
-    assert found.unexplained
-
-
-def test_without_its_word_its_correlation_stays_unexplained() -> None:
-    true = camera(effect("row_banding", sigma_dn=0.8, length_rows=3.0))
-    found = _named(true, camera(), 9, WORDS - {"row_banding"})
-    assert {one.effect for one in found.omitted_physics} <= {"row_noise"}
-    assert any(m.statistic in ("row_correlation", "slow_row_variance") for m in found.unexplained)
 
 
 def _wander(length: float, drift_dn: float, *, located: bool = True) -> Any:

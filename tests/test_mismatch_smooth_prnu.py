@@ -13,18 +13,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from planter.light import blots
 
-from analysis.mismatch import find_mismatch
+from analysis.mismatch import Finding, find_mismatch
 from analysis.mismatch.bank.parts import parts
 from analysis.mismatch.bank.patches import SIZES, names
 from analysis.mismatch.bank.together import TOGETHER, together
 from analysis.mismatch.candidates.fields import CANDIDATES, fields
 from analysis.mismatch.clues import Clues
+from dsis.camera import Camera
 from dsis.cfa import Cfa
 from dsis.draw import Draw
 from dsis.effects import Effect, Exposure
 from dsis.grid import PixelGrid
 from exposing import effect
-from mismatch_recordings import camera, recorded
+from mismatch_recordings import FEW_LEVELS, camera, recorded
 
 SURE = 5.0  # standard errors
 WORDS = frozenset(
@@ -211,12 +212,15 @@ def test_a_field_as_long_as_the_sensor_is_uneven_light(length: float, sane: bool
     assert CANDIDATES[0].sane(layout, one) == sane
 
 
-@pytest.mark.parametrize("cfa", ["MONO", "RGGB"])
-@pytest.mark.parametrize(("sigma", "length"), [(0.25, 4.0), (0.13, 3.0)])
+def _found(true: Camera, seed: int, words: frozenset[str] = WORDS) -> Finding:
+    recording = recorded(true, seed, levels=FEW_LEVELS)
+    return find_mismatch(camera(cfa=true.cfa), recording, seed=1, vocabulary=words)
+
+
+@pytest.mark.parametrize(("cfa", "sigma", "length"), [("MONO", 0.25, 4.0), ("RGGB", 0.13, 3.0)])
 def test_it_is_named_with_its_numbers(cfa: str, sigma: float, length: float) -> None:
     own = {"sigma_percent": sigma, "length_pixels": length}
-    true = camera(effect("smooth_prnu", **own), cfa=cfa)
-    found = find_mismatch(camera(cfa=cfa), recorded(true, 9), seed=1, vocabulary=WORDS)
+    found = _found(camera(effect("smooth_prnu", **own), cfa=cfa), 9)
     (named,) = found.omitted_physics
     assert named.effect == "smooth_prnu"
     assert not found.unexplained
@@ -234,14 +238,12 @@ def test_it_is_named_with_its_numbers(cfa: str, sigma: float, length: float) -> 
     ],
 )
 def test_what_resembles_it_is_not_it(kind: str, values: dict[str, float]) -> None:
-    true = camera(effect(kind, **values))
-    found = find_mismatch(camera(), recorded(true, 10), seed=1, vocabulary=WORDS)
+    found = _found(camera(effect(kind, **values)), 10)
     assert [one.effect for one in found.omitted_physics] == [kind]
 
 
 def test_without_its_word_nothing_else_is_named() -> None:
     true = camera(effect("smooth_prnu", sigma_percent=0.1, length_pixels=4.0))
-    words = WORDS - {"smooth_prnu"}
-    found = find_mismatch(camera(), recorded(true, 9), seed=1, vocabulary=words)
+    found = _found(true, 9, WORDS - {"smooth_prnu"})
     assert not {one.effect for one in found.omitted_physics} - {"prnu"}
     assert any(m.statistic == "fixed_patch_variance" for m in found.unexplained)

@@ -14,7 +14,7 @@ from analysis.mismatch.bank.key import Key
 from analysis.mismatch.diagnose import VOCABULARY
 from analysis.mismatch.uneven import _ratio, uneven
 from dsis.effects import registry
-from mismatch_recordings import camera, recorded
+from mismatch_recordings import FEW_LEVELS, camera, recorded
 
 TIME_S, NOISE_DN = 0.5, 0.3
 RATE = 4.0  # DN / s
@@ -142,6 +142,8 @@ def test_odds_are_the_mean_of_the_likelihood_over_the_growth(
 def test_a_glow_that_has_no_word_stays_unexplained() -> None:
     glow = registry()["amp_glow"](dn_per_s=300.0, place="top_left", extent=0.15)
     words = VOCABULARY - {"amp_glow"}
-    found = find_mismatch(camera(), recorded(camera(glow), 7), seed=3, vocabulary=words)
+    found = find_mismatch(
+        camera(), recorded(camera(glow), 7, levels=FEW_LEVELS), seed=3, vocabulary=words
+    )
     assert found.verdict == "unexplained"
     assert any(m.statistic.startswith("fixed_smooth") for m in found.unexplained)

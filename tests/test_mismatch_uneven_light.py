@@ -14,7 +14,7 @@ from analysis.mismatch.diagnose import VOCABULARY
 from dsis.camera import read_camera
 from dsis.effects import registry
 from dsis.recording import read_recording
-from mismatch_recordings import camera, recorded
+from mismatch_recordings import FEW_LEVELS, camera, recorded
 
 FALL, DOWN, RIGHT, BOW = 2.0, -1.5, 1.0, 1.5
 NUMBERS = (
@@ -41,7 +41,7 @@ def _shading(**percent: float) -> object:
 )
 def test_uneven_light_is_named_with_its_numbers(percent: dict[str, float]) -> None:
     true = camera(_shading(**percent))  # type: ignore[arg-type] # an effect of the registry
-    found = find_mismatch(camera(), recorded(true, 8), seed=1)
+    found = find_mismatch(camera(), recorded(true, 8, levels=FEW_LEVELS), seed=1)
     (named,) = found.omitted_physics
     assert named.effect == "shading"
     assert not found.unexplained
@@ -55,7 +55,8 @@ def test_uneven_light_is_named_with_its_numbers(percent: dict[str, float]) -> No
 def test_two_amplifiers_that_have_no_word_are_no_tilt_of_the_light() -> None:
     taps = registry()["tap_mismatch"](gain_percent=1.5, regions="left_right")
     words = VOCABULARY - {"tap_mismatch"}
-    found = find_mismatch(camera(), recorded(camera(taps), 9), seed=1, vocabulary=words)
+    recording = recorded(camera(taps), 9, levels=FEW_LEVELS)
+    found = find_mismatch(camera(), recording, seed=1, vocabulary=words)
     assert not found.omitted_physics
     assert found.verdict == "unexplained"
 
@@ -82,7 +83,8 @@ def test_the_fall_of_a_lens_is_a_fall_and_no_bow(tmp_path: Path) -> None:
 def test_a_camera_that_knows_its_lens_matches_its_own_recording(fall: float) -> None:
     """What a fall of the light takes of the level is taken once, however much it is."""
     known = camera(_shading(falloff_percent=fall))  # type: ignore[arg-type] # an effect of the registry
-    found = find_mismatch(known, recorded(known, 9), seed=1, vocabulary=frozenset())
+    recording = recorded(known, 9, levels=FEW_LEVELS)
+    found = find_mismatch(known, recording, seed=1, vocabulary=frozenset())
     assert found.verdict == "match"
     assert not found.searched
     assert any("No physics was looked for" in remark for remark in found.remarks)
@@ -93,7 +95,8 @@ def test_a_fall_is_told_beside_a_decay_that_the_camera_has() -> None:
     edge = registry()["line_settling"](gain_percent=3.0, length_pixels=6.0, edge="left")
     known = camera(edge)
     true = camera(edge, _shading(falloff_percent=1.5))  # type: ignore[arg-type] # an effect of the registry
-    found = find_mismatch(known, recorded(true, 5), seed=2, vocabulary=frozenset({"shading"}))
+    recording = recorded(true, 5, levels=FEW_LEVELS)
+    found = find_mismatch(known, recording, seed=2, vocabulary=frozenset({"shading"}))
     (named,) = found.omitted_physics
     fall = named.parameters["falloff_percent"]
     assert fall.value == pytest.approx(1.5, abs=4 * fall.standard_error)

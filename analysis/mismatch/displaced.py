@@ -23,6 +23,8 @@ _BENDS = frozenset({"nonlinearity", "dual_gain", "dual_gain_mismatch"})
 _PAIRS = {"correlation_0_1": 2, "correlation_1_0": 2, "correlation_1_1": 4}
 """How many neighbours of a pixel a correlation is that of."""
 _LINES = {"row_fpn": "row", "row_prnu": "row", "column_fpn": "column", "column_prnu": "column"}
+_GREENS = frozenset({"channel_imbalance", "tap_mismatch"})
+_BESIDE = ("R", "Gr", "Gb", "B")
 _MOST = 0.5  # of a misfit, or of what white rows explain, that something else may make
 _FAR_OFF = 8.0  # standard deviations that no chance has
 _CHANCE = 1e-3  # that variances on a line misfit more
@@ -56,6 +58,8 @@ def displaced(state: State, kind: str, mean: Array, without: Array | None = None
         return _of_new_lines(state, _LINES[kind], without)
     if kind == "row_noise":
         return _of_alike_rows(state)
+    if kind in _GREENS:
+        return _of_colours(state, mean - without)
     return shared_otherwise(state, kind, without)
 
 
@@ -178,6 +182,38 @@ def _left(state: State, statistics: Iterable[str]) -> dict[tuple[Place, str], tu
         )
         if known and key.statistic in certain and key.scope == "exposure"
     }
+
+
+def _of_colours(state: State, change: Array) -> Denial | None:
+    """Return how greens that differ are denied by charge that colours share; None: they are not.
+
+    Gr has red beside it in its row and blue in its column, Gb the other way round. Neighbours whose
+    noise has a correlation r share about r / 2: along rows Gr / Gb departs by r (R - B) / G, along
+    columns by as much the other way. `change` is what the effect makes of the numbers.
+    """
+    left, keys = _left(state, ("correlation_0_1", "correlation_1_0")), state.vector.keys
+    if not left or set(_BESIDE) != set(state.setting.layout.channels):
+        return None
+    clear = np.where(state.null.known & np.isfinite(change), change, 0.0) / state.null.sd
+    of_halves = np.array([key.statistic in ("parity", "half_seam") for key in keys])
+    halves = float((clear[of_halves] ** 2).sum())
+    seen, fake, signals = 0.0, 0.0, state.calibrated.fit.signal_dn
+    for i, key in enumerate(keys):
+        if key.statistic != "channel_ratio" or key.scope != "exposure" or not clear[i]:
+            continue
+        red, *greens, blue = (max(signals[key.exposure, c], 0.0) for c in _BESIDE)
+        rows, columns = (
+            np.mean([left.get(((key.exposure, c), name), (0.0, 0.0))[0] for c in _BESIDE])
+            for name in ("correlation_0_1", "correlation_1_0")
+        )
+        if sum(greens) > 0:
+            made = float(rows - columns) * (red - blue) * 2 / sum(greens)
+            seen += float(clear[i]) ** 2
+            fake += float(clear[i]) * made / float(state.null.sd[i])
+    if fake <= _MOST * seen or seen <= halves:  # which tell amplifiers by more
+        return None
+    why = "neighbours of other colours are alike, and what they share makes the greens differ"
+    return Denial(max(1 - fake / seen, 0.0), why)
 
 
 def _of_new_lines(state: State, axis: str, without: Array) -> Denial | None:

@@ -1,0 +1,70 @@
+"""Greens that differ because charge leaks to other colours, whatever it is that is left of that."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from analysis.mismatch.displaced import displaced
+from dsis.effects import registry
+from mismatch_recordings import camera, recorded, state_of
+
+Array = NDArray[np.float64]
+LEVELS = (400.0, 1200.0, 2600.0)
+COLOURS = {"R": 0.6, "G": 1.0, "B": 0.8}
+SITES = {"R": (0, 0), "Gr": (0, 1), "Gb": (1, 0), "B": (1, 1)}
+FRACTION = 0.02
+SLOPE, READ, BLACK = 0.5, 20.0, 64.0
+
+
+def _shared(charge: Array, axis: int, fraction: float) -> Array:
+    """Return frames (frame, row, column) that gave neighbours along an axis a share of charge."""
+    here = (1 - 2 * fraction) * charge
+    return here + fraction * (np.roll(charge, 1, axis) + np.roll(charge, -1, axis))
+
+
+def _state(model: Any, *, axis: int = 2, fraction: float = 0.0, greens: float = 0.0) -> Any:
+    """Return a state of a mosaic under light of three colours; `greens` differ by that share."""
+    recording = recorded(camera(cfa="RGGB"), 5, levels=LEVELS, lit=False)
+    assert recording.stacks is not None
+    rng = np.random.default_rng(8)
+    for name, frames in recording.stacks.items():
+        level = 0.0 if name.startswith("dark") else LEVELS[int(name.removeprefix("flat-"))]
+        mean = np.zeros(frames.shape)
+        for site, (y, x) in SITES.items():
+            own = {"Gr": 1 + greens / 2, "Gb": 1 - greens / 2}.get(site, 1.0)
+            mean[:, y::2, x::2] = level * COLOURS[site[0]] * own
+        charge = mean + (SLOPE * mean) ** 0.5 * rng.standard_normal(frames.shape)
+        read = READ**0.5 * rng.standard_normal(frames.shape)
+        made = BLACK + _shared(charge, axis, fraction) + read
+        recording.stacks[name] = np.rint(made).clip(0, 4095).astype(np.uint16)
+    return state_of(recording, camera(*model, cfa="RGGB"))
+
+
+def _said(state: Any) -> Any:
+    without = state.camera.model_copy(update={"effect": ()})
+    return displaced(state, "channel_imbalance", state.null.mean, state.predictor(8).mean(without))
+
+
+@pytest.mark.parametrize(("axis", "sign"), [(2, 1), (1, -1)])
+def test_what_colours_share_makes_the_greens_differ(axis: int, sign: int) -> None:
+    """Along rows Gr gains 2 f (R - B) / G beside Gb, along columns it loses as much."""
+    percent = 200 * FRACTION * sign * (COLOURS["R"] - COLOURS["B"])
+    own = {"gain_percent": percent}
+    state = _state([registry()["channel_imbalance"](**own)], axis=axis, fraction=FRACTION)
+    denial = _said(state)
+    assert denial is not None
+    assert denial.share < 0.4
+    assert "other colours" in denial.why
+
+
+def test_greens_that_differ_by_themselves_are_not_denied() -> None:
+    own = {"gain_percent": 0.8}
+    effect = registry()["channel_imbalance"](**own)
+    assert _said(_state([effect], greens=0.008)) is None
+    # Nor where they differ by far more than what is shared makes.
+    strong = {"gain_percent": 3.0}
+    effect = registry()["channel_imbalance"](**strong)
+    state = _state([effect], greens=0.03, fraction=FRACTION)
+    assert _said(state) is None

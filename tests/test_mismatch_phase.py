@@ -123,6 +123,31 @@ def test_noise_holds_no_line() -> None:
     assert look(LAYOUT, lambda name: iter(of[name]), (x / COLUMNS, y / ROWS)).absent
 
 
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("wave", [0.0, 0.5])
+def test_the_slowest_wave_of_noise_that_rises_is_no_line(seed: int, wave: float) -> None:
+    """Means of rows that wander, weakly: their one slow wave stands out, and may be a line."""
+    rows = 96
+    layout: Any = SimpleNamespace(**{**vars(LAYOUT), "rows": rows, "channels": ("MONO",)})
+    layout.variance_dn2 = {(e, "MONO"): SD**2 for e in ("dark", "flat")}
+    at = (0.0, 1.1 / rows)
+
+    def of(name: str) -> Iterator[NDArray[np.float64]]:
+        rng = np.random.default_rng([seed, len(name)])
+        f = np.arange(0.5, rows / 2, 0.5)
+        turns = 2 * np.pi * np.arange(rows)[:, np.newaxis] * f / rows
+        for _ in range(20):
+            parts = 0.0 if wave else rng.normal(size=(2, f.size)) * 0.16 / np.sqrt(f)
+            lines = (np.stack([np.cos(turns), np.sin(turns)]) * np.reshape(parts, (-1, 1, f.size))
+                     if not wave else np.zeros((2, rows, f.size)))  # fmt: skip
+            phase = 2 * np.pi * (at[1] * np.arange(rows) + rng.uniform())
+            one = lines.sum((0, 2)) + wave * np.cos(phase)
+            yield one[:, np.newaxis] + rng.normal(0, SD, (rows, COLUMNS))
+
+    seen = look(layout, of, at)
+    assert seen.absent is not bool(wave) or seen.broad
+
+
 @pytest.mark.parametrize("row_noise", [0.0, 0.3])
 def test_a_band_is_no_line_and_a_line_beside_noise_of_rows_is(row_noise: float) -> None:
     """Slow waves of rows raise the bins beside the highest; row noise raises all bins alike."""

@@ -34,6 +34,8 @@ _CROSS = ((-1 / 3, 0.0), (1 / 3, 0.0), (0.0, -1 / 3), (0.0, 1 / 3))  # bins, bes
 _MOST_CREST = 1.21  # power between steps: sinc(1/6)^-4, a sixth of a bin off on both axes
 _BETWEEN = (-1 / 3, 0.0, 1 / 3)  # bins by which a frequency may be off
 _CHANCE = 0.05  # of a line as strong among all frequencies
+_SLOWEST = 3.0  # waves of a frame, beside which noise may rise as 1 / f
+_SHORTER = 5, 24  # waves of a frame, that say by how much
 _FEW = 8  # multiples of a quarter, at which patterns of single pixels lie
 _PHASE_WORDS = {
     "periodic_noise": "the pattern's phase is the same in all frames but for its sign",
@@ -270,7 +272,8 @@ def look(layout: Layout, frames_of: FramesOf, frequency: Frequency) -> Look:
     far = [slice(i * count + len(_NEAR), (i + 1) * count) for i in (0, 1)]
     ground = max(float(np.median(around.excess[one])) for one in far)
     level = min(max(float(np.median(around.level[one])) for one in far), 1.0)
-    own, around = own.above(ground, level), around.above(ground, level)
+    among, around = own.above(ground, level), around.above(ground, level)
+    own = own.above(max(ground, _wandering(layout, frames_of, (fx, fy))), level)
     real = all((2 * f) % 1 == 0 for f in (fx, fy))
     bins = _FEW if exact else rows * columns / 2
     broad = False
@@ -283,7 +286,7 @@ def look(layout: Layout, frames_of: FramesOf, frequency: Frequency) -> Look:
         ]
         if exact or not some:
             continue
-        broad |= around.crowded(some, float(own.excess[0]))
+        broad |= around.crowded(some, float(among.excess[0]))
     absent = own.chance(real=real) * bins > _CHANCE
     kept = own.keeps_phase(real=real)
     if exact:
@@ -293,6 +296,24 @@ def look(layout: Layout, frames_of: FramesOf, frequency: Frequency) -> Look:
     asked = zip(frequency, there, strict=True)
     x, y = (f if (2 * f) % 1 == 0 else (at + 0.5) % 1 - 0.5 for f, at in asked)
     return Look(absent, broad, kept, own, crest, (x, y))
+
+
+def _wandering(layout: Layout, frames_of: FramesOf, at: Frequency) -> float:
+    """Return the power that noise which rises as 1 / f has at a slow wave of rows or of columns.
+
+    By least squares of its power at shorter waves, over white noise; 0 of waves that are not slow.
+    """
+    sizes = np.array([layout.columns, layout.rows])
+    waves = np.abs(np.array(at)) * sizes
+    if waves.min() > 0 or not 0 < waves.max() <= _SLOWEST:
+        return 0.0
+    axis = int(waves.argmax())
+    shorter = np.arange(*_SHORTER)
+    shorter = shorter[shorter < sizes[axis] / 2]
+    looked_at = [(k / sizes[0], 0.0) if axis == 0 else (0.0, k / sizes[1]) for k in shorter]
+    excess = Power.of(layout, projections(layout, frames_of, looked_at)).excess
+    rising = waves.max() / shorter
+    return float(excess @ rising / (rising @ rising)) if shorter.size else 0.0
 
 
 def _top(at: float, beside: NDArray[np.float64]) -> tuple[float, list[float]]:

@@ -62,6 +62,58 @@ def test_what_is_explained_or_another_effect_feigns_nothing() -> None:
     assert feigned(_state(0.1, 0.0), "row_fpn", WITHOUT) is None
 
 
+def _over_all(rho: float, pattern_dn: float, seed: int) -> Any:
+    """Return a state whose map of offsets is drawn: a dark, and a flat whose frames are alike."""
+    rng = np.random.default_rng(seed)
+    sd_dn, pixels = {"dark": 0.6, "flat": 1.2}, 12_000
+    pattern = pattern_dn * rng.standard_normal(pixels)
+    top, bottom, noise = np.zeros(pixels), 0.0, 0.0
+    for name, sd in sd_dn.items():
+        own = rho if name == "flat" else 0.0
+        frames = [rng.standard_normal(pixels)]
+        for _ in range(FRAMES - 1):
+            frames.append(own * frames[-1] + (1 - own**2) ** 0.5 * rng.standard_normal(pixels))
+        mean, variance = sd * np.mean(frames, 0) + pattern, sd**2 / FRAMES
+        top, bottom, noise = top + mean / variance, bottom + 1 / variance, noise + 1 / variance
+    ratio = (top / bottom).var() / (noise / bottom**2)
+    keys = [
+        Key(statistic="frame_correlation", scope="exposure", exposure=e, channel="MONO", detail="")
+        for e in sd_dn
+    ]
+    keys.append(
+        Key(
+            statistic="fixed_pixel_variance", scope="offset", exposure="", channel="MONO", detail=""
+        )
+    )
+    numbers = tuple(range(FRAMES))
+    return SimpleNamespace(
+        setting=SimpleNamespace(
+            layout=SimpleNamespace(
+                exposures=[SimpleNamespace(name=e, numbers=numbers) for e in sd_dn]
+            ),
+            seen=SimpleNamespace(
+                levels={(e, "MONO"): SimpleNamespace(variance_dn2=s**2) for e, s in sd_dn.items()}
+            ),
+        ),
+        vector=SimpleNamespace(keys=tuple(keys), values=np.array([0.0, rho, np.cbrt(ratio)])),
+        null=SimpleNamespace(
+            mean=np.array([0.0, 0.0, np.cbrt(ratio)]),
+            sd=np.array([1e-3, 1e-3, (2 / pixels) ** 0.5 / 3]),
+            known=np.ones(3, bool),
+        ),
+        mismatches=[SimpleNamespace(statistic="frame_correlation")],
+    )
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_map_over_all_exposures_has_what_the_alike_ones_give_it(seed: int) -> None:
+    """Of a fifth of its weight, but for chance: the dark beside them shows no offsets."""
+    without = np.array([0.0, 0.0, 1.0])
+    assert feigned(_over_all(0.3, 0.0, seed), "dsnu", without) is not None
+    assert feigned(_over_all(0.3, 0.12, seed), "dsnu", without) is None
+    assert feigned(_over_all(0.0, 0.12, seed), "dsnu", without) is None
+
+
 ROWS, COLUMNS = 48, 64
 
 

@@ -1,5 +1,6 @@
 """Patterns and pixels that something else feigns: alike frames, halves, dark current."""
 
+from collections.abc import Mapping, Sequence
 from math import log
 
 import numpy as np
@@ -24,7 +25,8 @@ Array = NDArray[np.float64]
 _MAPS = {"dsnu": ("offset", "offset alone"), "prnu": ("gain", "gain alone")}
 _AXES = {"row_fpn": "rows", "column_fpn": "columns", "row_prnu": "rows", "column_prnu": "columns"}
 _GROWING = frozenset({"row_prnu", "column_prnu"})
-_CLEAR = 5.0  # standard errors of what stands out with exposure time
+_CLEAR = 5.0  # standard errors of what stands out
+_LEAST_NUMBER = 0.5  # of a cube root of a variance: below, its error is another's
 _SHAPED = frozenset({"half_seam", "parity", STATISTIC})
 _MOST = 0.5  # of a pattern's variance, or of tails, that something else may feign
 _SCATTER = 1.84  # see `coded`
@@ -62,7 +64,8 @@ def feigned(state: State, kind: str, without: Array) -> Denial | None:
 
     n frames of variance v, of correlation rho between neighbours (a mean over all, gaps included),
     have a mean frame of variance v / n (1 + 2 rho (n - 1) / n). Where that correlation is left
-    unexplained, and feigns half of what the pattern would explain, there may be no pattern.
+    unexplained, and feigns half of what the pattern would explain, there may be no pattern. Nor
+    where all of it that stood out lies in maps over all exposures, and does no longer beyond that.
 
     Parameters
     ----------
@@ -81,25 +84,60 @@ def feigned(state: State, kind: str, without: Array) -> Denial | None:
         for i, key in enumerate(state.vector.keys)
         if key.statistic == "frame_correlation" and state.null.known[i] and key.exposure in numbers
     }
-    seen, fake = 0.0, 0.0
+    seen, fake, clear, rest = 0.0, 0.0, False, False
     for i, key in enumerate(state.vector.keys):
         place = (key.exposure, key.channel)
-        if key.statistic != "fixed_pixel_variance" or place not in left:
+        if key.statistic != "fixed_pixel_variance":
             continue
-        change = state.null.mean[i] - without[i]
-        if not (state.null.known[i] and change > state.null.sd[i]):
+        change, sd = state.null.mean[i] - without[i], state.null.sd[i]
+        if not (state.null.known[i] and change > sd):
             continue  # the pattern explains nothing here, or nothing is known
-        frames = len(numbers[key.exposure])
-        weight = 1 / state.null.sd[i] ** 2
         # Numbers are cube roots of variances relative to the noise of the mean frame.
-        seen += weight * (state.vector.values[i] ** 3 - without[i] ** 3)
-        fake += weight * 2 * left[place] * (frames - 1) / frames
-    if fake <= _MOST * seen:
+        explained = float(state.vector.values[i] ** 3 - without[i] ** 3)
+        if place in left:
+            alike = _in_means(left[place], len(numbers[place[0]]))
+            seen += explained / sd**2
+            fake += alike / sd**2
+        elif key.scope in _MAPS[kind]:
+            alike = _in_maps(state, left, numbers, kind, key.channel)
+        else:
+            continue
+        unit = 3 * max(without[i], _LEAST_NUMBER) ** 2 * sd
+        clear |= explained > _CLEAR * unit
+        rest |= explained - alike > _CLEAR * unit
+    if fake <= _MOST * seen and (rest or not clear):
         return None
-    share = 1 - fake / seen if seen > 0 else 0.0
+    share = 1 - fake / seen if fake > _MOST * seen and seen > 0 else 0.0
     return Denial(
         share, "successive frames are alike for another reason, and feign a fixed pattern"
     )
+
+
+def _in_means(rho: float, frames: int) -> float:
+    """Return by which share of itself the variance of a mean of alike frames is larger."""
+    return 2 * rho * (frames - 1) / frames
+
+
+def _in_maps(
+    state: State,
+    left: Mapping[tuple[str, str], float],
+    numbers: Mapping[str, Sequence[int]],
+    kind: str,
+    channel: str,
+) -> float:
+    """Return the same of a map over all exposures, of offsets or of gains.
+
+    Mean frames count by their inverse variances, for gains times the signal, too.
+    """
+    whole = more = 0.0
+    for (name, own), level in state.setting.seen.levels.items():
+        if own != channel or name not in numbers or not level.variance_dn2 > 0:
+            continue
+        row = 1.0 if kind == "dsnu" else max(state.calibrated.fit.signal_dn[name, own], 0.0)
+        weight = row**2 * len(numbers[name]) / level.variance_dn2
+        whole += weight
+        more += weight * _in_means(left.get((name, own), 0.0), len(numbers[name]))
+    return more / whole if whole > 0 else 0.0
 
 
 def stepped(state: State, kind: str) -> Denial | None:

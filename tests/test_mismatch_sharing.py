@@ -1,5 +1,6 @@
 """By which law neighbours are alike: noise made here, by each law, foreign to effects."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -10,6 +11,7 @@ from scipy.ndimage import convolve
 from analysis.mismatch.displaced import displaced
 from analysis.mismatch.sharing import Law, evidences, shared_otherwise
 from analysis.mismatch.state import State
+from analysis.mismatch.straight import bent
 from dsis.effects import registry
 from mismatch_recordings import camera, recorded, state_of
 
@@ -89,6 +91,30 @@ def test_another_law_denies_a_filter_and_crosstalk(kind: str, law: Law) -> None:
     if denial is not None:
         assert denial.share < 1e-4
         assert law.value in denial.why
+
+
+def test_bends_of_the_model_itself_say_nothing_of_charge() -> None:
+    """A second read-out segment that the camera has: no line, and crosstalk is crosstalk."""
+    two = ((0.5, 20.0, 1000.0), (0.8, 40.0, None))
+    crosstalk = registry()["crosstalk"](fraction=CORRELATION / 2)
+    model, true = camera(segments=two), camera(crosstalk, segments=two)
+    state = state_of(recorded(true, 4, levels=LEVELS), model)
+    assert bent(state)
+    assert not bent(_state(Law.LIGHT))
+    (other, *_) = _state(Law.LIGHT).mismatches
+    off = replace(state, mismatches=(replace(other, statistic="pixel_variance"),))
+    assert shared_otherwise(off, "crosstalk", off.null.mean) is None
+
+
+def test_what_charge_takes_from_variances_counts() -> None:
+    state = _state(Law.CHARGE)
+    (other, *_) = state.mismatches
+    off = replace(state, mismatches=(replace(other, statistic="pixel_variance"),))
+    none = replace(state, mismatches=(replace(other, statistic="level"),))
+    asked = [shared_otherwise(one, "crosstalk", one.null.mean) for one in (off, none)]
+    assert all(asked)
+    first, second = (one.share for one in asked if one is not None)
+    assert first < second
 
 
 @pytest.mark.parametrize("kind", ["brighter_fatter", "readout_memory", "prnu"])

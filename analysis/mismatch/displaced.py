@@ -14,6 +14,7 @@ from analysis.mismatch.candidates.response import skewness_below
 from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.layout import Place
 from analysis.mismatch.recalibrate import code_step
+from analysis.mismatch.resolved import FAR_OFF
 from analysis.mismatch.sharing import of_charge, shared_otherwise
 from analysis.mismatch.state import State
 from analysis.mismatch.straight import curves, misfit, misfits
@@ -26,7 +27,6 @@ _LINES = {"row_fpn": "row", "row_prnu": "row", "column_fpn": "column", "column_p
 _GREENS = frozenset({"channel_imbalance", "tap_mismatch"})
 _BESIDE = ("R", "Gr", "Gb", "B")
 _MOST = 0.5  # of a misfit, or of what white rows explain, that something else may make
-_FAR_OFF = 8.0  # standard deviations that no chance has
 _CHANCE = 1e-3  # that variances on a line misfit more
 _LIMITS = (-1.5, 4.0)  # standard deviations at which noise may be cut
 
@@ -38,7 +38,8 @@ def displaced(state: State, kind: str, mean: Array, without: Array | None = None
     what they would be without: by covariances that neighbours have instead, or by what is cut off
     of noise that leans. Where that leaves half of the misfit or less, there may be no bend; nor
     where variances scatter no more than codes that are not equally wide make them. Of a bend that
-    levels show nothing is asked. Of filters and crosstalk, how alike neighbours are at each level.
+    levels show nothing is asked. Of filters and crosstalk, how alike neighbours are at each level;
+    of greens that differ, what other colours share with them.
 
     Parameters
     ----------
@@ -69,7 +70,7 @@ def _seen_in_levels(state: State, without: Array, mean: Array) -> bool:
     levels &= np.isfinite(without) & np.isfinite(mean)
     values, sd = state.vector.values[levels], state.null.sd[levels]
     before, after = np.abs(values - without[levels]), np.abs(values - mean[levels])
-    return bool(((before > _FAR_OFF * sd) & (after < _MOST * before)).any())
+    return bool(((before > FAR_OFF * sd) & (after < _MOST * before)).any())
 
 
 def _of_neighbours(state: State) -> Denial | None:
@@ -107,7 +108,7 @@ def _of_limits(state: State) -> Denial | None:
     cut = {
         place: 1 / _variance_below(brentq(lambda z, g=rest: skewness_below(z) + abs(g), *_LIMITS))
         for (place, _), (rest, sd) in _left(state, ("skewness",)).items()
-        if abs(rest) > _FAR_OFF * sd and -skewness_below(_LIMITS[1]) < abs(rest)
+        if abs(rest) > FAR_OFF * sd and -skewness_below(_LIMITS[1]) < abs(rest)
         if abs(rest) < -skewness_below(_LIMITS[0])
     }
     why = "noise leans to one side for another reason, and what cuts it off lessens variances"

@@ -13,6 +13,7 @@ from analysis.mismatch.contradicted import Denial, rival
 from analysis.mismatch.displaced import displaced
 from analysis.mismatch.edged import STATISTIC, edged, single
 from analysis.mismatch.recalibrate import code_step
+from analysis.mismatch.resolved import FAR_OFF
 from analysis.mismatch.rivalled import rivalled
 from analysis.mismatch.state import State
 from analysis.mismatch.uneven import uneven
@@ -30,7 +31,6 @@ _LEAST_NUMBER = 0.5  # of a cube root of a variance: below, its error is another
 _SHAPED = frozenset({"half_seam", "parity", STATISTIC})
 _MOST = 0.5  # of a pattern's variance, or of tails, that something else may feign
 _SCATTER = 1.84  # see `coded`
-_FAR_OFF = 8.0  # standard deviations that no chance has
 _FEW_ELECTRONS = 1.0  # skewness of shot noise of one electron: read noise beside it lessens it
 _LONGEST = 1 / 8  # of a frame's rows, over which bands are taken to last
 _LIKELY = 2.0  # standard deviations that chance may well have
@@ -107,7 +107,7 @@ def feigned(state: State, kind: str, without: Array) -> Denial | None:
         rest |= explained - alike > _CLEAR * unit
     if fake <= _MOST * seen and (rest or not clear):
         return None
-    share = 1 - fake / seen if fake > _MOST * seen and seen > 0 else 0.0
+    share = 1 - fake / seen if seen > 0 else 0.0
     return Denial(
         share, "successive frames are alike for another reason, and feign a fixed pattern"
     )
@@ -279,7 +279,7 @@ def lopsided(state: State, kind: str) -> Denial | None:
     leans = any(
         key.statistic == "skewness"
         and key.scope == "exposure"
-        and abs(z) > _FAR_OFF
+        and abs(z) > FAR_OFF
         and abs(value) > _FEW_ELECTRONS
         for key, z, value in zip(state.vector.keys, left, state.vector.values, strict=False)
     )

@@ -10,6 +10,7 @@ from analysis.mismatch.own import Own, called, explained, refitted, resized, siz
 from analysis.mismatch.polish import polish, with_effects
 from analysis.mismatch.predict import Predictor
 from analysis.mismatch.rank import LEAST_GAIN, Ranked, replicates_for
+from analysis.mismatch.resolved import FAR_OFF
 from analysis.mismatch.segments import Path
 from analysis.mismatch.state import Setting, State
 from analysis.mismatch.uncertainty import settled
@@ -18,7 +19,6 @@ from dsis.effects import Effect
 
 Step = Callable[[], None]
 WEAK = 30.0  # gain below which an effect may be what others, fitted one by one, left over
-_FAR_OFF = 8.0  # standard deviations that no chance has
 _POLISHES = 3  # of what is strong
 
 
@@ -134,7 +134,7 @@ class Fitted:
         """
         if not self.rough or self.setting.large:
             return self.rough and gain < WEAK
-        return gain < WEAK or self._depart(state, _FAR_OFF)
+        return gain < WEAK or self._depart(state, FAR_OFF)
 
     def _own(self, named: Named) -> Own | None:
         """Return the camera's own effect that one named is like, as large as both; None: none."""

@@ -16,6 +16,7 @@ from dsis.effects import Effect
 
 Array = NDArray[np.float64]
 CLEAR = 3.0  # departures below are chance
+FAR_OFF = 8.0  # standard deviations that no chance has
 _MOST_OF, LEAST_CHANGE = 0.7, 1.0  # few simulations show of none as much as the second
 _OPEN = 8.0  # standard errors
 MINOR = 0.3  # share of a departure

@@ -6,20 +6,20 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.mismatch.basefit import CLIPPED_SHARE
 from analysis.mismatch.clues import Clues
 from analysis.mismatch.contradicted import Denial, rival
 from analysis.mismatch.layout import Place
 from analysis.mismatch.rank import TOLD_APART
 from analysis.mismatch.recalibrate import code_step
 from analysis.mismatch.state import State
-from analysis.mismatch.straight import misfits
+from analysis.mismatch.straight import bent, misfits
 
 Array = NDArray[np.float64]
 Left = dict[tuple[str, str], list[tuple[Place, float, float]]]
 _BESIDE = frozenset({"correlation_0_1", "correlation_1_0"})
 _PAIRS = _BESIDE | {"correlation_0_2", "correlation_2_0"}
 _ROUNDING = 1 / 12  # of a step between codes, squared: noise that comes after any filter
-_CLIPPED = 1e-3  # share of samples at an end of the converter, from which variances are not noise's
 
 
 class Law(StrEnum):
@@ -40,8 +40,9 @@ def shared_otherwise(state: State, kind: str, without: Array) -> Denial | None:
     """Return how a filter or crosstalk is denied by the law of what is shared; None: it is not.
 
     Where another law is likelier at odds of 20, whatever follows it, word or none, is there
-    instead. What charge takes from variances counts where these are left unexplained. `without`
-    are the numbers predicted without the effect.
+    instead. What charge takes from variances counts, for or against it, where these are left
+    unexplained and the model's lie on a line. `without` are the numbers predicted without the
+    effect.
     """
     own = _LAWS.get(kind)
     if own is None:
@@ -50,9 +51,9 @@ def shared_otherwise(state: State, kind: str, without: Array) -> Denial | None:
     if not left:
         return None
     found = _gains(state.clues(), left)
-    if any(m.statistic == "pixel_variance" for m in state.mismatches):
+    if any(m.statistic == "pixel_variance" for m in state.mismatches) and not bent(state):
         before, after = misfits(state, _factor(state.clues(), left))
-        found[Law.CHARGE] += max(before - after, 0.0) / 2
+        found[Law.CHARGE] += (before - after) / 2
     best = max(found, key=lambda law: found[law])
     behind = found[best] - found[own]
     if behind <= TOLD_APART:
@@ -160,7 +161,7 @@ def _left(state: State, without: Array, statistics: frozenset[str]) -> Left:
         if key.statistic not in statistics or key.scope != "exposure" or place not in levels:
             continue
         known = state.null.known[i] and np.isfinite(without[i]) and place[0] in uniform
-        clipped = max(levels[place].clipped_low, levels[place].clipped_high) > _CLIPPED
+        clipped = max(levels[place].clipped_low, levels[place].clipped_high) > CLIPPED_SHARE
         if known and not clipped:
             value = float(state.vector.values[i] - without[i])
             found.setdefault((key.statistic, key.channel), []).append(

@@ -26,6 +26,16 @@ def misfits(state: State, factor: Callable[[Place, float], float]) -> tuple[floa
     return before, after
 
 
+def bent(state: State) -> bool:
+    """Return whether the model's own variances are off a line: they misfit it by 1 nat or more."""
+    expected = state.calibrated.fit.expected_dn2
+    found = (
+        misfit(signal, np.array([expected[at] for at in places]), weight)
+        for signal, _, weight, places in curves(state)
+    )
+    return sum(found) > 2.0  # of chi-squared
+
+
 def curves(state: State) -> Iterator[tuple[Array, Array, Array, list[Place]]]:
     """Yield signals, variances, weights of their logarithms and places of each channel."""
     levels, signals = state.setting.seen.levels, state.calibrated.fit.signal_dn

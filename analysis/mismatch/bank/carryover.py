@@ -32,6 +32,7 @@ _SAMPLES = 2**16  # of a difference, roughly: every so many lines are looked at
 _KEPT = 2**15  # samples of a difference of frames that are kept one by one
 _FARTHEST = 6.0  # standard deviations of a change of samples: beyond it is a spike
 _ASKED = 4096  # samples that tell how far changes scatter
+_ASKED_AT = np.array([0.15865, 0.5, 0.84135])  # a standard deviation, and the middle
 _FINER = 8  # places of a step between two of `PLACES`
 Array = NDArray[np.float64]
 Frame = NDArray[np.int32]
@@ -82,6 +83,36 @@ def detail(axis: str, period: int, phase: str) -> str:
     return f"{axis}, {phase} over {period} codes"
 
 
+class _Counts:
+    """Sums over samples by their code, folded at `PERIODS[-1]`, and over all of them.
+
+    Attributes
+    ----------
+    counts
+        How often codes, their differences and sums occur: (3, code).
+    moved
+        Changes of samples, of those to their right and of those below: (code, 3).
+    squares
+        Count, squares of the own, of the others, and their products with the own.
+    """
+
+    def __init__(self) -> None:
+        self.counts = np.zeros((3, _FOLDED), np.int64)
+        self.moved = np.zeros((_FOLDED, 3))
+        self.squares = np.zeros(6)
+
+    def take(
+        self,
+        one: Frame,
+        other: Frame,
+        still: NDArray[np.float32],
+        lines: tuple[int, int, int],
+        columns: tuple[int, int],
+    ) -> None:
+        """Take samples of some lines (first, end, step) and columns (first, end)."""
+        _take(one, other, still, lines, columns, self.counts, self.moved, self.squares)
+
+
 class CarryOver:
     """Sums over successive frames of one exposure, by the code before, folded at `PERIODS[-1]`.
 
@@ -92,8 +123,7 @@ class CarryOver:
     def __init__(self, *, keep: bool = False) -> None:
         self.keep = keep
         self.kept: dict[str, list[Array]] = {axis: [] for axis in AXES}
-        self.by_code = {axis: np.zeros((5, _FOLDED)) for axis in AXES}
-        self.squares = {axis: np.zeros(4) for axis in AXES}
+        self.inner, self.edges = _Counts(), {axis: _Counts() for axis in AXES}
         self.frames, self.size = 0, {"rows": 1, "columns": 1}
 
     def watching(self, frames: Iterable[NDArray[np.generic]]) -> Iterator[NDArray[np.generic]]:
@@ -109,20 +139,41 @@ class CarryOver:
             yield frame
 
     def _take(self, one: Frame, other: Frame) -> None:
-        self.size = {"rows": one.shape[1], "columns": one.shape[0]}
+        """Take the change between two frames, of every so many lines.
+
+        Most samples stand before one to their right and one below: what both have in common is
+        summed once. The last column stands before what is below alone, the last line before what is
+        beside.
+        """
+        rows, columns = one.shape
+        self.size = {"rows": columns, "columns": rows}
         still = _still(one, other, *_ends(one, other))
         every = max(one.size // _SAMPLES, 1) | 1  # odd: no colour is left out
-        found = _sums(one, other, still, every)
+        self.inner.take(one, other, still, (0, rows - 1, every), (0, columns - 1))
+        self.edges["columns"].take(one, other, still, (0, rows - 1, every), (columns - 1, columns))
+        if (rows - 1) % every == 0:
+            self.edges["rows"].take(one, other, still, (rows - 1, rows, 1), (0, columns - 1))
+        if not self.keep:
+            return
         for axis in AXES:
-            self.by_code[axis] += found[axis][0]
-            self.squares[axis] += found[axis][1]
-            if self.keep:
-                down, right = _BEFORE[axis]
-                rows, columns = one.shape[0] - down, one.shape[1] - right
-                parts = (one, other, still[down:, right:], still)
-                flat = [part[:rows, :columns].reshape(-1) for part in parts]
-                step = max(flat[0].size // _KEPT, 1) | 1
-                self.kept[axis].append(np.stack([part[::step] for part in flat]).astype(float))
+            down, right = _BEFORE[axis]
+            parts = (one, other, still[down:, right:], still)
+            flat = [part[: rows - down, : columns - right].reshape(-1) for part in parts]
+            step = max(flat[0].size // _KEPT, 1) | 1
+            self.kept[axis].append(np.stack([part[::step] for part in flat]).astype(float))
+
+    def sums(self, axis: str) -> tuple[Array, Array]:
+        """Return sums of samples that stand before others along an axis.
+
+        By code: how often codes, their differences and sums occur, changes of what was read after
+        and of the codes' own. Of all: count, squares of what was read after, product with the own,
+        squares of the own.
+        """
+        inner, edge, after = self.inner, self.edges[axis], AXES.index(axis)
+        counts, moved = inner.counts + edge.counts, inner.moved + edge.moved
+        squares = inner.squares + edge.squares
+        by_code = np.stack([*counts, moved[:, 1 + after], moved[:, 0]])
+        return by_code, squares[[0, 2 + after, 4 + after, 1]]
 
     def samples(self, axis: str) -> Samples | None:
         """Return the samples kept; None: there are none."""
@@ -171,10 +222,10 @@ class CarryOverSums:
         weight = (2 * own.frames - 2) / (3 * own.frames - 4)
         waves = _waves()
         for axis in AXES:
-            count, square, product, before = own.squares[axis]
+            by_code, (count, square, product, before) = own.sums(axis)
             if min(square, before) <= 0:
                 continue
-            codes, differences, sums, moved, itself = own.by_code[axis]
+            codes, differences, sums, moved, itself = by_code
             variance = max(square - product**2 / before, 1e-12) / count
             for k, (wave, sign) in enumerate(zip(waves, (1.0, -1.0), strict=True)):
                 # Of cosines (cos a - cos b)^2, of sines (sin a - sin b)^2, from a - b and a + b.
@@ -289,11 +340,41 @@ def _ends(one: Frame, other: Frame) -> tuple[int, int]:
     Six standard deviations from the middle, which normal changes never reach: a spike, or a few,
     would bend all that is summed, and its own lines' means.
     """
-    size, every = one.size, max(one.size // _ASKED, 1) | 1
-    change = one.reshape(size)[::every] - other.reshape(size)[::every]
-    low, middle, high = np.percentile(change, [15.865, 50, 84.135])
+    low, middle, high = _quantiles(one, other, max(one.size // _ASKED, 1) | 1, _ASKED_AT)
     far = _FARTHEST * max(float(high - low) / 2, 0.5)
     return int(np.floor(middle - far)), int(np.ceil(middle + far))
+
+
+@kernel
+def _quantiles(one: Frame, other: Frame, every: int, at: Array) -> Array:
+    """Return quantiles of every so many changes, between two in proportion, as numpy has them.
+
+    Counted, not sorted: changes are few whole numbers.
+    """
+    columns, count = one.shape[1], (one.size + every - 1) // every
+    change = np.empty(count, np.int32)
+    for i in range(count):
+        y, x = divmod(i * every, columns)
+        change[i] = one[y, x] - other[y, x]
+    least = change.min()
+    met = np.zeros(change.max() - least + 1, np.int64)
+    for i in range(count):
+        met[change[i] - least] += 1
+    found = np.empty(at.size)
+    for k in range(at.size):
+        place = at[k] * (count - 1)
+        below = 0
+        so_far = met[0]
+        while so_far <= int(place):
+            below += 1
+            so_far += met[below]
+        next_ = below
+        if so_far <= min(int(place) + 1, count - 1):
+            next_ += 1
+            while met[next_] == 0:
+                next_ += 1
+        found[k] = least + below + (next_ - below) * (place - int(place))
+    return found
 
 
 @kernel
@@ -321,43 +402,19 @@ def _still(one: Frame, other: Frame, least: int, most: int) -> NDArray[np.float3
     return found
 
 
-def _sums(
-    one: Frame, other: Frame, still: NDArray[np.float32], every: int
-) -> dict[str, tuple[Array, Array]]:
-    """Return `by_code` and `squares` of two frames, by axis, of every so many lines.
-
-    Most samples stand before one to their right and one below: what both have in common is summed
-    once. The last column stands before what is below alone, the last line before what is beside.
-    """
-    rows, columns = one.shape
-    inner = _by_code(one, other, still, (0, rows - 1, every), (0, columns - 1))
-    last = (rows - 1) % every  # 0: it is looked at
-    bottom = _by_code(one, other, still, (rows - 1, rows - last, every), (0, columns - 1))
-    side = _by_code(one, other, still, (0, rows - 1, every), (columns - 1, columns))
-    found = {}
-    for axis, edge, own in (("rows", bottom, 0), ("columns", side, 1)):
-        codes, squares = inner[0] + edge[0], inner[1] + edge[1]
-        found[axis] = (codes[[0, 1, 2, 4 + own, 3]], squares[[0, 2 + own, 4 + own, 1]])
-    return found
-
-
 @kernel
-def _by_code(
+def _take(
     one: Frame,
     other: Frame,
     still: NDArray[np.float32],
     lines: tuple[int, int, int],
     columns: tuple[int, int],
-) -> tuple[Array, Array]:
-    """Return sums over some lines and columns of samples: by their code, and of squares.
-
-    By code: how often codes, their differences and sums occur; sums of the sample's own change, of
-    that of the one to its right, and of the one below. Of squares: count, own squared, the others
-    squared, and their products with the own.
-    """
+    counts: NDArray[np.int64],
+    moved: Array,
+    squares: Array,
+) -> None:
+    """Add sums over some lines and columns of samples: see `_Counts`."""
     mask = _FOLDED - 1
-    moved = np.zeros((_FOLDED, 3))  # of a code side by side
-    counts = np.zeros((3, _FOLDED), np.int64)
     count = before = squared_right = squared_below = by_right = by_below = 0.0
     end = still.shape[1] - 1
     for y in range(lines[0], lines[1], lines[2]):
@@ -382,6 +439,9 @@ def _by_code(
             squared_below += below * below
             by_right += right * own
             by_below += below * own
-    codes = np.empty((6, _FOLDED))
-    codes[:3], codes[3:] = counts, moved.T
-    return codes, np.array([count, before, squared_right, squared_below, by_right, by_below])
+    squares[0] += count
+    squares[1] += before
+    squares[2] += squared_right
+    squares[3] += squared_below
+    squares[4] += by_right
+    squares[5] += by_below

@@ -22,6 +22,7 @@ from analysis.mismatch.finding import (
     Verdict,
 )
 from analysis.mismatch.instance import kind_of
+from analysis.mismatch.layout import Layout
 from analysis.mismatch.model import processes
 from analysis.mismatch.name import Search
 from analysis.mismatch.named import Named
@@ -40,6 +41,7 @@ from analysis.mismatch.state import Setting, State
 from analysis.mismatch.taking import layout_of
 from analysis.mismatch.thinned import stages, with_all_frames
 from analysis.mismatch.trial import Trial
+from analysis.mismatch.unsettled import told_beside, unsettled, with_first_frames, without
 from analysis.mismatch.wholecells import whole_cells
 from dsis.blas import one_thread
 from dsis.camera import Camera
@@ -95,14 +97,11 @@ def _found(
 ) -> Finding:
     """Return the finding; `how` is the seed and the number of processes."""
     recording = whole_cells(recording)
-    split = Split.of(recording)
     source = Source(recording)
-    # What moves in a locked frame only is no static scene either.
-    moving = layout_of(recording, split.all_of_development, source.frames).moving
-    split = split.without(moving)
+    first = unsettled(recording, source)
+    words = told_beside(words, first)
+    split, layout = _taken(recording, source, without(Split.of(recording), first))
     development = split.development
-    layout = layout_of(recording, development, source.frames)
-    layout = replace(layout, moving=(*moving, *layout.moving))
     numbers = {e.name: e.numbers for e in layout.exposures}
     remarks = (*remarks_on(recording, development, layout), *(() if words else (_LOCATED,)))
     # What is left out proves nothing either: copies of a frame are told from any simulation.
@@ -120,6 +119,7 @@ def _found(
         proof = _proof_without(trial, whole, _calibrated_to(setting, whole, camera), step, source)
         evidence = evidence_of(whole, whole, album if large else trial.numbers.album, split)
         found = _finding(camera, whole, whole, search, {}, proof, {})
+        found = with_first_frames(found, first)
         return _said(found, remarks, evidence, words)
     base = whole if large else State.of(setting, camera, step)
     # Of a large recording lines are looked for, and measured, in the same frames.
@@ -157,7 +157,17 @@ def _found(
         departures = Change(len(whole.mismatches), len(final.mismatches))
         proof = replace(proof, discrepancies=departures)
     found = _finding(camera, whole, final, search, gains, proof, known)
+    found = with_first_frames(found, first)
     return _said(found, remarks, evidence, words)
+
+
+def _taken(recording: Recording, source: Source, split: Split) -> tuple[Split, Layout]:
+    """Return the split without scenes that move, and the layout of what may be looked at."""
+    # What moves in a locked frame only is no static scene either.
+    moving = layout_of(recording, split.all_of_development, source.frames).moving
+    split = split.without(moving)
+    layout = layout_of(recording, split.development, source.frames)
+    return split, replace(layout, moving=(*moving, *layout.moving))
 
 
 def _said(

@@ -12,6 +12,7 @@ from analysis.mismatch.contrasts import Contrasts, contrasts
 from analysis.mismatch.fewpairs import widening
 from analysis.mismatch.layout import Layout
 from analysis.mismatch.vector import Vector
+from analysis.mismatch.wander import wandering_dn2
 
 Array = NDArray[np.float64]
 _OWN = 40.0  # degrees of freedom that the closed form, scaled by name, is worth for a number
@@ -89,6 +90,7 @@ def null_of(layout: Layout, simulated: Sequence[Vector], seen: Vector) -> Null:
     wide = widening(seen.keys, np.where(known, np.nan_to_num(values), 0.0), error, recorded)
     known &= np.isfinite(wide)
     sd = np.where(known, sd * wide, sd)
+    sd = np.sqrt(sd**2 + np.where(known, wandering_dn2(layout, seen.keys, mean, recorded), 0.0))
     sums = contrasts(layout, Vector(seen.keys, seen.values, sd), known)
     parts = np.where(known, (np.nan_to_num(values) - mean) / sd, 0.0)
     along = parts @ sums.matrix.T

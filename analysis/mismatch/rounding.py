@@ -34,7 +34,7 @@ def rounded(
         return 0.0, 1 / 12
     codes, share = _codes(mean_dn, sigma, white_dn)
     if codes.size < 2:
-        return float(codes[0] - mean_dn) if codes.size else 0.0, -variance_dn2
+        return float(codes[0] - mean_dn), -variance_dn2
     mean = float((share * codes).sum())
     variance = float((share * (codes - mean) ** 2).sum())
     return mean - mean_dn, variance - max(variance_dn2, 0.0)
@@ -42,8 +42,9 @@ def rounded(
 
 def _codes(mean_dn: float, sigma_dn: float, white_dn: float) -> tuple[Array, Array]:
     """Return the codes that occur, and the share of samples that each has."""
-    low = max(int(np.floor(mean_dn - _REACH * sigma_dn)) - 1, 0)
-    high = min(int(np.ceil(mean_dn + _REACH * sigma_dn)) + 1, int(white_dn))
+    last = int(white_dn)
+    low = min(max(int(np.floor(mean_dn - _REACH * sigma_dn)) - 1, 0), last)
+    high = max(min(int(np.ceil(mean_dn + _REACH * sigma_dn)) + 1, last), 0)
     if high - low > 4096:  # far wider than a code: only the ends matter
         codes = np.unique(np.linspace(low, high, 4097).round())
     else:

@@ -22,6 +22,7 @@ from dsis.measures.spikes import variance_of_quartiles, without_spikes
 
 LOWEST_CODE, CODES = -(2**16), 2**18  # the first code counted, and how many
 LEAST_SIGMA_STEPS = 2.0  # below, noise does not smooth the density: no code width can be told
+_LEAST_CODES = 4  # whose common step is larger by chance once in 8 times, much larger hardly ever
 _LEAK = 1e-7  # of the smooth density's power is let into the band
 _REMEMBERED = 4096  # transforms up to this size keep their bands: 17 MB at most
 _LEAST_DOF, _NODES = 4.0, 20
@@ -129,6 +130,17 @@ class Codes:
     def share_at_least(self, code: float) -> float:
         """Return the share of samples at or above a code."""
         return float(self.counts[max(int(code) - self.lowest, 0) :].sum() / self.total)
+
+    def ends(self, lowest: float, highest: float) -> tuple[float, float]:
+        """Return the first and the last code that a converter of these ends can give, DN.
+
+        Those of its steps, which need not reach either end; of few codes steps are not known.
+        """
+        own = self.lattice
+        if own is None or own.step <= 1 or self._inner.size < _LEAST_CODES:
+            return lowest, highest
+        first = lowest + (own.code - lowest) % own.step
+        return first, highest - (highest - own.code) % own.step
 
     def spacing(self) -> Estimate:
         """Return the greatest common step of the codes that occur, DN.

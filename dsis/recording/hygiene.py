@@ -19,6 +19,7 @@ from dsis.compiled import kernel
 CLIPPED_SHARE = 1e-4
 """Share of clipped pixels above which mean and variance of an exposure are biased noticeably."""
 
+_FIRST = 4096  # samples of a frame, which tell that codes are ordinary
 _LEAST_STEPS = 4  # that all codes reach over: of fewer no step is told
 
 
@@ -72,7 +73,8 @@ class Inspection:
         """Take note of frame `index` of an exposure: uint16 (row, column)."""
         numbers = _summarise(codes.reshape(-1), np.uint16(np.ceil(self.white_level)))
         checksum = zlib.crc32(np.ascontiguousarray(codes).data)
-        total, least, largest, at_zero, at_white, step = (int(n) for n in numbers)
+        total, least, largest, at_zero, at_white = (int(n) for n in numbers)
+        step = _step_of(codes.reshape(-1))
         summary = FrameSummary(total, least, largest, at_zero, at_white, step, codes.size, checksum)
         with self._lock:
             self._seen[exposure][index] = summary
@@ -174,9 +176,9 @@ def _on_light(seen: list[tuple[Planned, list[FrameSummary]]]) -> list[str]:
 @kernel
 def _summarise(
     codes: NDArray[np.uint16], white: np.uint16
-) -> tuple[np.uint64, np.uint16, np.uint16, np.uint64, np.uint64, np.int64]:
+) -> tuple[np.uint64, np.uint16, np.uint16, np.uint64, np.uint64]:
     total, at_zero, at_white = np.uint64(0), np.uint64(0), np.uint64(0)
-    least, largest, step, first = np.uint16(65535), np.uint16(0), np.int64(0), np.int64(codes[0])
+    least, largest = np.uint16(65535), np.uint16(0)
     for i in range(codes.size):
         code = codes[i]
         total += np.uint64(code)
@@ -184,8 +186,23 @@ def _summarise(
         at_white += np.uint64(code >= white)
         least = min(least, code)
         largest = max(largest, code)
-        if step != 1:
-            rest = abs(np.int64(code) - first)
-            while rest:  # Euclid: at once for most codes
-                step, rest = rest, step % rest
-    return total, least, largest, at_zero, at_white, step
+    return total, least, largest, at_zero, at_white
+
+
+def _step_of(codes: NDArray[np.uint16]) -> int:
+    """Return the greatest step between codes, (sample,); 0 where there is one code."""
+    step = _common_step(np.unique(codes[:_FIRST]))
+    return step if step == 1 else _common_step(np.flatnonzero(_occurring(codes)))
+
+
+def _common_step(ascending: NDArray[np.integer]) -> int:
+    return int(np.gcd.reduce(np.diff(ascending)))
+
+
+@kernel
+def _occurring(codes: NDArray[np.uint16]) -> NDArray[np.bool_]:
+    """Return whether each code 0..65535 occurs."""
+    found = np.zeros(65536, np.bool_)
+    for i in range(codes.size):
+        found[codes[i]] = True
+    return found

@@ -3,12 +3,15 @@
 Measured without dsis's own measures; tolerances are five standard errors.
 """
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
+from dsis.camera import camera_values, read_camera, write_camera
 from dsis.cfa import Cfa
 from dsis.draw import Draw
 from dsis.effects.adc_dnl import code_edges
@@ -85,6 +88,50 @@ def test_quantisation_leaves_multiples_where_codes_are_clipped(step: float) -> N
         assert (codes % step == 0).all()
         assert codes.min() >= 0
         assert codes.max() <= WHITE_DN
+
+
+@given(step=st.integers(1, 300), part=st.floats(0, 1, exclude_max=True), seed=st.integers(0, 99))
+def test_codes_are_whole_steps_from_the_phase(step: int, part: float, seed: int) -> None:
+    """Also where they are clipped; the nearest such code is taken."""
+    phase = int(part * step)
+    one = camera(effect("quantisation", step_dn=float(step), phase_dn=phase), cfa=Cfa.RGGB)
+    ends = (-BLACK_DN - 50, WHITE_DN - BLACK_DN + 50)
+    clean = np.random.default_rng(seed).uniform(*ends, (8, 8)).astype(np.float32)
+    grid = PixelGrid(8, 8, Cfa.RGGB)
+    codes = one.expose(clean, Draw(5), Draw(6), 0, grid).astype(np.float64) + BLACK_DN
+    assert (codes % step == phase).all()
+    assert codes.min() >= phase
+    assert codes.max() <= WHITE_DN
+    lowest, highest = phase, WHITE_DN - (WHITE_DN - phase) % step
+    nearest = np.clip(clean + BLACK_DN, lowest, highest)
+    assert np.abs(codes - nearest).max() <= step / 2 + 2e-3  # single precision of 16 383 DN
+
+
+@pytest.mark.parametrize("step", [1.0, 2.5, 6.0, 100.0])
+def test_without_a_phase_codes_are_as_they_always_were(step: float) -> None:
+    """Bit for bit: by the formula without a phase, then whole and clipped."""
+    image = white(4000.0, mean=6000).astype(np.float32)
+    one = camera(effect("quantisation", step_dn=step))
+    codes = one.expose(image, Draw(5), Draw(6), 0, PixelGrid(SIDE, SIDE, Cfa.MONO))
+    black, width = np.float32(BLACK_DN), np.float32(step)
+    coarse = width * np.minimum(np.rint((image + black) / width), np.float32(WHITE_DN // step))
+    whole = np.clip(np.rint(coarse - black + black), np.float32(0), np.float32(WHITE_DN)) - black
+    np.testing.assert_array_equal(codes, whole)
+    assert camera_values(one)["effect"] == [{"kind": "quantisation", "step_dn": step}]
+
+
+def test_a_phase_is_below_the_step_and_the_white_level(tmp_path: Path) -> None:
+    one = camera(effect("quantisation", step_dn=6.0, phase_dn=5))
+    write_camera(one, tmp_path / "camera.toml")
+    assert "phase_dn = 5" in (tmp_path / "camera.toml").read_text()
+    assert read_camera(tmp_path / "camera.toml") == one
+    with pytest.raises(ValueError, match="phase_dn is 6, must be below step_dn = 6"):
+        effect("quantisation", step_dn=6.0, phase_dn=6)
+    with pytest.raises(ValueError, match="phase_dn"):
+        effect("quantisation", step_dn=6.0, phase_dn=-1)
+    beyond = effect("quantisation", step_dn=20000.0, phase_dn=17000)
+    with pytest.raises(ValueError, match="phase_dn is 17000, must be at most white_level = 16383"):
+        camera(beyond)
 
 
 @pytest.mark.parametrize("rms", [0.1, 0.5, 1.0])

@@ -48,7 +48,13 @@ STRONG: dict[str, tuple[dict[str, object], ...]] = {
     "impulse": ({"mean_dn": 3000.0},),
     "periodic_noise": ({"amplitude_dn": 30.0}, {"amplitude_dn": 30.0, "frequency": (0, 0.2)}),
     "pink_noise": ({"sigma_dn": 20.0},),
-    "quantisation": ({"step_dn": 2.5}, {"step_dn": 30.0}, {"step_dn": 100.0}),
+    "quantisation": (
+        {"step_dn": 2.5},
+        {"step_dn": 30.0},
+        {"step_dn": 100.0},
+        {"step_dn": 6.0, "phase_dn": 5},
+        {"step_dn": 30.0, "phase_dn": 17},
+    ),
     "readout_memory": ({"fraction": 0.8}, {"fraction": 0.8, "lag_pixels": 1, "along": "columns"}),
     "row_banding": ({"sigma_dn": 20.0}, {"sigma_dn": 20.0, "length_rows": 20.0}),
     "rts": (

@@ -1,12 +1,14 @@
 """Promise: measures of codes are exact, and what frames cannot tell is said to be unknown."""
 
+from functools import reduce
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dsis.cfa import Cfa
-from dsis.measures import Accumulator, measure, measure_exposure
+from dsis.measures import Accumulator, Codes, Lattice, measure, measure_exposure
 from stacks import SIGMA, Z_MAX, noise, one, recorded
 
 
@@ -16,6 +18,31 @@ class TestCodes:
     def test_spacing_is_exact(self, step: int, offset: int) -> None:
         codes = step * recorded(300 + noise(3, 20, 20)) + offset
         assert measure(codes.astype(np.float32))["code_spacing"].value == step
+
+    @given(step=st.integers(2, 64), offset=st.integers(0, 40))
+    @settings(max_examples=20, deadline=None)
+    def test_all_codes_lie_on_the_lattice(self, step: int, offset: int) -> None:
+        """Of few codes the step may be a multiple; that of several places together is exact."""
+        codes = step * recorded(300 + noise(3, 20, 20)) + offset
+        few = [Codes.of(int(c), np.array([1])) for c in np.unique(codes)]
+        few.append(Codes.of(offset, np.bincount([0, 0, 4 * step])))
+        places = [own.lattice for own in few]
+        assert all(own is not None for own in places)
+        lattice = reduce(Lattice.joined, places)
+        assert (lattice.step, lattice.phase(step)) == (step, offset % step)
+        assert (codes % step == lattice.phase(step)).all()
+
+    @pytest.mark.parametrize(("step", "phase"), [(1, 0), (6, 5), (7, 0), (8, 3)])
+    def test_coarse_codes_are_clipped_at_the_steps_next_to_the_ends(
+        self, step: int, phase: int
+    ) -> None:
+        draws = np.random.default_rng(step).normal(0, 3 * step, (4, 32, 32))
+        for level in (0.0, 255.0):
+            steps = np.rint((level + draws - phase) / step)
+            codes = phase + step * np.clip(steps, 0, (255 - phase) // step)
+            channel = one(codes, white_level=255.0, lowest_code=0.0)
+            low, high = (codes == phase).mean(), (codes == codes.max()).mean()
+            assert (channel.clipped_low, channel.clipped_high) == ((0, high) if level else (low, 0))
 
     def test_random_code_widths(self) -> None:
         """Edges of codes moved so that widths scatter by 5 %: what the measure must return."""

@@ -48,6 +48,31 @@ def test_rounding_is_undone(mean: float, sigma: float) -> None:
     assert stretch > 0
 
 
+@given(
+    step=st.integers(2, 40),
+    part=st.floats(0, 1, exclude_max=True),
+    mean=st.floats(0.0, 300.0),
+    sigma=st.floats(0.35, 1.5),
+)
+def test_coarse_rounding_from_any_phase_is_the_law_of_its_codes(
+    step: int, part: float, mean: float, sigma: float
+) -> None:
+    """By scipy.stats, at the ends too; undone where a mean is within."""
+    phase, sd = int(part * step), sigma * step
+    codes = np.arange(phase, 256, step)
+    below = norm.cdf(codes[:-1] + step / 2, mean, sd)
+    share = np.diff(np.concatenate([[0.0], below, [1.0]]))
+    level = float(share @ codes)
+    variance = float(share @ (codes - level) ** 2)
+    shift, added = rounded(mean, sd**2, 255, step, phase)
+    assert mean + shift == pytest.approx(level, abs=1e-6 * step)
+    assert sd**2 + added == pytest.approx(variance, abs=1e-6 * step**2)
+    if 7 * sd < mean < 255 - 7 * sd:
+        back, before, _ = unrounded(level, variance, 255, step, phase)
+        assert back == pytest.approx(mean, abs=1e-5 * step)
+        assert before == pytest.approx(sd**2, rel=1e-5)
+
+
 @pytest.mark.parametrize(("mean", "sigma"), [(48.243, 0.25), (48.4, 0.3), (48.0, 0.8)])
 def test_errors_of_few_codes_are_those_of_repeated_samples(mean: float, sigma: float) -> None:
     """Spread of what is undone, over that of a normal variate of the recorded variance."""

@@ -93,6 +93,26 @@ def test_cells_cover_the_line(kind: str) -> None:
     assert cells.plain == (kind == "quantisation")
 
 
+@pytest.mark.parametrize(("step", "phase"), [(2, 1), (6, 5), (6, 0), (7, 3), (64, 63)])
+def test_codes_from_a_phase_on_have_all_the_mass(step: int, phase: int) -> None:
+    """Cells reach half a step to both sides, and at the ends as far as signals do."""
+    model = camera(registry()["quantisation"](step_dn=float(step), phase_dn=phase), black=64.3)
+    cells = cells_of(model, 1)
+    codes = np.arange(phase, 4096, step)
+    np.testing.assert_array_equal(cells.occurring, codes)
+    lower, upper = cells.lower_dn[codes] + 64.3, cells.upper_dn[codes] + 64.3
+    np.testing.assert_allclose(lower[1:], codes[1:] - step / 2, atol=1 / 16)
+    np.testing.assert_allclose(upper[:-1], codes[:-1] + step / 2, atol=1 / 16)
+    assert (np.diff(cells.lower_dn) >= 0).all()
+    assert (np.diff(cells.upper_dn) >= 0).all()
+    assert cells.step_dn == pytest.approx(step, abs=1 / 16)
+    for level, sd in ((64.3, 0.5 * step), (phase + 0.2 * step, step), (1000.0, 0.4 * step)):
+        edges = np.concatenate([[-np.inf], codes[:-1] + step / 2, [np.inf]])
+        mean = float(np.diff(scipy.stats.norm.cdf(edges, level, sd)) @ codes)
+        found = cells.centre(mean - 64.3, sd) + 64.3
+        assert found == pytest.approx(level, abs=1 / 16 + 2e-3 * step)
+
+
 def test_a_law_learned_from_normal_draws_is_normal() -> None:
     draws = np.random.default_rng(2).standard_normal(50_000)
     u = np.linspace(-7, 7, 200)

@@ -11,6 +11,7 @@ from analysis.photon_transfer.levels import levels_of
 from analysis.photon_transfer.lines import line_through
 from analysis.photon_transfer.segments import fit_segments
 from analysis.photon_transfer.statistics import expose_statistics
+from dsis.camera import camera_values
 from dsis.cfa import Cfa
 from dsis.effects import registry
 from dsis.measures import measure_exposure
@@ -101,6 +102,23 @@ def test_the_black_levels_error_is_in_the_intercept(black_se: float) -> None:
     added = moved.intercept_se_dn2**2 - plain.intercept_se_dn2**2
     assert added == pytest.approx((2.18 * black_se) ** 2, rel=1e-3)
     assert moved.slope_se_dn == pytest.approx(plain.slope_se_dn, rel=1e-3)
+
+
+@pytest.mark.parametrize(("step", "phase"), [(6, 5), (3, 0)])
+def test_codes_in_steps_from_a_phase_on(step: int, phase: int) -> None:
+    """Their step is measured; its square over 12 is no read noise, their phase no black level."""
+    made = camera((None, 1.7, 30.0), white_level=16383.0)
+    recording = record(made, 6, levels=(*LEVELS_DN, 15000.0))
+    stepped = tuple(
+        replace(e, stack=(np.rint((e.stack - phase) / step) * step + phase).astype(np.uint16))
+        for e in recording.exposures
+    )
+    fit = fit_camera(replace(recording, exposures=stepped))
+    found = camera_values(fit.camera)["effect"][-1]
+    expected = {"kind": "quantisation", "step_dn": float(step), "phase_dn": phase}
+    assert found == {name: value for name, value in expected.items() if value}
+    for name, z in misses(fit, made).items():
+        assert abs(z) < Z_MAX, name
 
 
 def test_codes_in_steps_that_do_not_reach_the_white_level() -> None:

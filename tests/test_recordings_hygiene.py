@@ -57,3 +57,10 @@ class TestHygiene:
     def test_left_aligned_codes(self, tmp_path: Path) -> None:
         (says,) = self.remarks(tmp_path, f=[codes & ~np.uint16(15) for codes in frames_of(2)])
         assert "multiples of 16" in says
+
+    def test_codes_that_are_no_multiples_of_their_step(self, tmp_path: Path) -> None:
+        coarse = [(6 * (codes // 6) + 5).astype(np.uint16) for codes in frames_of(2)]
+        (says,) = self.remarks(tmp_path / "6", f=coarse)
+        assert "all codes are 5 and multiples of 6" in says
+        few = [np.where(codes % 2, 64, 2064).astype(np.uint16) for codes in frames_of(2)]
+        assert not any("multiples" in r for r in self.remarks(tmp_path / "two", f=few))

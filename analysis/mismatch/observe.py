@@ -21,7 +21,7 @@ from analysis.mismatch.layout import Layout, Place, Taken
 from analysis.mismatch.scenes import Local
 from analysis.mismatch.summed import ChannelSums, Looked, SensorSums, measure
 from analysis.mismatch.touches import RECORDED, SPECTRA, SPIKES
-from dsis.measures import Channel, Measured
+from dsis.measures import Channel, Lattice, Measured
 from dsis.recording.ahead import in_order
 
 Array = NDArray[np.float64]
@@ -91,6 +91,8 @@ class Observation:
         The same as `levels` of scenes: by exposure and channel, and in bins of signal.
     carried
         Kept on demand: samples and those read before, by axis, of each exposure.
+    lattices
+        Where the codes lie that occur, by exposure and channel, clipped ends left out.
     """
 
     levels: Mapping[Place, Level]
@@ -102,6 +104,7 @@ class Observation:
     common: Mapping[str, Mapping[str, Number]] = field(default_factory=dict)
     local: Mapping[Place, Level] = field(default_factory=dict)
     carried: Mapping[str, tuple[Samples, ...]] = field(default_factory=dict)
+    lattices: Mapping[Place, Lattice] = field(default_factory=dict)
 
     def level(self, place: Place) -> Level | None:
         """Return mean and variance at a place, of a scene or not; None: it is none."""
@@ -176,6 +179,7 @@ def observing(
     """Observe as `observe` does, and pause whenever an exposure of uniform light was looked at."""
     levels: dict[Place, Level] = {}
     found: dict[Place, Mapping[str, Number]] = {}
+    lattices: dict[Place, Lattice] = {}
     sums: dict[str, ChannelSums] = {}
     whole = SensorSums(layout, samples=kept.images and kept.samples, made=kept.made)
 
@@ -190,6 +194,7 @@ def observing(
         measured, frames = one.measured, one.frames
         still = {name for name in layout.channels if (one.exposure, name) in layout.still}
         whole.add(one, still=bool(still))
+        lattices |= _lattices(one.exposure, measured)
         if watch is not None:
             watch(one.exposure, measured)
         for name, channel in measured.channels.items():
@@ -220,7 +225,15 @@ def observing(
         whole.common,
         local,
         whole.memory.samples,
+        lattices,
     )
+
+
+def _lattices(exposure: str, measured: Measured) -> dict[Place, Lattice]:
+    """Return where the codes of each channel lie, if there are any."""
+    codes = {name: channel.codes for name, channel in measured.channels.items()}
+    own = {(exposure, name): one.lattice for name, one in codes.items() if one is not None}
+    return {place: lattice for place, lattice in own.items() if lattice is not None}
 
 
 def _pooled(

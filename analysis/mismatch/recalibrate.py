@@ -99,7 +99,7 @@ def calibrate(
     start = camera.black_level - layout.black_dn
     slopes = [s.slope for s in camera.noise.segment]
     spiky = _spiky(seen.levels)
-    undone = _undone(layout, seen.levels, code_step(camera), spiky=spiky)
+    undone = _undone(layout, seen.levels, codes_of(camera), spiky=spiky)
     bending = spiky or bends(camera.effect)
     effects = near.bent if near is not None and bending else Offsets()
     known = near is not None and _bends_alike(near, camera, spiky=spiky)
@@ -225,7 +225,13 @@ def signals_of(layout: Layout, fit: BaseFit) -> dict[str, Sites]:
 
 def code_step(camera: Camera) -> float:
     """Return the step between codes, DN: coarser than 1 where the camera quantises."""
-    return max((e.step_dn for e in camera.effect if isinstance(e, Quantisation)), default=1.0)
+    return codes_of(camera)[0]
+
+
+def codes_of(camera: Camera) -> tuple[float, float]:
+    """Return the step between codes and the lowest code, its phase, DN: 1 and 0, or coarser."""
+    own = [(e.step_dn, float(e.phase_dn)) for e in camera.effect if isinstance(e, Quantisation)]
+    return max(own, key=lambda one: one[0], default=(1.0, 0.0))
 
 
 def _spiky(levels: Mapping[Place, Level]) -> bool:
@@ -234,17 +240,20 @@ def _spiky(levels: Mapping[Place, Level]) -> bool:
 
 
 def _undone(
-    layout: Layout, levels: Mapping[Place, Level], step_dn: float, *, spiky: bool
+    layout: Layout, levels: Mapping[Place, Level], codes: tuple[float, float], *, spiky: bool
 ) -> Offsets:
-    """Return what rounding added to the recorded levels and variances, by undoing it."""
+    """Return what rounding added to the recorded levels and variances, by undoing it.
+
+    `codes` are step and phase, see `codes_of`.
+    """
     shift, added, stretch, bulk = {}, {}, {}, {}
     for place, level in levels.items():
         mean = level.level_dn + layout.black_dn
-        before, variance, slope = unrounded(mean, level.variance_dn2, layout.white_dn, step_dn)
+        before, variance, slope = unrounded(mean, level.variance_dn2, layout.white_dn, *codes)
         shift[place], added[place] = mean - before, level.variance_dn2 - variance
         stretch[place] = slope
         if spiky:
-            many = unrounded(mean, level.bulk_dn2, layout.white_dn, step_dn)
+            many = unrounded(mean, level.bulk_dn2, layout.white_dn, *codes)
             shift[place], bulk[place], stretch[place] = (
                 mean - many[0], level.bulk_dn2 - many[1], many[2]
             )  # fmt: skip
@@ -260,7 +269,7 @@ def _rounding(model: Model, layout: Layout, fit: BaseFit, *, spiky: bool) -> Off
             line = float(fit.line_dn2(np.array([signal]))[0])
             mean = layout.black_dn + fit.black_dn[channel] + signal
             level[e.name, channel], variance[e.name, channel] = rounded(
-                mean, line, layout.white_dn, code_step(model.camera)
+                mean, line, layout.white_dn, *codes_of(model.camera)
             )
     return Offsets(level, variance, bulk_dn2=variance if spiky else {})
 

@@ -14,14 +14,19 @@ _NARROW = (0.08, 0.12, 0.17, 0.24, 0.34, 0.48)  # standard deviations, codes
 
 
 def rounded(
-    mean_dn: float, variance_dn2: float, white_dn: float, step_dn: float = 1.0
+    mean_dn: float,
+    variance_dn2: float,
+    white_dn: float,
+    step_dn: float = 1.0,
+    phase_dn: float = 0.0,
 ) -> tuple[float, float]:
-    """Return what rounding to codes 0, step .. white and clipping add to mean and variance.
+    """Return what rounding to codes and clipping add to mean and variance, DN and DN^2.
 
-    DN and DN^2.
+    The codes are phase, phase + step .. up to white; 0 <= phase < step.
     """
     if step_dn != 1:
-        shift, added = rounded(mean_dn / step_dn, variance_dn2 / step_dn**2, white_dn // step_dn)
+        mean, last = (mean_dn - phase_dn) / step_dn, (white_dn - phase_dn) // step_dn
+        shift, added = rounded(mean, variance_dn2 / step_dn**2, last)
         return shift * step_dn, added * step_dn**2
     sigma = max(variance_dn2, 1e-12) ** 0.5
     inside = _REACH * sigma < mean_dn < white_dn - _REACH * sigma
@@ -29,7 +34,7 @@ def rounded(
         return 0.0, 1 / 12
     codes, share = _codes(mean_dn, sigma, white_dn)
     if codes.size < 2:
-        return float(codes[0] - mean_dn) if codes.size else 0.0, -variance_dn2
+        return float(codes[0] - mean_dn), -variance_dn2
     mean = float((share * codes).sum())
     variance = float((share * (codes - mean) ** 2).sum())
     return mean - mean_dn, variance - max(variance_dn2, 0.0)
@@ -37,8 +42,9 @@ def rounded(
 
 def _codes(mean_dn: float, sigma_dn: float, white_dn: float) -> tuple[Array, Array]:
     """Return the codes that occur, and the share of samples that each has."""
-    low = max(int(np.floor(mean_dn - _REACH * sigma_dn)) - 1, 0)
-    high = min(int(np.ceil(mean_dn + _REACH * sigma_dn)) + 1, int(white_dn))
+    last = int(white_dn)
+    low = min(max(int(np.floor(mean_dn - _REACH * sigma_dn)) - 1, 0), last)
+    high = max(min(int(np.ceil(mean_dn + _REACH * sigma_dn)) + 1, last), 0)
     if high - low > 4096:  # far wider than a code: only the ends matter
         codes = np.unique(np.linspace(low, high, 4097).round())
     else:
@@ -49,7 +55,11 @@ def _codes(mean_dn: float, sigma_dn: float, white_dn: float) -> tuple[Array, Arr
 
 
 def unrounded(
-    mean_dn: float, variance_dn2: float, white_dn: float, step_dn: float = 1.0
+    mean_dn: float,
+    variance_dn2: float,
+    white_dn: float,
+    step_dn: float = 1.0,
+    phase_dn: float = 0.0,
 ) -> tuple[float, float, float]:
     """Return the mean and the variance before rounding, and by how much its error grows.
 
@@ -59,10 +69,9 @@ def unrounded(
     variance comes back as recorded, and the third is infinite.
     """
     if step_dn != 1:
-        before, variance, grown = unrounded(
-            mean_dn / step_dn, variance_dn2 / step_dn**2, white_dn // step_dn
-        )
-        return before * step_dn, variance * step_dn**2, grown
+        mean, last = (mean_dn - phase_dn) / step_dn, (white_dn - phase_dn) // step_dn
+        before, variance, grown = unrounded(mean, variance_dn2 / step_dn**2, last)
+        return before * step_dn + phase_dn, variance * step_dn**2, grown
     if variance_dn2 > 4 * _WIDE**2 and variance_dn2**0.5 * _REACH < mean_dn:
         return mean_dn, variance_dn2 - 1 / 12, 1.0
     if variance_dn2 <= 1e-4:

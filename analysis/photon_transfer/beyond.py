@@ -1,7 +1,7 @@
 """Physics beyond the affine model that photon transfer measures anyway, as effects of a camera."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from pydantic import ValidationError
@@ -17,7 +17,7 @@ LEAST_Z = 3.0  # standard errors from which a growth is taken for real
 
 @dataclass(frozen=True)
 class FittedEffect:
-    """One effect of one parameter, in the unit that the parameter's name says.
+    """One effect of one fitted parameter, in the unit that the parameter's name says.
 
     Attributes
     ----------
@@ -25,18 +25,21 @@ class FittedEffect:
         Names of the vocabulary of physics.
     value, standard_error
         Over all channels; the error is 0 where the value is a count.
+    beside
+        Further parameters, counts too.
     """
 
     kind: str
     parameter: str
     value: float
     standard_error: float
+    beside: Mapping[str, int] = field(default_factory=dict)
 
     @property
     def effect(self) -> Effect:
         """The link of a camera's chain; raises `InputError` where no sensor is like that."""
         try:
-            return registry()[self.kind].model_validate({self.parameter: self.value})
+            return registry()[self.kind].model_validate({self.parameter: self.value, **self.beside})
         except ValidationError as error:
             fact = f"was measured as {self.value:.4g}: {error.errors()[0]['msg'].lower()}; are the "
             fact += "flats lit all over, and is cfa right?"
@@ -44,7 +47,7 @@ class FittedEffect:
 
 
 def effects_of(
-    current: FittedEffect | None, patterns: FixedPatterns, step_dn: int
+    current: FittedEffect | None, patterns: FixedPatterns, step_dn: int, phase_dn: int = 0
 ) -> tuple[FittedEffect, ...]:
     """Return dark current, fixed patterns by their parts and coarse codes, as far as certain.
 
@@ -56,6 +59,8 @@ def effects_of(
         Of darks and of gains; the channels' variances are pooled.
     step_dn
         Greatest common step of the codes, DN.
+    phase_dn
+        The lowest code on it, DN.
     """
     dark, gain = list(patterns.dark.values()), list(patterns.gain.values())
     found = [
@@ -65,9 +70,14 @@ def effects_of(
         _part("column_fpn", "sigma_dn", [p.column for p in dark], shared=True),
         _part("prnu", "sigma_percent", [p.pixel for p in gain], scale=100.0),
         _shading(patterns.falloff),
-        FittedEffect("quantisation", "step_dn", float(step_dn), 0.0) if step_dn > 1 else None,
+        _coarse(step_dn, phase_dn) if step_dn > 1 else None,
     ]
     return tuple(effect for effect in found if effect is not None)
+
+
+def _coarse(step_dn: int, phase_dn: int) -> FittedEffect:
+    beside = {"phase_dn": phase_dn} if phase_dn else {}
+    return FittedEffect("quantisation", "step_dn", float(step_dn), 0.0, beside)
 
 
 def pooled_current(darks: Mapping[str, DarkLine | None]) -> FittedEffect | None:

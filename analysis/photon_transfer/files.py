@@ -78,7 +78,9 @@ def camera_text(fit: Fit, origin: str = "") -> str:
             "(95 %); upper_dn is the middle"
         )
     comments += [
-        f"{e.kind}.{e.parameter} = {e.value:.6g} +- {e.standard_error:.2g}" for e in fit.effects
+        f"{e.kind}.{e.parameter} = {e.value:.6g} +- {e.standard_error:.2g}"
+        + "".join(f", {name} = {value}" for name, value in e.beside.items())
+        for e in fit.effects
     ]
     comments += fit.remarks
     head = "".join(f"# {line}\n" for line in comments)

@@ -194,11 +194,11 @@ def fit_camera(
     """
     remarks: list[str] = []
     measured, inspection, sums = _measured(recording, threads, progress)
-    step = inspection.step_dn()
+    step, phase = inspection.step_dn(), inspection.phase_dn()
     remarks += _remarks_on_frames(recording, inspection, step)
     names = list(dict.fromkeys(np.ravel(channel_names(recording.sensor.cfa)).tolist()))
-    darks = {name: dark_of(measured, name, step) for name in names}
-    levels = levels_of(measured, darks, recording.sensor.black_level, step)
+    darks = {name: dark_of(measured, name, step, phase) for name in names}
+    levels = levels_of(measured, darks, recording.sensor.black_level, step, phase)
     saturation = saturation_of(levels)
     levels = leave_out(levels, saturation, remarks)
     sums.without(recording, {v.statistics.exposure for v in levels if v.left_out})
@@ -244,7 +244,7 @@ def fit_camera(
         full_well_means=full_means,
         quantities=model_figures(found, full, full_means),
         distribution=noise_distribution(recording, _chosen(distribution_of, used, recording)),
-        effects=effects_of(current, patterns, step),
+        effects=effects_of(current, patterns, step, phase),
         maps=patterns.maps,
         remarks=tuple(dict.fromkeys(remarks)),
     )
@@ -272,7 +272,7 @@ def _measured(
     """
     white = float(recording.sensor.white_level)
     measured, inspection, sums = _pass(recording, white, threads, progress)
-    short = white % inspection.step_dn()
+    short = (white - inspection.phase_dn()) % inspection.step_dn()
     return _pass(recording, white - short, threads, None) if short else (measured, inspection, sums)
 
 

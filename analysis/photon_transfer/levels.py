@@ -57,7 +57,9 @@ def useless(s: LevelStatistics) -> str:
     return next((why for holds, why in reasons if holds), "")
 
 
-def dark_of(measured: Sequence[LevelStatistics], channel: str, step_dn: int = 1) -> DarkLine | None:
+def dark_of(
+    measured: Sequence[LevelStatistics], channel: str, step_dn: int = 1, phase_dn: int = 0
+) -> DarkLine | None:
     """Return the black level of one channel, from the darks that are not clipped at code 0."""
     usable = [
         s
@@ -69,7 +71,13 @@ def dark_of(measured: Sequence[LevelStatistics], channel: str, step_dn: int = 1)
     times, levels, errors, hidden = [], [], [], False
     for s in usable:
         plain = unrounded(
-            s.level_dn, s.level_se_dn, s.variance_dn2, s.variance_se_dn2, s.fixed_dn2, step_dn
+            s.level_dn,
+            s.level_se_dn,
+            s.variance_dn2,
+            s.variance_se_dn2,
+            s.fixed_dn2,
+            step_dn,
+            phase_dn,
         )
         hidden |= not plain.recovered
         # A frame offset that wanders moves the mean more than the pixels' noise does.
@@ -90,13 +98,14 @@ def levels_of(
     darks: dict[str, DarkLine | None],
     nominal_dn: float,
     step_dn: int = 1,
+    phase_dn: int = 0,
 ) -> list[FittedLevel]:
     """Return every measured level above black and before rounding, with why it is of no use."""
     levels = []
     for s in measured:
         dark, why = darks[s.channel], useless(s)
         numbers = (s.level_dn, s.level_se_dn, s.variance_dn2, s.variance_se_dn2)
-        plain = as_coded(*numbers) if why else unrounded(*numbers, s.fixed_dn2, step_dn)
+        plain = as_coded(*numbers) if why else unrounded(*numbers, s.fixed_dn2, step_dn, phase_dn)
         if not why and not plain.recovered:
             why = "its noise is too small beside one code to be recovered from rounding"
         x = plain.level_dn - (dark.black_dn if dark else nominal_dn)

@@ -56,6 +56,7 @@ def unrounded(
     variance_se_dn2: float,
     fixed_dn2: float = 0.0,
     step_dn: int = 1,
+    phase_dn: int = 0,
 ) -> Unrounded:
     """Return level and variance before rounding; `recovered` is false where codes hide the noise.
 
@@ -67,14 +68,17 @@ def unrounded(
         Variance of the pixels' fixed offsets.
     step_dn
         Step between codes: rounding adds its square over 12.
+    phase_dn
+        The lowest of them, below the step.
     """
     if step_dn > 1:
         k, k2 = step_dn, step_dn**2
+        level = (level_dn - phase_dn) / k
         one = unrounded(
-            level_dn / k, level_se_dn / k, variance_dn2 / k2, variance_se_dn2 / k2, fixed_dn2 / k2
+            level, level_se_dn / k, variance_dn2 / k2, variance_se_dn2 / k2, fixed_dn2 / k2
         )
         return Unrounded(
-            one.level_dn * k,
+            one.level_dn * k + phase_dn,
             one.level_se_dn * k,
             one.variance_dn2 * k2,
             one.variance_se_dn2 * k2,

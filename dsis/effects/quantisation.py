@@ -1,24 +1,28 @@
 """Quantisation: codes coarser than one DN."""
 
 from collections.abc import Mapping
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
-from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, Stage
+from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, ReadOut, Stage
 
 
 class Quantisation(Effect):
-    """Codes come in steps: only whole multiples of a whole step occur, at both ends too.
+    """Codes come in steps: only phase + n step occur, n = 0, 1 .., at both ends too.
 
-    c = step min(round((v + black) / step), floor(white / step)); the converter then rounds what a
-    fractional step gives to whole codes. Where the noise is wider than half a step the variance
-    grows by (step^2 - 1) / 12, the finer rounding to whole codes having been there before.
+    c = phase + step min(round((v + black - phase) / step), floor((white - phase) / step)), no code
+    below the phase; the converter then rounds what a fractional step gives to whole codes. The
+    phase is 0 where codes are multiples of the step, and another where black, from which steps were
+    counted, is none. It is below the step and alike in all channels. Where the noise is wider than
+    half a step the variance grows by (step^2 - 1) / 12, the finer rounding to whole codes having
+    been there before.
     """
 
     kind: Literal["quantisation"] = "quantisation"
     step_dn: Annotated[float, Field(ge=1, examples=[4.0])]
+    phase_dn: Annotated[int, Field(ge=0)] = 0
 
     stage: ClassVar[Stage] = Stage.CODE
     rank: ClassVar[int] = 60
@@ -39,12 +43,35 @@ class Quantisation(Effect):
         "Every moment of narrow noise: judge codes first. adc_dnl uses all codes, unequally."
     )
 
+    @model_validator(mode="after")
+    def _within_a_step(self) -> Self:
+        if self.phase_dn >= self.step_dn:
+            message = f"phase_dn is {self.phase_dn}, must be below step_dn = {self.step_dn:g}"
+            raise ValueError(message)
+        return self
+
+    @model_serializer(mode="wrap")
+    def _without_no_phase(self, values_of: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Return the fields; multiples of the step are written as ever, without their phase."""
+        values = dict(values_of(self))
+        if not self.phase_dn:
+            values.pop("phase_dn", None)
+        return values
+
+    def unfit_for(self, read_out: ReadOut) -> str:
+        """Return why a camera cannot have this effect: no code is as large as its phase."""
+        white = read_out.white_level_dn
+        if self.phase_dn <= white:
+            return ""
+        return f"phase_dn is {self.phase_dn}, must be at most white_level = {white:g}"
+
     def apply(self, image: Image, exposure: Exposure) -> Image:
-        """Round to whole steps, none of them above the white level."""
+        """Round to whole steps from the phase on, none of them above the white level."""
         black, step = np.float32(exposure.read_out.black_level_dn), np.float32(self.step_dn)
-        top = np.float32(exposure.read_out.white_level_dn // self.step_dn)
-        codes: Image = step * np.minimum(np.rint((image + black) / step), top)
-        return codes - black
+        phase = np.float32(self.phase_dn)
+        top = np.float32((exposure.read_out.white_level_dn - self.phase_dn) // self.step_dn)
+        codes: Image = step * np.clip(np.rint((image + black - phase) / step), np.float32(0), top)
+        return codes + phase - black
 
     def contributions(self, point: OperatingPoint) -> Mapping[str, float]:
         """Return Sheppard's variance, where it holds, and the spacing of whole steps."""

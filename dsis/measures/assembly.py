@@ -229,6 +229,8 @@ def _channel(
         **_correlations(sums, still, FIXED_CORRELATION_LAGS),
     }
     low, high = sums.lowest_code, sums.white_level
+    if codes and low is not None and high is not None:
+        low, high = codes.ends(low, high)
     return Channel(
         {name: estimates[name] for name in MEASURES},
         one.moments.kurtosis_within_pixels(),

@@ -22,9 +22,34 @@ from dsis.measures.spikes import variance_of_quartiles, without_spikes
 
 LOWEST_CODE, CODES = -(2**16), 2**18  # the first code counted, and how many
 LEAST_SIGMA_STEPS = 2.0  # below, noise does not smooth the density: no code width can be told
+_LEAST_CODES = 4  # whose common step is larger by chance once in 8 times, much larger hardly ever
 _LEAK = 1e-7  # of the smooth density's power is let into the band
 _REMEMBERED = 4096  # transforms up to this size keep their bands: 17 MB at most
 _LEAST_DOF, _NODES = 4.0, 20
+
+
+@dataclass(frozen=True)
+class Lattice:
+    """Codes from one to the next of which there are whole steps.
+
+    Attributes
+    ----------
+    code
+        One of them, DN.
+    step
+        The greatest that all their differences are multiples of, DN, at least 1; 0: one code only.
+    """
+
+    code: int
+    step: int
+
+    def joined(self, other: "Lattice") -> "Lattice":
+        """Return that of the codes of both."""
+        return Lattice(self.code, math.gcd(self.step, other.step, self.code - other.code))
+
+    def phase(self, step: int) -> int:
+        """Return what codes leave when divided by a step that their own is a multiple of, DN."""
+        return self.code % step
 
 
 class CodeCounts:
@@ -106,6 +131,17 @@ class Codes:
         """Return the share of samples at or above a code."""
         return float(self.counts[max(int(code) - self.lowest, 0) :].sum() / self.total)
 
+    def ends(self, lowest: float, highest: float) -> tuple[float, float]:
+        """Return the first and the last code that a converter of these ends can give, DN.
+
+        Those of its steps, which need not reach either end; of few codes steps are not known.
+        """
+        own = self.lattice
+        if own is None or own.step <= 1 or self._inner.size < _LEAST_CODES:
+            return lowest, highest
+        first = lowest + (own.code - lowest) % own.step
+        return first, highest - (highest - own.code) % own.step
+
     def spacing(self) -> Estimate:
         """Return the greatest common step of the codes that occur, DN.
 
@@ -115,13 +151,25 @@ class Codes:
         return self._spacing
 
     @cached_property
-    def _spacing(self) -> Estimate:
+    def lattice(self) -> Lattice | None:
+        """Where the codes lie that `spacing` looks at; None: there is none."""
+        used = self._inner
+        if not used.size:
+            return None
+        return Lattice(self.lowest + int(used[0]), int(np.gcd.reduce(np.diff(used))))
+
+    @cached_property
+    def _inner(self) -> NDArray[np.intp]:
+        """Places of the codes that occur, without ends that may be clipped off the lattice."""
         used = np.flatnonzero(self.counts)
-        if self._clipped:
-            used = used[1:-1]
-        if used.size < 2:
+        return used[1:-1] if self._clipped else used
+
+    @cached_property
+    def _spacing(self) -> Estimate:
+        used = self._inner
+        if used.size < 2 or self.lattice is None:
             return unknown(1.0)
-        step = int(np.gcd.reduce(np.diff(used)))
+        step = self.lattice.step
         chance = (step * 2.0 ** (-min(used.size, 80) / 2)) ** 2
         return estimate(step, chance, 1.0, chance)
 

@@ -47,7 +47,8 @@ class Channel:
     codes
         Histogram of codes, DN as recorded; None where values are not whole.
     clipped_low, clipped_high
-        Share of samples at or beyond the lowest code and the white level; nan where unknown.
+        Share of samples at or beyond the lowest code and the white level, or the steps next to
+        them where codes are coarse; nan where unknown.
     """
 
     estimates: Mapping[str, Estimate]

@@ -3,6 +3,7 @@
 Nothing here refuses a recording; each remark states a limit of what it can show.
 """
 
+import math
 import zlib
 from collections import defaultdict
 from collections.abc import Sequence
@@ -18,6 +19,9 @@ from dsis.compiled import kernel
 CLIPPED_SHARE = 1e-4
 """Share of clipped pixels above which mean and variance of an exposure are biased noticeably."""
 
+_FIRST = 4096  # samples of a frame, which tell that codes are ordinary
+_LEAST_STEPS = 4  # that all codes reach over: of fewer no step is told
+
 
 class Planned(Protocol):
     """What the remarks need to know of an exposure."""
@@ -30,10 +34,11 @@ class Planned(Protocol):
 
 @dataclass(frozen=True)
 class FrameSummary:
-    """One frame in a few numbers: code sum, least and largest code, clipped counts, common bits.
+    """One frame in a few numbers: code sum, least and largest code, clipped counts, common step.
 
     `checksum` is CRC-32 of the codes: with the sum, which alone spreads over thousands of values,
-    1000 frames of noise hold two that only seem alike once in ten million recordings.
+    1000 frames of noise hold two that only seem alike once in ten million recordings. `step` is the
+    greatest that all differences of codes are multiples of; 0 where there is one code.
     """
 
     total: int
@@ -41,7 +46,7 @@ class FrameSummary:
     largest: int
     at_zero: int
     at_white: int
-    bits: int
+    step: int
     size: int
     checksum: int
 
@@ -68,8 +73,9 @@ class Inspection:
         """Take note of frame `index` of an exposure: uint16 (row, column)."""
         numbers = _summarise(codes.reshape(-1), np.uint16(np.ceil(self.white_level)))
         checksum = zlib.crc32(np.ascontiguousarray(codes).data)
-        total, least, largest, at_zero, at_white, bits = (int(n) for n in numbers)
-        summary = FrameSummary(total, least, largest, at_zero, at_white, bits, codes.size, checksum)
+        total, least, largest, at_zero, at_white = (int(n) for n in numbers)
+        step = _step_of(codes.reshape(-1))
+        summary = FrameSummary(total, least, largest, at_zero, at_white, step, codes.size, checksum)
         with self._lock:
             self._seen[exposure][index] = summary
 
@@ -85,10 +91,21 @@ class Inspection:
         return frozenset(name for same in self._same() for name, _ in same)
 
     def step_dn(self) -> int:
-        """Return the power of two of which all codes are multiples; 1 for ordinary codes."""
-        bits = [frame.bits for frames in self._seen.values() for frame in frames.values()]
-        common = int(np.bitwise_or.reduce(bits or [0]))
-        return max(common & -common, 1)
+        """Return the greatest step that lies between all codes; 1 for ordinary codes, or few."""
+        frames = self._frames()
+        if not frames:
+            return 1
+        least = min(frame.least for frame in frames)
+        step = math.gcd(*(one for f in frames for one in (f.step, f.least - least)))
+        reach = max(frame.largest for frame in frames) - least
+        return step if 1 < step * _LEAST_STEPS <= reach else 1
+
+    def phase_dn(self) -> int:
+        """Return what all codes leave when divided by their step: 0 for multiples of it."""
+        return min((frame.least for frame in self._frames()), default=0) % self.step_dn()
+
+    def _frames(self) -> list[FrameSummary]:
+        return [frame for frames in self._seen.values() for frame in frames.values()]
 
     def _same(self) -> list[list[tuple[str, int]]]:
         """Return the places (exposure, frame) of every frame that occurs more than once."""
@@ -107,9 +124,12 @@ class Inspection:
         )
 
     def _on_codes(self) -> list[str]:
-        if self.step_dn() <= 1:
+        step, phase = self.step_dn(), self.phase_dn()
+        if step <= 1:
             return []
-        says = f"all codes are multiples of {self.step_dn()}: left-aligned, or converted?"
+        if phase:
+            return [f"all codes are {phase} and multiples of {step}: coarser than the bit depth"]
+        says = f"all codes are multiples of {step}: left-aligned, or converted?"
         return [f"{says} Codes must be right-aligned"]
 
 
@@ -156,9 +176,9 @@ def _on_light(seen: list[tuple[Planned, list[FrameSummary]]]) -> list[str]:
 @kernel
 def _summarise(
     codes: NDArray[np.uint16], white: np.uint16
-) -> tuple[np.uint64, np.uint16, np.uint16, np.uint64, np.uint64, np.uint16]:
+) -> tuple[np.uint64, np.uint16, np.uint16, np.uint64, np.uint64]:
     total, at_zero, at_white = np.uint64(0), np.uint64(0), np.uint64(0)
-    least, largest, bits = np.uint16(65535), np.uint16(0), np.uint16(0)
+    least, largest = np.uint16(65535), np.uint16(0)
     for i in range(codes.size):
         code = codes[i]
         total += np.uint64(code)
@@ -166,5 +186,23 @@ def _summarise(
         at_white += np.uint64(code >= white)
         least = min(least, code)
         largest = max(largest, code)
-        bits |= code
-    return total, least, largest, at_zero, at_white, bits
+    return total, least, largest, at_zero, at_white
+
+
+def _step_of(codes: NDArray[np.uint16]) -> int:
+    """Return the greatest step between codes, (sample,); 0 where there is one code."""
+    step = _common_step(np.unique(codes[:_FIRST]))
+    return step if step == 1 else _common_step(np.flatnonzero(_occurring(codes)))
+
+
+def _common_step(ascending: NDArray[np.integer]) -> int:
+    return int(np.gcd.reduce(np.diff(ascending)))
+
+
+@kernel
+def _occurring(codes: NDArray[np.uint16]) -> NDArray[np.bool_]:
+    """Return whether each code 0..65535 occurs."""
+    found = np.zeros(65536, np.bool_)
+    for i in range(codes.size):
+        found[codes[i]] = True
+    return found

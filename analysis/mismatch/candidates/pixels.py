@@ -1,12 +1,15 @@
 """The law of single pixels' noise: Poisson, tails, pixels that differ or jump, spikes, codes."""
 
+from collections import Counter
 from collections.abc import Sequence
+from functools import reduce
 from math import log, sqrt
 
 import numpy as np
 
 from analysis.mismatch.candidates.candidate import Candidate, Proposal, proposals
 from analysis.mismatch.clues import Clues
+from dsis.measures import Lattice
 
 _SWITCHING = (0.35, 0.1)  # a frame: seen in the noise, and in maps of few frames too
 _QUIET = 4.0  # times the least variance: there spikes stand out
@@ -94,13 +97,25 @@ def _counted(clues: Clues, most_dn: float) -> list[tuple[float, float]]:
 
 
 def _quantisation(clues: Clues) -> Sequence[Proposal]:
+    """Propose the step and the phase of all codes; where few stray, those of most exposures."""
+    lattices = list(clues.seen.lattices.values())
+    step = reduce(Lattice.joined, lattices).step if lattices else 1
+    if step <= 1:
+        step = _step_of_most(clues)
+        lattices = [own for own in lattices if own.step % step == 0]
+    if step <= 1 or not lattices:
+        return []
+    phase = Counter(own.phase(step) for own in lattices).most_common(1)[0][0]
+    return proposals("quantisation", [], step_dn=float(step), phase_dn=phase)
+
+
+def _step_of_most(clues: Clues) -> int:
     steps = [
         2 ** clues.vector.values[i]
         for i, key in enumerate(clues.vector.keys)
         if key.statistic == "code_spacing" and clues.null.known[i]
     ]
-    step = round(float(np.median(steps))) if steps else 1
-    return proposals("quantisation", [], step_dn=float(step)) if step > 1 else []
+    return max(round(float(np.median(steps))), 1) if steps else 1
 
 
 def _dnl(clues: Clues) -> Sequence[Proposal]:

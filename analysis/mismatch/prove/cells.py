@@ -56,9 +56,14 @@ class Cells:
 
     @cached_property
     def step_dn(self) -> float:
-        """Width of the median code that occurs."""
-        width = self.upper_dn[1:-1] - self.lower_dn[1:-1]
-        return float(np.median(width[width > 0]))
+        """Width of the median code that occurs, those at the ends left out; none between: of 1."""
+        width = (self.upper_dn - self.lower_dn)[self.occurring[1:-1]]
+        return float(np.median(width)) if width.size else 1.0
+
+    @cached_property
+    def occurring(self) -> NDArray[np.intp]:
+        """The codes that occur, ascending."""
+        return np.flatnonzero(self.upper_dn > self.lower_dn)
 
     def centre(self, mean_dn: float, sd_dn: float) -> float:
         """Return the centre of normal noise whose codes have a mean, both in DN above black.
@@ -66,7 +71,8 @@ class Cells:
         Clipping and coarse codes move the mean; elsewhere it is the centre itself.
         """
         step = self.step_dn
-        ends = min(mean_dn - self.upper_dn[0], self.lower_dn[-1] - mean_dn)
+        first, last = self.occurring[[0, -1]]
+        ends = min(mean_dn - self.upper_dn[first], self.lower_dn[last] - mean_dn)
         if ends > _CLEAR * sd_dn and sd_dn > _COARSE * step:
             return mean_dn
         reach = 1.5 * step + 2.5 * sd_dn
@@ -126,10 +132,11 @@ def cells_of(camera: Camera, seed: int) -> Cells:
 
 
 def _open(lower: NDArray[np.floating], upper: NDArray[np.floating]) -> tuple[Array, Array]:
-    """Return edges whose first and last cells take all that lies beyond."""
-    occurring = np.nonzero(upper > lower)[0]
+    """Return edges, ascending, whose first and last cells take all that lies beyond."""
+    first, last = np.flatnonzero(upper > lower)[[0, -1]]
     low, high = lower.astype(np.float64), upper.astype(np.float64)
-    low[occurring[0]], high[occurring[-1]] = -_OUTER, _OUTER
+    low[: first + 1], high[:first] = -_OUTER, -_OUTER
+    low[last + 1 :], high[last:] = _OUTER, _OUTER
     return low, high
 
 

@@ -188,3 +188,13 @@ def test_the_mean_steps_where_gains_disagree() -> None:
         assert abs(stack.mean() - gain * level) < Z_MAX * 10.2 / np.sqrt(stack.size)
         variance = 100 * gain**2 + 1 / 12
         assert abs(stack.var() / variance - 1) < Z_MAX * np.sqrt(2 / stack.size)
+
+
+def test_the_mean_kinks_where_both_paths_read_the_same_at_the_switch() -> None:
+    one = effect("dual_gain_mismatch", gain_error_percent=2.0, mean="kinks")
+    for level in (900.0, 1100.0, 2000.0):
+        stack = recorded(camera(one, intercept=100, switch=1000.0), level, 20)
+        expected = level + 0.02 * max(level - 1000, 0)
+        assert abs(stack.mean() - expected) < Z_MAX * 10.2 / np.sqrt(stack.size)
+    assert one.model_dump()["mean"] == "kinks"
+    assert "mean" not in effect("dual_gain_mismatch", gain_error_percent=2.0).model_dump()

@@ -126,6 +126,8 @@ class OperatingPoint:
         Size of the recording.
     exposure_time_s
         Exposure time, s.
+    segment_from_dn
+        Signal from which on that segment is read, DN above black.
     """
 
     signal_dn: float
@@ -137,6 +139,7 @@ class OperatingPoint:
     rows: int
     columns: int
     exposure_time_s: float = 0.0
+    segment_from_dn: float = 0.0
 
     @property
     def shot_variance_dn2(self) -> float:

@@ -78,26 +78,39 @@ def skewness_below(limit: float) -> float:
 
 
 def _gain_mismatch(clues: Clues) -> Sequence[Proposal]:
-    """Start from the step of the levels at the switch; a side of one flat only has no step."""
+    """Start from what the gain does at the switch: the mean steps or kinks.
+
+    A side of one flat only has neither.
+    """
     ends = [s.upper_dn for s in clues.camera.noise.segment if s.upper_dn is not None]
     flats = {e.name for e in clues.layout.exposures if e.kind == "flat"}
-    if not ends:
+    rows = [
+        (clues.signal(place), value, sd, place[0])
+        for place, (value, sd) in clues.excess("level").items()
+        if clues.signal(place) > 0 and place[0] in flats
+    ]
+    if not (ends and rows):
         return []
-    sides: tuple[dict[str, list[float]], ...] = ({}, {})
-    for place, (value, _) in clues.excess("level").items():
-        s = clues.signal(place)
-        if s > 0 and place[0] in flats:
-            sides[int(s >= ends[0])].setdefault(place[0], []).append(value / s)
-    if any(len(side) < _LEAST_FLATS for side in sides):
+    signal, value, sd = (np.array(part) for part in list(zip(*rows, strict=True))[:3])
+    above = signal >= ends[0]
+    names = np.array([name for *_, name in rows])
+    if any(len(set(names[side].tolist())) < _LEAST_FLATS for side in (above, ~above)):
         return []
-    below, above = (float(np.median(np.concatenate(list(side.values())))) for side in sides)
-    step = 100 * (above - below)
-    return proposals(
-        "dual_gain_mismatch",
-        ["gain_error_percent"],
-        ["gain_error_percent"],
-        gain_error_percent=step or 0.1,
-    )
+    step = 100 * float(np.median((value / signal)[above]) - np.median((value / signal)[~above]))
+    bent = np.stack([np.where(above, signal - ends[0], 0.0), signal], 1) / sd[:, None]
+    kink = 100 * float(np.linalg.lstsq(bent, value / sd, rcond=None)[0][0])
+    name = "gain_error_percent"
+    found = proposals("dual_gain_mismatch", [name], [name], gain_error_percent=step or 0.1)
+    return [
+        *found,
+        *proposals(
+            "dual_gain_mismatch",
+            [name],
+            [name],
+            gain_error_percent=float(np.clip(kink, -20, 20)) or 0.1,
+            mean="kinks",
+        ),
+    ]
 
 
 CANDIDATES = (

@@ -200,10 +200,8 @@ def test_beside_white_rows_both_are_named() -> None:
 @pytest.mark.parametrize(
     ("kind", "values"),
     [
-        ("row_noise", {"sigma_dn": 0.8}),
         ("pink_noise", {"sigma_dn": 1.5}),
         ("line_flicker", {"depth_percent": 0.3, "cycles_per_frame": 2.3}),
-        ("crosstalk", {"fraction": 0.03}),
     ],
 )
 def test_what_resembles_it_is_not_it(kind: str, values: dict[str, float]) -> None:

@@ -229,19 +229,6 @@ def test_it_is_named_with_its_numbers(cfa: str, sigma: float, length: float) -> 
         assert abs(fitted.value - value) < 4 * fitted.standard_error  # type: ignore[operator] # one number
 
 
-@pytest.mark.parametrize(
-    ("kind", "values"),
-    [
-        ("prnu", {"sigma_percent": 0.5}),
-        ("shading", {"falloff_percent": 1.0, "tilt_down_percent": 0.5}),
-        ("crosstalk", {"fraction": 0.02}),
-    ],
-)
-def test_what_resembles_it_is_not_it(kind: str, values: dict[str, float]) -> None:
-    found = _found(camera(effect(kind, **values)), 10)
-    assert [one.effect for one in found.omitted_physics] == [kind]
-
-
 def test_without_its_word_nothing_else_is_named() -> None:
     true = camera(effect("smooth_prnu", sigma_percent=0.1, length_pixels=4.0))
     found = _found(true, 9, WORDS - {"smooth_prnu"})

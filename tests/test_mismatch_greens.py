@@ -5,7 +5,6 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
 
-import pytest
 from planter import Choice, draw_case, plant
 from planter.case import Effect as Planted
 
@@ -24,16 +23,13 @@ def _found(folder: Path, planted: Planted, words: frozenset[str] = WORDS) -> Fin
     return find_mismatch(camera, read_recording(folder), seed=1, vocabulary=words)
 
 
-@pytest.mark.parametrize("percent", [0.4, -0.4])
-def test_greens_that_differ_are_named_and_amplifiers_are_their_alternative(
-    tmp_path: Path, percent: float
-) -> None:
-    found = _found(tmp_path, Planted("channel_imbalance", {"gain_percent": percent}))
+def test_greens_that_differ_are_named_and_amplifiers_are_their_alternative(tmp_path: Path) -> None:
+    found = _found(tmp_path, Planted("channel_imbalance", {"gain_percent": -0.4}))
     (named,) = found.omitted_physics
     assert named.effect == "channel_imbalance"
     fitted = named.parameters["gain_percent"]
     assert isinstance(fitted.value, float)
-    assert abs(abs(fitted.value) - abs(percent)) < 3 * fitted.standard_error
+    assert abs(abs(fitted.value) - 0.4) < 3 * fitted.standard_error
     (other,) = (one for one in named.alternatives if one.effect == "tap_mismatch")
     assert other.would_settle
     assert not found.undecided

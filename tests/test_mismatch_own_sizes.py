@@ -30,7 +30,6 @@ def _found(true: Camera, model: Camera) -> Finding:
 @pytest.mark.parametrize(
     ("true", "model", "name"),
     [
-        (_prnu(1.0), _prnu(1.2), "effect.prnu.sigma_percent"),
         (_prnu(1.2), _prnu(1.0), "effect.prnu.sigma_percent"),
         (_column_fpn(1.0), _column_fpn(2.0), "effect.column_fpn.sigma_dn"),
     ],

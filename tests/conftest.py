@@ -53,14 +53,24 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     items.sort(key=lambda item: rank(item.path.name))
 
 
-def pytest_collection_finish() -> None:
-    """Exempt what libraries hold from garbage collection: some of them collect at every call."""
+def _exempt() -> None:
+    """Exempt what is held from garbage collection: some libraries collect at every call."""
     gc.collect()
     gc.freeze()
 
 
+def pytest_collection_finish() -> None:
+    _exempt()
+
+
 def pytest_sessionfinish() -> None:
     gc.unfreeze()
+
+
+@pytest.fixture(scope="module")
+def swept() -> None:
+    """Exempt what earlier tests left, too: a whole run leaves so much that each sweep is slow."""
+    _exempt()
 
 
 @pytest.fixture(scope="session")

@@ -147,6 +147,7 @@ def test_signed_rank_is_scipys_without_ties():
     assert signed_rank(values) == pytest.approx(expected)
 
 
+@pytest.mark.usefixtures("swept")
 @settings(max_examples=25)
 @given(st.lists(st.floats(0, 1), min_size=1, max_size=12))
 def test_holm_is_statsmodels(p):

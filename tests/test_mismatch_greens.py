@@ -1,11 +1,11 @@
 """Greens that differ: named as what is seen, with the amplifiers that could have made them."""
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
 
-import pytest
 from planter import Choice, draw_case, plant
 from planter.case import Effect as Planted
 
@@ -19,21 +19,20 @@ WORDS = frozenset({"channel_imbalance", "tap_mismatch", "shading", "row_fpn", "r
 
 def _found(folder: Path, planted: Planted, words: frozenset[str] = WORDS) -> Finding:
     choice = Choice(cfa="GRBG", segments=1, light=True, times="darks")
-    plant(folder, draw_case(4, "small", choice).having(planted))
+    case = draw_case(4, "small", choice)
+    few = tuple(one for one in case.exposures if one.name not in {"flat-1", "flat-3"})
+    plant(folder, replace(case, exposures=few).having(planted))
     camera = read_camera(folder / "camera.toml")
     return find_mismatch(camera, read_recording(folder), seed=1, vocabulary=words)
 
 
-@pytest.mark.parametrize("percent", [0.4, -0.4])
-def test_greens_that_differ_are_named_and_amplifiers_are_their_alternative(
-    tmp_path: Path, percent: float
-) -> None:
-    found = _found(tmp_path, Planted("channel_imbalance", {"gain_percent": percent}))
+def test_greens_that_differ_are_named_and_amplifiers_are_their_alternative(tmp_path: Path) -> None:
+    found = _found(tmp_path, Planted("channel_imbalance", {"gain_percent": -0.4}))
     (named,) = found.omitted_physics
     assert named.effect == "channel_imbalance"
     fitted = named.parameters["gain_percent"]
     assert isinstance(fitted.value, float)
-    assert abs(abs(fitted.value) - abs(percent)) < 3 * fitted.standard_error
+    assert abs(abs(fitted.value) - 0.4) < 3 * fitted.standard_error
     (other,) = (one for one in named.alternatives if one.effect == "tap_mismatch")
     assert other.would_settle
     assert not found.undecided

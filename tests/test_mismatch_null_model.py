@@ -107,6 +107,7 @@ def test_clipping_at_zero_takes_variance_away() -> None:
     assert 4 + added == pytest.approx(draws.var(), rel=5 * (3 / 400_000) ** 0.5)
 
 
+@pytest.mark.usefixtures("swept")
 @given(st.lists(st.floats(1e-9, 1), min_size=1, max_size=30))
 def test_equal_weights_are_holm_s_procedure(chances: list[float]) -> None:
     found = adjusted(np.array(chances), np.full(len(chances), 1 / len(chances)))

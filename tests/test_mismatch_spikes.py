@@ -17,12 +17,16 @@ from dsis.camera import Camera
 from dsis.cfa import Cfa
 from dsis.effects import Effect, registry
 from dsis.measures import Accumulator, Estimate
-from mismatch_recordings import camera, recorded, state_of
+from mismatch_recordings import FEW_LEVELS, camera, recorded, state_of
 
 ROWS, COLUMNS, FRAMES = 32, 48, 8
 SIGMA = 3.0
 PLACES = {"MONO": (0, 0, 1)}
 IMPULSE = registry()["impulse"](per_megapixel_frame=500.0, mean_dn=1500.0)
+RIVALS = frozenset(
+    {"impulse", "heavy_tailed_read_noise", "read_noise_spread", "rts", "hot_pixels", "dsnu", "prnu"}
+)
+"""What makes single samples or pixels stand out."""
 
 
 def _noise(rng: np.random.Generator) -> NDArray[np.float64]:
@@ -117,7 +121,8 @@ def test_a_wrong_switch_is_found_beside_spikes() -> None:
 
 
 def test_rare_spikes_are_named_alone_with_their_numbers() -> None:
-    found = find_mismatch(camera(), recorded(camera(IMPULSE), 6), seed=2)
+    recording = recorded(camera(IMPULSE), 6, levels=FEW_LEVELS)
+    found = find_mismatch(camera(), recording, seed=2, vocabulary=RIVALS)
     assert [effect.effect for effect in found.omitted_physics] == ["impulse"]
     for name, true in (("per_megapixel_frame", 500.0), ("mean_dn", 1500.0)):
         fitted = found.omitted_physics[0].parameters[name]

@@ -1,10 +1,9 @@
 """What is strong is fitted until nothing of it is left: a remainder is no further physics."""
 
-from functools import cache
-
 from analysis.mismatch import Finding, find_mismatch
+from dsis.effects import Effect
 from exposing import effect
-from mismatch_recordings import camera, recorded
+from mismatch_recordings import FEW_LEVELS, LEVELS, camera, recorded
 
 PERCENT = -2.0  # of full scale: levels depart by more than a thousand standard errors
 WORDS = frozenset(
@@ -13,16 +12,15 @@ WORDS = frozenset(
 )  # fmt: skip
 
 
-@cache
-def _found(fraction: float) -> Finding:
-    """Return what is found of a bend, and of a little crosstalk beside it."""
+def _found(levels: tuple[float, ...], *beside: Effect) -> Finding:
+    """Return what is found of a bend, and of what is beside it."""
     bend = effect("nonlinearity", percent_full_scale=PERCENT)
-    beside = (effect("crosstalk", fraction=fraction),) if fraction else ()
-    return find_mismatch(camera(), recorded(camera(bend, *beside), 5), seed=1, vocabulary=WORDS)
+    recording = recorded(camera(bend, *beside), 5, levels=levels)
+    return find_mismatch(camera(), recording, seed=1, vocabulary=WORDS)
 
 
 def test_a_strong_bend_is_fitted_until_no_level_departs() -> None:
-    found = _found(0.0)
+    found = _found(FEW_LEVELS)
     (named,) = found.omitted_physics
     own = named.parameters["percent_full_scale"]
     assert named.effect == "nonlinearity"
@@ -33,7 +31,7 @@ def test_a_strong_bend_is_fitted_until_no_level_departs() -> None:
 
 def test_what_a_rough_fit_leaves_of_levels_is_no_residue_of_a_converter() -> None:
     """Here one of 1024 codes was named, for levels that a bend fitted roughly had left."""
-    found = _found(0.003)
+    found = _found(LEVELS, effect("crosstalk", fraction=0.003))
     assert {one.effect for one in found.omitted_physics} <= {"nonlinearity", "crosstalk"}
     (own,) = (o for o in found.omitted_physics if o.effect == "nonlinearity")
     bent = own.parameters["percent_full_scale"]

@@ -1,5 +1,6 @@
 """Pixels that jump: laws of single pixels against dense algebra, and populations of the test's."""
 
+from functools import cache
 from itertools import pairwise, product
 
 import numpy as np
@@ -66,6 +67,7 @@ SURE = 7.0  # nats
 NOISE = (2.0, 2.0, 3.0, 6.0)  # DN, of four exposures: two darks, two flats
 
 
+@cache  # two promises are about a noise that spreads
 def _recorded(seed: int, kind: str, **how: float) -> Telegraph | None:
     """Return what is told of frames whose single pixels are noisy in one way."""
     rng = np.random.default_rng(seed)

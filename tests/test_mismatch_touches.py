@@ -8,7 +8,7 @@ from analysis.mismatch.bank.key import Key
 from analysis.mismatch.touches import touched
 from dsis.effects.line_fpn import ColumnFpn, RowFpn
 from dsis.effects.shading import Shading
-from mismatch_recordings import camera, recorded
+from mismatch_recordings import FEW_LEVELS, camera, recorded
 
 NAMES = ("fixed_row_variance", "fixed_edge", "half_seam", "fixed_smooth_tilt", "parity")
 KEYS = tuple(Key(name, "offset", "", "MONO", "rows") for name in NAMES)
@@ -26,7 +26,8 @@ def test_random_lines_lean_to_no_side_and_light_does() -> None:
 @pytest.mark.parametrize("effect", [RowFpn(sigma_dn=0.4), ColumnFpn(sigma_dn=0.35)])
 def test_weak_lines_of_a_mosaic_are_named(effect: RowFpn | ColumnFpn) -> None:
     """Whatever the few sensors lean to, by chance, that they are compared with."""
-    recording = recorded(camera(effect, cfa="RGGB"), 1, rows=64, columns=80)
+    true = camera(effect, cfa="RGGB")
+    recording = recorded(true, 1, rows=64, columns=80, levels=FEW_LEVELS)
     found = find_mismatch(
         camera(cfa="RGGB"), recording, vocabulary=frozenset({"row_fpn", "column_fpn"})
     )

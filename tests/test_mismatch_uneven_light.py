@@ -33,8 +33,6 @@ def _shading(**percent: float) -> object:
 @pytest.mark.parametrize(
     "percent",
     [
-        {"falloff_percent": FALL},
-        {"tilt_down_percent": DOWN},
         {"falloff_percent": FALL, "tilt_down_percent": DOWN, "tilt_right_percent": RIGHT},
         {"tilt_down_percent": DOWN, "bow_down_percent": BOW},
     ],

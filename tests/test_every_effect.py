@@ -72,6 +72,7 @@ STRONG: dict[str, tuple[dict[str, object], ...]] = {
         {"gain_percent": 40.0, "edge": "bottom", "length_pixels": 4.0},
         {"offset_dn": 300.0, "edge": "right"},
     ),
+    "dual_gain_mismatch": ({"gain_error_percent": 5.0, "mean": "kinks"},),
     "tap_mismatch": (
         {"gain_percent": 40.0, "regions": "even_odd_columns"},
         {"gain_percent": 40.0, "regions": "even_odd_rows"},
@@ -90,6 +91,7 @@ def point_at(level: float) -> OperatingPoint:
         slope_dn=SLOPE_DN,
         read_variance_dn2=INTERCEPTS_DN2[segment],
         segment=segment,
+        segment_from_dn=SWITCH_DN * segment,
         full_scale_dn=65035.0,
         frames=FRAMES,
         rows=ROWS,

@@ -88,8 +88,9 @@ def _clues(signals: list[float], switch: float = 100.0) -> Any:
 
 
 def test_a_switch_needs_two_flats_on_either_side() -> None:
-    (proposal,) = GAINS.propose(_clues([20.0, 50.0, 200.0, 500.0]))
-    assert proposal.effect.model_dump()["gain_error_percent"] == pytest.approx(2.0)
+    stepped, kinked = GAINS.propose(_clues([20.0, 50.0, 200.0, 500.0]))
+    assert stepped.effect.model_dump()["gain_error_percent"] == pytest.approx(2.0)
+    assert kinked.effect.model_dump()["mean"] == "kinks"
     assert GAINS.propose(_clues([50.0, 200.0, 500.0])) == []  # darks have no gain
     assert GAINS.propose(_clues([20.0, 50.0, 500.0])) == []
 

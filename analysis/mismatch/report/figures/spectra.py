@@ -1,4 +1,4 @@
-"""Spectra of the temporal noise, of pixels and of line means, with the line that stands out."""
+"""Spectra of the temporal noise, of line means and of maps, with the line that stands out."""
 
 from collections.abc import Sequence
 
@@ -8,7 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from analysis.figures import ALARM, COLOURS, GREY, INK
-from analysis.mismatch.evidence import Array, LineSpectrum, Spectrum
+from analysis.mismatch.bank.robust import drawn_in
+from analysis.mismatch.evidence import Array, LineSpectrum, Map, Spectrum
 from analysis.mismatch.finding import Where
 from analysis.mismatch.report.figures.maps import PANELS
 from analysis.mismatch.report.figures.ticks import plain_numbers
@@ -23,6 +24,12 @@ def size_inches(spectra: Sequence[Spectrum]) -> tuple[float, float]:
     """Return width and height of a figure with a line of panels for each channel."""
     panels = len(_panels(spectra[0]))
     return 1.2 + 2.4 * panels, 3.9 * len(spectra)
+
+
+def of_map(one: Map) -> Spectrum:
+    """Return the spectra of a map beyond rows and columns, without pixels that stand far out."""
+    before, after = (None if own is None else _power(own) for own in (one.before, one.after))
+    return Spectrum(one.channel, _power(one.recorded), before, after, one.pitch_px)
 
 
 def draw(figure: Figure, spectra: Sequence[Spectrum], where: Where) -> None:
@@ -83,6 +90,11 @@ def draw_lines(figure: Figure, spectra: Sequence[LineSpectrum], where: Where, ax
             )
     panels[0].set_ylabel("power, relative")
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
+
+
+def _power(image: Array) -> Array:
+    rest = image - image.mean(0) - image.mean(1)[:, np.newaxis]
+    return np.asarray(np.abs(np.fft.rfft2(drawn_in(rest))) ** 2)
 
 
 def folded(frequency: float, nyquist: float) -> float:

@@ -151,8 +151,9 @@ def _patterns(m: Mismatch, name: str, evidence: Evidence) -> Iterator[Picture]:
 
 def _of_map(m: Mismatch, wanted: str, evidence: Evidence) -> Iterator[Picture]:
     """Yield the spectrum of a map, the wave that stands out ringed."""
-    parts = [spectra.of_map(one) for one in _parts(m, wanted, evidence)]
-    if parts:
+    some = _parts(m, wanted, evidence)
+    if some:
+        parts = [spectra.of_maps(some)]
         draw = partial(spectra.draw, spectra=parts, where=m.where)
         size = spectra.size_inches(parts)
         yield Picture(f"{wanted}-spectrum", _title(m, wanted), (m,), size, draw)

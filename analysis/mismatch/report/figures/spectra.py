@@ -26,10 +26,21 @@ def size_inches(spectra: Sequence[Spectrum]) -> tuple[float, float]:
     return 1.2 + 2.4 * panels, 3.9 * len(spectra)
 
 
-def of_map(one: Map) -> Spectrum:
-    """Return the spectra of a map beyond rows and columns, without pixels that stand far out."""
-    before, after = (None if own is None else _power(own) for own in (one.before, one.after))
-    return Spectrum(one.channel, _power(one.recorded), before, after, one.pitch_px)
+def of_maps(maps: Sequence[Map]) -> Spectrum:
+    """Return the spectra of maps beyond rows and columns, those of channels summed.
+
+    Each is over its median, and pixels that stand far out count as so far out as others ever are.
+    """
+    first = maps[0]
+    before = [one.before for one in maps if one.before is not None]
+    after = [one.after for one in maps if one.after is not None]
+    return Spectrum(
+        first.channel if len(maps) == 1 else "",
+        _power([one.recorded for one in maps]),
+        _power(before) if before else None,
+        _power(after) if after else None,
+        first.pitch_px,
+    )
 
 
 def draw(figure: Figure, spectra: Sequence[Spectrum], where: Where) -> None:
@@ -92,9 +103,17 @@ def draw_lines(figure: Figure, spectra: Sequence[LineSpectrum], where: Where, ax
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
 
 
-def _power(image: Array) -> Array:
-    rest = image - image.mean(0) - image.mean(1)[:, np.newaxis]
-    return np.asarray(np.abs(np.fft.rfft2(drawn_in(rest))) ** 2)
+def _power(images: Sequence[Array]) -> Array:
+    rows, columns = np.min([image.shape for image in images], axis=0)
+    total: Array = np.zeros((rows, columns // 2 + 1))
+    for image in images:
+        own = image[:rows, :columns]
+        rest = own - own.mean(0) - own.mean(1)[:, np.newaxis]
+        power = np.abs(np.fft.rfft2(drawn_in(rest))) ** 2
+        middle = np.median(power[1:, 1:])
+        power[0], power[:, 0] = middle, middle  # lines were taken off
+        total += power / (middle or 1.0)
+    return total
 
 
 def folded(frequency: float, nyquist: float) -> float:

@@ -110,6 +110,7 @@ def test_a_fixed_pattern_is_shown_where_it_departs_most() -> None:
         "parity": ("gain_map", "columns", "gain_map-columns-parity"),
         "half_seam": ("offset_map", "rows", "offset_map-rows-halves"),
         "fixed_smooth_variance": ("gain_alone_map", "", "gain_alone_map-smooth-MONO"),
+        "fixed_spectral_peak": ("gain_alone_map", "", "gain_alone_map-spectrum"),
         "outlying_pixels": ("time_map", "", "time_map-pixels-MONO"),
     }
     seen = Evidence(

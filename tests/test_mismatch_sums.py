@@ -26,7 +26,12 @@ from mismatch_recordings import camera, recorded, state_of
 
 SCENE = np.linspace(100, 2000, 96 * 128, dtype=np.float32).reshape(96, 128)
 ONLY = {
-    SPECTRA: {"spectral_peak", "line_correlation", "alternation_variance"},
+    SPECTRA: {
+        "spectral_peak",
+        "line_correlation",
+        "alternation_variance",
+        "fixed_spectral_peak",
+    },
     NEIGHBOURS: {
         "correlation_0_1",
         "correlation_1_0",

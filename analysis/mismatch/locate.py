@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from analysis.mismatch.bank.home import TIME, homes, one_sided
 from analysis.mismatch.bank.key import MOSAIC, Key
+from analysis.mismatch.bank.standing import NAME as FIXED_WAVE
 from analysis.mismatch.finding import Mismatch, Where
 from analysis.mismatch.layout import Layout
 from analysis.mismatch.null import Null, adjusted
@@ -56,8 +57,9 @@ def tested(layout: Layout, null: Null, seen: Vector) -> tuple[Array, Array]:
         if small[np.flatnonzero(row)].all():
             z[size + i] = 0.0
     # The largest of many bins says nothing where it is smaller than chance makes it.
-    peaks = np.array([key.statistic.endswith("spectrum_peak") or key.statistic == "spectral_peak"
-                      for key in null.keys])  # fmt: skip
+    peaks = np.array(
+        [key.statistic.endswith(("spectrum_peak", "spectral_peak")) for key in null.keys]
+    )
     z[peaks] = np.maximum(z[peaks], 0.0)
     # No pattern is less than none: lower tails of these ratios of few degrees are heavy.
     nothing = _without_pattern(null, seen)
@@ -139,7 +141,8 @@ def _where(
         single = [i for i in own if abs(z[i]) > 0.5 * most and z[i] * z[top] > 0]
     names = list(dict.fromkeys(keys[i].exposure for i in single))
     if not names:
-        names = [e.name for e in layout.uniform]
+        shone = statistic == FIXED_WAVE and "gain" in keys[top].scope
+        names = [e.name for e in layout.uniform if e.kind == "flat" or not shone]
     exposures = [e for e in layout.exposures if e.name in names]
     channels = {keys[i].channel for i in (*which, *single) if keys[i].channel}
     channel = channels.pop() if len(channels) == 1 else None
@@ -193,6 +196,7 @@ def _frequency(
     kind = {
         "spectral_peak": f"spectrum, {key.detail}" if key.detail else "spectrum",
         "row_spectrum_peak": "rows of light" if key.detail == "light" else "rows",
+        FIXED_WAVE: f"{FIXED_WAVE}, {key.scope}",
     }.get(statistic)
     peak = seen.peaks.get((key.channel, kind or ""))
     if peak is None:

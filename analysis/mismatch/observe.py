@@ -14,9 +14,13 @@ from analysis.mismatch.bank.carryover import Samples
 from analysis.mismatch.bank.coherent import Peak, SpectrumSums
 from analysis.mismatch.bank.common import common
 from analysis.mismatch.bank.local import local_scalars, variances, widened
+from analysis.mismatch.bank.maps import ALONE
 from analysis.mismatch.bank.parts import Parts, parts
 from analysis.mismatch.bank.scalars import NAMES, UNKNOWN, Number, scalars
+from analysis.mismatch.bank.standing import NAME as FIXED_WAVE
+from analysis.mismatch.bank.standing import standing
 from analysis.mismatch.bank.together import together
+from analysis.mismatch.bank.waves import WaveSums
 from analysis.mismatch.layout import Layout, Place, Taken
 from analysis.mismatch.scenes import Local
 from analysis.mismatch.summed import ChannelSums, Looked, SensorSums, measure
@@ -213,14 +217,14 @@ def observing(
             sums[name].add(one.exposure, channel, frames, variance, signal)
         yield
     local = _scenes(layout, frames_of, watch, found, whole.common, kept.made)
-    maps, images = _maps(layout, sums)
+    maps, images, fixed = _maps(layout, sums, whole.waves)
     pooled, peaks = _pooled(sums, whole, places=kept.places)
     return Observation(
         levels,
         found,
         maps,
         pooled,
-        peaks,
+        {**peaks, **fixed} if kept.places else {},
         images if kept.images else {},
         whole.common,
         local,
@@ -301,9 +305,16 @@ def _by_signal(channel: Channel, frames: int, own: Local) -> dict[str, Level]:
 
 
 def _maps(
-    layout: Layout, sums: Mapping[str, ChannelSums]
-) -> tuple[dict[tuple[str, str], Mapping[str, Number]], dict[tuple[str, str], tuple[Array, float]]]:
-    """Return the statistics of all maps, and the maps with their noise."""
+    layout: Layout, sums: Mapping[str, ChannelSums], waves: WaveSums
+) -> tuple[
+    dict[tuple[str, str], Mapping[str, Number]],
+    dict[tuple[str, str], tuple[Array, float]],
+    dict[tuple[str, str], Peak],
+]:
+    """Return the statistics of all maps, the maps with their noise, and waves that stand in them.
+
+    `waves` are those of the whole sensor that move.
+    """
     numbers: dict[tuple[str, str], Mapping[str, Number]] = {}
     images: dict[tuple[str, str], tuple[Array, float]] = {}
     split: dict[str, dict[str, Parts]] = {}
@@ -321,7 +332,18 @@ def _maps(
     for kind, by_channel in split.items():
         if len(by_channel) == len(layout.sites) > 1:
             numbers["", kind] = together(by_channel, sharp[kind], layout.sites)
-    return numbers, images
+    fixed: dict[tuple[str, str], Peak] = {}
+    for one in ALONE:
+        kind = one if f"{one} alone" not in split else f"{one} alone"
+        planes = {name: part.pixels for name, part in split.get(kind, {}).items()}
+        if len(planes) != len(layout.sites):
+            continue
+        where = "" if len(planes) > 1 else layout.channels[0]
+        number, peak = standing(planes, sharp[kind], layout.sites, waves)
+        numbers[where, kind] = {**numbers[where, kind], FIXED_WAVE: number}
+        if peak is not None:
+            fixed[where, f"{FIXED_WAVE}, {kind}"] = peak
+    return numbers, images, fixed
 
 
 def _with_bulk(level: Level, channel: str, many: Bulk | None) -> Level:

@@ -45,6 +45,7 @@ _WORDS = {
     "fixed_patch_variance": "pixels that lie together have fixed deviations in common",
     "fixed_correlation_0_1": "fixed deviations of neighbours along a row are alike",
     "fixed_correlation_1_0": "fixed deviations of neighbours along a column are alike",
+    "fixed_spectral_peak": "a wave stands still in the mean frame",
     "half_seam": "the two halves of the sensor meet in a step",
     "parity": "even and odd lines differ",
 }

@@ -59,11 +59,15 @@ _FOLLOWS = {
     # Few electrons of several DN each leave codes out.
     "code_imbalance": frozenset({"code_imbalance", "skewness"}),
     "code_spacing": frozenset({"code_spacing", "skewness"}),
+    # No effect leaves a wave in the mean of frames but by chance: what moves is allowed for.
+    "fixed_spectral_peak": frozenset(),
 }
 
 SPECTRA, NEIGHBOURS, CARRY_OVER = "spectra", "neighbours", "carry_over"
 _NEED: Mapping[str, frozenset[str]] = {
-    SPECTRA: frozenset({"spectral_peak", "line_correlation", "alternation_variance"}),
+    SPECTRA: frozenset(
+        {"spectral_peak", "line_correlation", "alternation_variance", "fixed_spectral_peak"}
+    ),
     NEIGHBOURS: _CORRELATIONS | {"fixed_correlation_0_1", "fixed_correlation_1_0"},
     CARRY_OVER: frozenset({"carry_over"}),
 }

@@ -49,6 +49,7 @@ STATISTICS = {
     "fixed_patch_variance": "fixed pattern of patches of pixels",
     "fixed_correlation_0_1": "fixed pattern alike in neighbours of a row",
     "fixed_correlation_1_0": "fixed pattern alike in neighbours of a column",
+    "fixed_spectral_peak": "wave that stands still in the mean frame",
     "pattern_growth": "growth of the fixed pattern",
     "half_seam": "step between two halves",
     "parity": "alternation of even and odd lines",

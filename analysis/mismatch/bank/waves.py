@@ -7,6 +7,7 @@ that channels add by amplitude, not by power, and a frequency has no aliases.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.fft
@@ -55,10 +56,10 @@ class Waves:
             return
         if self.power is None:
             self.power = np.zeros((2, 2, *self.half))
-            _add(self.total, 1.0, self.power)
+            add_power(self.total, 1.0, self.power)
             self.total = self.total.astype(np.complex128)
         self.total += transform
-        _add(transform, 1.0, self.power)
+        add_power(transform, 1.0, self.power)
 
     def add_to(self, power: Array, weight: float) -> None:
         """Add the power over time, in units in which white noise has its variance in every bin.
@@ -67,10 +68,26 @@ class Waves:
         """
         per_bin = weight / (self.pixels * (self.frames - 1))
         if self.power is None:
-            _add(self.total, per_bin / 2, power)
+            add_power(self.total, per_bin / 2, power)
         else:
             power += per_bin * self.power
-            _add(self.total, -per_bin / self.frames, power)
+            add_power(self.total, -per_bin / self.frames, power)
+
+
+@dataclass(frozen=True)
+class Moving:
+    """What moves from frame to frame: power of bins and halfway between them, in any unit.
+
+    Attributes
+    ----------
+    power
+        (half a bin down, half a bin right, row, column // 2 + 1).
+    degrees
+        Independent frames in it.
+    """
+
+    power: Array
+    degrees: int
 
 
 class WaveSums:
@@ -136,6 +153,12 @@ class WaveSums:
         )
         return score_of_log(any_of(least, len(parts))), 1.0
 
+    def moving(self) -> Moving | None:
+        """Return the power itself; None where no frames were taken."""
+        if not (self.taken and self.weight):
+            return None
+        return Moving(self.power, self._degrees)
+
     def odd_lags(self) -> dict[str, Number]:
         """Return correlations along lines of samples an odd number of pixels apart.
 
@@ -183,7 +206,7 @@ class WaveSums:
             for right in (0, 1):
                 own = self.power[down, right]
                 fine[down::2, right::2] = own * (middles[0] / middles[2 * down + right])
-        fine[~self._looked_at()] = 0.0
+        fine[~looked_at(self.shape, self.step)] = 0.0
         y, x = (int(i) for i in np.unravel_index(int(fine.argmax()), fine.shape))
         # At half a cycle per pixel both sides are alike: each is the other's conjugate.
         across = x / 2 + (top(np.pad(fine[y], 1), x + 1) / 2 if x < columns else 0.0)
@@ -196,39 +219,38 @@ class WaveSums:
 
     def _parts(self) -> list[Array]:
         """Return the powers that are looked at, by where they lie in the bins."""
-        looked_at = self._looked_at()
+        seen = looked_at(self.shape, self.step)
         rows, columns = self.shape
         if rows % 2 == 0 and columns % 2 == 0:  # what alternates along both axes: has its own
-            looked_at[rows - 1 : rows + 2, columns - 1 : columns + 2] = False
+            seen[rows - 1 : rows + 2, columns - 1 : columns + 2] = False
         return [
-            self.power[down, right][looked_at[down::2, right::2]]
-            for down in (0, 1)
-            for right in (0, 1)
+            self.power[down, right][seen[down::2, right::2]] for down in (0, 1) for right in (0, 1)
         ]
 
-    def _looked_at(self) -> NDArray[np.bool_]:
-        """Return which half bins (2 rows, columns + 2) hold waves of their own.
 
-        The axes hold what rows, columns and frames have in common, of each colour of a mosaic: half
-        a bin from them the same is seen.
-        """
-        rows, columns = self.shape
-        found = np.ones((2 * rows, 2 * self.power.shape[3]), np.bool_)
-        found[[0, 1, -1]] = False
-        found[:, [0, 1]] = False
-        found[:, columns + (columns + 1) % 2 :] = False  # beyond half a cycle per pixel
-        if columns % 2 == 0:
-            # At half a cycle each wave stands twice, as its own conjugate; on rows of bins only.
-            found[1::2, columns] = False
-            found[rows + 1 :, columns] = False
-        if self.step == 2:
-            found[rows - 1 : rows + 2] = False
-            found[:, columns - 1 :] = False
-        return found
+def looked_at(shape: tuple[int, int], step: int) -> NDArray[np.bool_]:
+    """Return which half bins (2 rows, columns + 2) of a sensor hold waves of their own.
+
+    The axes hold what rows, columns and frames have in common, of each colour of a mosaic (`step`
+    2): half a bin from them the same is seen.
+    """
+    rows, columns = shape
+    found = np.ones((2 * rows, 2 * (columns // 2 + 1)), np.bool_)
+    found[[0, 1, -1]] = False
+    found[:, [0, 1]] = False
+    found[:, columns + (columns + 1) % 2 :] = False  # beyond half a cycle per pixel
+    if columns % 2 == 0:
+        # At half a cycle each wave stands twice, as its own conjugate; on rows of bins only.
+        found[1::2, columns] = False
+        found[rows + 1 :, columns] = False
+    if step == 2:
+        found[rows - 1 : rows + 2] = False
+        found[:, columns - 1 :] = False
+    return found
 
 
 @kernel
-def _add(transform: NDArray[np.complexfloating], weight: float, power: Array) -> None:
+def add_power(transform: NDArray[np.complexfloating], weight: float, power: Array) -> None:
     """Add the weighted power of bins, and of neighbours' differences: down, right, both."""
     rows, columns = transform.shape
     down, right, both = weight / 2, weight / 2, weight / 4

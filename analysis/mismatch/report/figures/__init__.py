@@ -12,6 +12,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from analysis.figures import STYLE
+from analysis.mismatch.bank.standing import NAME as FIXED_WAVE
 from analysis.mismatch.evidence import Array, Evidence, Histogram, Map, Shown
 from analysis.mismatch.finding import Finding, Mismatch
 from analysis.mismatch.report.figures import (
@@ -142,8 +143,20 @@ def _curves(
 def _patterns(m: Mismatch, name: str, evidence: Evidence) -> Iterator[Picture]:
     if name in NOISY_PIXELS:
         yield from _map(m, "variance_map", evidence, "pixels")
+    elif name == FIXED_WAVE and m.statistic in evidence.shown_in:
+        yield from _of_map(m, evidence.shown_in[m.statistic].map, evidence)
     elif name.startswith(MAPPED) and m.statistic in evidence.shown_in:
         yield from _pattern(m, name, evidence.shown_in[m.statistic], evidence)
+
+
+def _of_map(m: Mismatch, wanted: str, evidence: Evidence) -> Iterator[Picture]:
+    """Yield the spectrum of a map, the wave that stands out ringed."""
+    some = _parts(m, wanted, evidence)
+    if some:
+        parts = [spectra.of_maps(some)]
+        draw = partial(spectra.draw, spectra=parts, where=m.where)
+        size = spectra.size_inches(parts)
+        yield Picture(f"{wanted}-spectrum", _title(m, wanted), (m,), size, draw)
 
 
 def _of_frames(m: Mismatch, name: str, evidence: Evidence) -> Iterator[Picture]:

@@ -1,4 +1,4 @@
-"""Spectra of the temporal noise, of pixels and of line means, with the line that stands out."""
+"""Spectra of the temporal noise, of line means and of maps, with the line that stands out."""
 
 from collections.abc import Sequence
 
@@ -8,7 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from analysis.figures import ALARM, COLOURS, GREY, INK
-from analysis.mismatch.evidence import Array, LineSpectrum, Spectrum
+from analysis.mismatch.bank.robust import drawn_in
+from analysis.mismatch.evidence import Array, LineSpectrum, Map, Spectrum
 from analysis.mismatch.finding import Where
 from analysis.mismatch.report.figures.maps import PANELS
 from analysis.mismatch.report.figures.ticks import plain_numbers
@@ -23,6 +24,23 @@ def size_inches(spectra: Sequence[Spectrum]) -> tuple[float, float]:
     """Return width and height of a figure with a line of panels for each channel."""
     panels = len(_panels(spectra[0]))
     return 1.2 + 2.4 * panels, 3.9 * len(spectra)
+
+
+def of_maps(maps: Sequence[Map]) -> Spectrum:
+    """Return the spectra of maps beyond rows and columns, those of channels summed.
+
+    Each is over its median, and pixels that stand far out count as so far out as others ever are.
+    """
+    first = maps[0]
+    before = [one.before for one in maps if one.before is not None]
+    after = [one.after for one in maps if one.after is not None]
+    return Spectrum(
+        first.channel if len(maps) == 1 else "",
+        _power([one.recorded for one in maps]),
+        _power(before) if before else None,
+        _power(after) if after else None,
+        first.pitch_px,
+    )
 
 
 def draw(figure: Figure, spectra: Sequence[Spectrum], where: Where) -> None:
@@ -83,6 +101,19 @@ def draw_lines(figure: Figure, spectra: Sequence[LineSpectrum], where: Where, ax
             )
     panels[0].set_ylabel("power, relative")
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
+
+
+def _power(images: Sequence[Array]) -> Array:
+    rows, columns = np.min([image.shape for image in images], axis=0)
+    total: Array = np.zeros((rows, columns // 2 + 1))
+    for image in images:
+        own = image[:rows, :columns]
+        rest = own - own.mean(0) - own.mean(1)[:, np.newaxis]
+        power = np.abs(np.fft.rfft2(drawn_in(rest))) ** 2
+        middle = np.median(power[1:, 1:])
+        power[0], power[:, 0] = middle, middle  # lines were taken off
+        total += power / (middle or 1.0)
+    return total
 
 
 def folded(frequency: float, nyquist: float) -> float:

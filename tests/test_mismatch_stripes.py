@@ -29,3 +29,16 @@ def test_a_weak_bistable_checkerboard_is_named() -> None:
     fitted = named.parameters["amplitude_dn"]
     assert isinstance(fitted.value, float)
     assert abs(fitted.value - 0.13) < 4 * fitted.standard_error < 0.13
+
+
+@pytest.mark.parametrize("cfa", ["MONO", "GRBG"])
+def test_interference_along_rows_alone_is_proposed_where_it_is(cfa: str) -> None:
+    # Upright stripes of free phase lie on an axis of the frequencies, which planes do not look at.
+    at = 0.1371
+    striped = registry()["periodic_noise"](amplitude_dn=0.5, frequency=(at, 0.0))
+    state = state_of(recorded(camera(striped, cfa=cfa), 12), camera(cfa=cfa))
+    assert "column_spectrum_peak" in {one.statistic for one in state.mismatches}
+    proposed = CANDIDATES["periodic_noise"].propose(state.clues())
+    found = [one.effect.model_dump()["frequency"] for one in proposed]
+    # Of a mosaic's planes whole frames tell aliases apart.
+    assert any(abs(abs(fx) - at) < 0.25 / 64 and fy == 0 for fx, fy in found)

@@ -156,6 +156,7 @@ class SpectrumSums:
             ("spectrum", self.peak()),
             ("rows", self.row_peak("")),
             ("rows of light", self.row_peak("signal")),
+            ("columns", self.column_peak()),
             *((line_name(rank), peak) for rank, peak in enumerate(self.lines(), 1)),
         )
         return [(kind, peak) for kind, peak in found if peak is not None]
@@ -184,6 +185,16 @@ class SpectrumSums:
             return {}
         power, degrees = self.fine[""] / total, self.degrees("")
         return {"slow_row_variance": slow_lines(power, degrees), **row_lags(power, degrees)}
+
+    def column_peak(self) -> Peak | None:
+        """Return where the spectrum of column means is largest, between bins."""
+        total, m = self.weight[""][0], self.shape[1]
+        if not total or m < 4:
+            return None
+        inner = _line(self.columns)[0] / total
+        place = int(inner.argmax())
+        across = place + 1 + _within_bin(inner, place)
+        return Peak(frequency(across, m), 0.0, float(inner[place]))
 
     def row_peak(self, key: str) -> Peak | None:
         """Return where the spectrum of row means is largest."""

@@ -10,6 +10,7 @@ import numpy as np
 
 from analysis.mismatch.basefit import BaseFit, Offsets, colour, fit_base
 from analysis.mismatch.bending import bending_offsets, bends, bent_by
+from analysis.mismatch.flattened import flattened
 from analysis.mismatch.layout import Layout, Place, sites
 from analysis.mismatch.model import Model, Sites
 from analysis.mismatch.observe import Level, Observation
@@ -96,6 +97,7 @@ def calibrate(
     """
     switches = tuple(s.upper_dn for s in camera.noise.segment if s.upper_dn is not None)
     left_out = frozenset([interpolated] if interpolated else [])
+    left_out |= flattened(layout, seen.levels)
     start = camera.black_level - layout.black_dn
     slopes = [s.slope for s in camera.noise.segment]
     spiky = _spiky(seen.levels)

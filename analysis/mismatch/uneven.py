@@ -20,6 +20,7 @@ Array = NDArray[np.float64]
 _PARTS = 4  # along each side
 _LEAST_SHARE = 0.5  # of a dark current, that every part of the sensor must show
 _SURE = 3.0  # standard errors: the least of sixteen
+_TAIL = 1 / 3  # of a glow's height, that it may have where it is least
 _SEEN = 3.5  # of a surface: chance has that among the map's few numbers in 1 % of recordings
 _SMOOTH = "fixed_smooth"
 
@@ -31,11 +32,16 @@ def uneven(state: State, effect: Effect | None) -> Denial | None:
     surface's - a glow's, say - it does not tell. Where such a surface is left unexplained, the part
     of the sensor that grows least must grow for sure, by half of a dark current; else all may be
     the surface's. Where none is certain by itself, a glow of the same mean must be denied by the
-    map, at odds of 20. Beside a glow or hot pixels that are named nothing is said: the map has
-    their mean too.
+    map, at odds of 20. Beside a glow or hot pixels that are named nothing is said, for the map has
+    their mean too - but that a glow may fall off more slowly than exponentially: as 1 / r it has a
+    third of its height left at twice its length, all over the sensor.
     """
     if not isinstance(effect, DarkCurrent) or not effect.dn_per_s:
         return None
+    glow = max((e.dn_per_s for e in state.camera.effect if isinstance(e, AmpGlow)), default=0.0)
+    if effect.dn_per_s < _TAIL * glow:
+        share = effect.dn_per_s / glow
+        return Denial(share, "a glow that falls off more slowly has as much all over the sensor")
     if any(isinstance(other, AmpGlow | HotPixels) for other in state.camera.effect):
         return None
     left = state.null.departures(state.vector)

@@ -15,6 +15,14 @@ from dsis.effects.readout_memory import ReadoutMemory
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 _POOLED = "all"
+_MAPS = {
+    "dsnu": "offset",
+    "row_fpn": "offset",
+    "column_fpn": "offset",
+    "prnu": "gain",
+    "row_prnu": "gain",
+    "column_prnu": "gain",
+}
 _LEFT = 0.5  # of what calls for an effect, that may stay where it is explained
 
 
@@ -30,11 +38,26 @@ def unmet(state: State, kind: str, without: Array, *, shown: bool = False) -> De
     if "level" not in registry()[kind].measures:
         known.discard("level")  # which only scatters with it: what stays is another's
     calls = np.array([key.statistic in known for key in state.null.keys])
+    calls &= _of_its_map(state, kind)
     change = changed(state, without)
     departures, off = off_without(state, without)
     if not (off & calls).any() and CANDIDATES[kind].hints:
         return None if shown else _unseen(state, calls, change)
     return _stays(state, calls, change, departures, off)
+
+
+def _of_its_map(state: State, kind: str) -> Mask:
+    """Return which numbers say whether a fixed pattern is there: those of its map, if it has one.
+
+    What darks and flats have alike is an offset, what grows with the signal a gain: where exposures
+    tell both, what stays of one says nothing of the other.
+    """
+    keys = state.null.keys
+    own = _MAPS.get(kind, "")
+    known = {key.scope for key, told in zip(keys, state.null.known, strict=False) if told}
+    if not own or not {"offset", "gain"} <= known:
+        return np.ones(len(keys), np.bool_)
+    return np.array([key.scope == own for key in keys])
 
 
 def _stays(state: State, calls: Mask, change: Array, departures: Array, off: Mask) -> Denial | None:

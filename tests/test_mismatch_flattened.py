@@ -1,0 +1,104 @@
+"""Flats at a full well are no part of the line; what frames' wander and glows allow is no more."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from analysis.mismatch.bank.key import Key
+from analysis.mismatch.flattened import flattened
+from analysis.mismatch.uneven import uneven
+from analysis.mismatch.unmet import _of_its_map
+from analysis.mismatch.wander import wandering_dn2
+from dsis.effects import registry
+
+SLOPE, READ = 2.0, 30.0
+
+
+def _layout(flats: int) -> Any:
+    exposures = [SimpleNamespace(name="dark", kind="dark", numbers=range(8))]
+    exposures += [
+        SimpleNamespace(name=f"flat-{i}", kind="flat", numbers=range(8)) for i in range(flats)
+    ]
+    return SimpleNamespace(uniform=exposures, channels=("MONO",), rows=10, columns=20)
+
+
+def _levels(signals: list[float], full_well: float, curvature: float = 0.0) -> Any:
+    """Return levels of a censored normal law, drawn apart from the effect."""
+    rng = np.random.default_rng(1)
+    found = {("dark", "MONO"): SimpleNamespace(level_dn=0.0, variance_dn2=READ)}
+    for i, signal in enumerate(signals):
+        shot = rng.normal(signal, np.sqrt(SLOPE * signal * (1 - curvature * signal)), 20_000)
+        seen = np.minimum(shot, full_well) + rng.normal(0, np.sqrt(READ), shot.size)
+        level = SimpleNamespace(level_dn=seen.mean(), variance_dn2=seen.var())
+        found[f"flat-{i}", "MONO"] = level
+    return found
+
+
+SIGNALS = [100.0, 400.0, 900.0, 1600.0, 2500.0]
+
+
+@pytest.mark.parametrize(
+    ("full_well", "curvature", "expected"),
+    [
+        (1e9, 0.0, set()),
+        (2300.0, 0.0, {"flat-4"}),
+        (1500.0, 0.0, {"flat-3", "flat-4"}),
+        (800.0, 0.0, {"flat-2", "flat-3", "flat-4"}),
+        (1e9, 2e-4, set()),  # charge that is shared takes half of the brightest's variance
+    ],
+)
+def test_flats_at_the_full_well_are_left_out(
+    full_well: float, curvature: float, expected: set[str]
+) -> None:
+    found = flattened(_layout(5), _levels(SIGNALS, full_well, curvature))
+    assert found == expected
+
+
+def test_two_flats_below_are_needed() -> None:
+    assert flattened(_layout(2), _levels(SIGNALS[:2], 300.0)) == frozenset()
+    assert flattened(_layout(3), _levels(SIGNALS[:3], 800.0)) == {"flat-2"}
+
+
+def test_levels_are_known_no_better_than_frames_that_wander_allow() -> None:
+    layout = _layout(1)
+    layout.variance_dn2 = {("flat-0", "MONO"): 50.0, ("dark", "MONO"): 30.0}
+    keys = [
+        Key("frame_variance", "exposure", "flat-0", "MONO"),
+        Key("level", "exposure", "flat-0", "MONO"),
+        Key("level", "exposure", "dark", "MONO"),
+    ]
+    # Means of 200 pixels have 50 / 200 DN^2; frames that scatter by 9 times as much have 8 more.
+    model, recorded = np.array([1.0, 0.0, 0.0]), np.array([9 ** (1 / 3), 3.0, 0.0])
+    added = wandering_dn2(layout, keys, model, recorded)
+    assert added == pytest.approx([0.0, 8 * 50 / 200 / 8, 0.0])
+    rng = np.random.default_rng(2)
+    frames = rng.normal(0, np.sqrt(9 * 50 / 200), (4000, 8))
+    assert frames.mean(1).var() == pytest.approx(50 / 200 / 8 + added[1], rel=0.1)
+    assert wandering_dn2(layout, keys, model, np.array([0.5, 3.0, 0.0])) == pytest.approx([0, 0, 0])
+
+
+def test_what_stays_of_offsets_says_nothing_of_gains() -> None:
+    scopes = ["exposure", "offset", "gain", "gain alone"]
+    keys = [Key("fixed_pixel_variance", scope) for scope in scopes]
+    null = SimpleNamespace(keys=keys, known=np.ones(4, bool))
+    assert _of_its_map(_state(null), "prnu").tolist() == [False, False, True, False]
+    assert _of_its_map(_state(null), "dsnu").tolist() == [False, True, False, False]
+    assert _of_its_map(_state(null), "row_noise").all()
+    null.known[2] = False  # one level: a map has both
+    assert _of_its_map(_state(null), "prnu").all()
+
+
+def _state(null: Any) -> Any:
+    return SimpleNamespace(null=null)
+
+
+@pytest.mark.parametrize(("rate", "denied"), [(0.01, True), (0.03, False)])
+def test_a_glow_may_reach_all_of_the_sensor(rate: float, denied: bool) -> None:
+    glow = registry()["amp_glow"](dn_per_s=0.06, place="right", extent=0.2)
+    state: Any = SimpleNamespace(camera=SimpleNamespace(effect=(glow,)))
+    found = uneven(state, registry()["dark_current"](dn_per_s=rate))
+    assert (found is not None) is denied
+    # A glow of 1 / r has so much where it is least, of 0.06 at its edge and 0.2 of the sensor.
+    assert pytest.approx(0.01) == 0.06 * 0.2 / (1 + 0.2)

@@ -38,12 +38,8 @@ def uneven(state: State, effect: Effect | None) -> Denial | None:
     """
     if not isinstance(effect, DarkCurrent) or not effect.dn_per_s:
         return None
-    glow = max((e.dn_per_s for e in state.camera.effect if isinstance(e, AmpGlow)), default=0.0)
-    if effect.dn_per_s < _TAIL * glow:
-        share = effect.dn_per_s / glow
-        return Denial(share, "a glow that falls off more slowly has as much all over the sensor")
     if any(isinstance(other, AmpGlow | HotPixels) for other in state.camera.effect):
-        return None
+        return _tail(state, effect)
     left = state.null.departures(state.vector)
     if not any(
         abs(z) > _SEEN and key.scope == "time" and key.statistic.startswith(_SMOOTH)
@@ -66,6 +62,15 @@ def uneven(state: State, effect: Effect | None) -> Denial | None:
         return None
     least = f"{max(share, 0):.0%} +- {error:.0%}"
     return Denial(share, f"a part of the sensor grows with exposure time by {least} of it")
+
+
+def _tail(state: State, effect: DarkCurrent) -> Denial | None:
+    """Return how a dark current is denied by the glow that is named: its tail may be as much."""
+    glow = max((e.dn_per_s for e in state.camera.effect if isinstance(e, AmpGlow)), default=0.0)
+    if effect.dn_per_s >= _TAIL * glow:
+        return None
+    why = "a glow that falls off more slowly has as much all over the sensor"
+    return Denial(effect.dn_per_s / glow, why)
 
 
 def _glowing(state: State, effect: DarkCurrent) -> Denial | None:

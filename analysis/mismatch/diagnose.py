@@ -36,7 +36,7 @@ from analysis.mismatch.remarks import remark_on_sizes, remarks_on
 from analysis.mismatch.segments import second_path
 from analysis.mismatch.settle import would_settle
 from analysis.mismatch.source import Source
-from analysis.mismatch.spikes import spikes_of, told_besides, with_spikes, without_spikes
+from analysis.mismatch.spikes import told_besides, with_spikes, without_spikes
 from analysis.mismatch.split import Split
 from analysis.mismatch.state import Setting, State
 from analysis.mismatch.taking import layout_of
@@ -97,10 +97,8 @@ def _found(
     step: Callable[[], None],
 ) -> Finding:
     """Return the finding; `how` is the seed and the number of processes."""
-    stored = recording = whole_cells(recording)
-    source, asked = Source(recording), words
-    spikes = spikes_of(recording, source, camera)
-    recording, source = without_spikes(recording, source, spikes)
+    stored, asked = whole_cells(recording), words
+    recording, source, spikes = without_spikes(stored, camera)
     first = unsettled(recording, source)
     words = told_besides(told_beside(words, first), spikes)
     split, layout = _taken(recording, source, without(Split.of(recording), first))

@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from analysis.mismatch.source import Source
 from analysis.mismatch.spikes.hits import Hits
-from analysis.mismatch.spikes.population import Spikes
+from analysis.mismatch.spikes.population import Spikes, spikes_of
+from dsis.camera import Camera
 from dsis.recording import RecordedExposure, Recording
 from dsis.recording.model import Codes
 
@@ -57,13 +58,16 @@ def cleaned(recording: Recording, replaced: Hits) -> Cleaned:
     return Cleaned(**values, stored=recording, patches=patches)
 
 
-def without_spikes(
-    recording: Recording, source: Source, spikes: Spikes | None
-) -> tuple[Recording, Source]:
-    """Return a recording and its source without spikes; what was read is not read again."""
+def without_spikes(recording: Recording, camera: Camera) -> tuple[Recording, Source, Spikes | None]:
+    """Return a recording and its source without spikes, and these; None: there are none.
+
+    What was read to find them is not read again.
+    """
+    source = Source(recording)
+    spikes = spikes_of(recording, source, camera)
     if spikes is None:
-        return recording, source
+        return recording, source, None
     own = cleaned(recording, spikes.replaced)
     made = Source(own)
     made.kept = {key: own.patched(key, frame) for key, frame in source.kept.items()}
-    return own, made
+    return own, made, spikes

@@ -90,12 +90,13 @@ class Looked:
     ----------
     hits
         Its far samples.
-    noise_dn
+    noise_dn, level_dn
         By row and column of the colour filter: (2, 2).
     """
 
     hits: Hits
     noise_dn: Array
+    level_dn: Array
 
 
 def hits_of(recording: Recording, source: Source, camera: Camera, number: int) -> Looked | None:
@@ -118,7 +119,7 @@ def hits_of(recording: Recording, source: Source, camera: Camera, number: int) -
         places.append(found)
         moved.append(own)
         count += len(found)
-    return Looked(_exact(watch, source, places, moved, number), watch.noise)
+    return Looked(_exact(watch, source, places, moved, number), watch.noise, watch.level)
 
 
 @dataclass(frozen=True)

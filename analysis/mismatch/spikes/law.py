@@ -121,6 +121,8 @@ def heldout_gain(
 
 def _tracks(hits: Hits) -> Array:
     """Return how many samples each track has: those of a frame that touch."""
+    if not hits.frame.size:
+        return np.zeros(0)
     touch = (
         (hits.exposure[:, np.newaxis] == hits.exposure)
         & (hits.frame[:, np.newaxis] == hits.frame)

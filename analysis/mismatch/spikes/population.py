@@ -17,12 +17,16 @@ Flags = NDArray[np.bool_]
 SPIKE = 8.0  # noises of the pixel: what is taken for a spike where there are any
 STRONG = 30.0  # noises: no law of noise
 _ELECTRONS = 20.0  # of a strong spike: one electron of few may be far out of the noise
+_LIT = 2.0  # times the variance of the darkest exposure: light tells what an electron is
 _LEAST = 3
+_BY_TAIL = 0.02  # chance that so many are strong
 _MOST = 1e-4  # of the samples
-_COMPLETE = 0.9  # of the spikes, where noise is least, that are strong
+_COMPLETE = 0.8  # of the spikes, where noise is least, that are strong
+_TAIL = 0.25  # as many would be of a tail that falls with the square of the distance, and more
 _NEGATIVE = 0.1  # of the spikes
 _RETURNING = 0.2  # pixels that come back, beside the spikes
-_BY_CHANCE = 1e-3  # that so many pixels are hit twice
+_BLINKING = 0.05  # of them, where they rise as high: others may do so once
+_TWICE = 1e-3  # chance that so many pixels are hit twice
 _ECHO = 0.1  # of a spike: as much smaller a sample in its row, its column or around it follows it
 _LAG = 0.3  # of a spike, that stays at its pixel
 _NEAR = 4  # rows and columns, and frames after
@@ -81,8 +85,7 @@ def spikes_of(recording: Recording, source: Source, camera: Camera) -> Spikes | 
         return None
     once = ~echo & ~again & (np.abs(hits.ratio) > SPIKE)
     in_uniform = np.isin(hits.exposure, list(uniform))
-    slope = max(s.slope for s in camera.noise.segment)
-    if not _certain(hits.of(once & in_uniform), slope, count):
+    if not _certain(hits.of(once & in_uniform), _electron_dn(camera, uniform), count):
         return None
     spikes = hits.of(once & (hits.ratio > 0))
     spikes = spikes.of(np.argsort(-spikes.ratio, kind="stable"))
@@ -90,18 +93,32 @@ def spikes_of(recording: Recording, source: Source, camera: Camera) -> Spikes | 
     return Spikes(spikes, _following(hits.of(echo & ~again), spikes), quiet)
 
 
+def _electron_dn(camera: Camera, uniform: dict[int, Looked]) -> float:
+    """Return what one electron adds, DN, at most: by the camera or by noise that grows with light.
+
+    The model's numbers may be wrong; its shot noise is what no spike may be.
+    """
+    variance = np.array([float((own.noise_dn**2).mean()) for own in uniform.values()])
+    level = np.array([float(own.level_dn.mean()) for own in uniform.values()])
+    dimmest = int(level.argmin())
+    above = level - level[dimmest]
+    lit = (above > 0) & (variance > _LIT * variance[dimmest])
+    slopes = (variance[lit] - variance[dimmest]) / above[lit]
+    return max([s.slope for s in camera.noise.segment] + [float(s) for s in slopes])
+
+
 def _samples(recording: Recording, uniform: dict[int, Looked]) -> int:
     frames = sum(len(recording.exposures[number].frames) for number in uniform)
     return frames * recording.rows * recording.columns
 
 
-def _certain(once: Hits, slope_dn: float, samples: int) -> bool:
+def _certain(once: Hits, electron_dn: float, samples: int) -> bool:
     """Return whether one-off samples are no tail of a law of noise.
 
     Spikes of one law of heights fall below thirty noises where noise is large: so whether nearly
     all are above is asked of the exposures where it is least, as many as say so.
     """
-    strong = (once.ratio > STRONG) & (once.height_dn > _ELECTRONS * slope_dn)
+    strong = (once.ratio > STRONG) & (once.height_dn > _ELECTRONS * electron_dn)
     positive = once.ratio > 0
     if strong.sum() < _LEAST or positive.sum() > _MOST * samples:
         return False
@@ -109,7 +126,9 @@ def _certain(once: Hits, slope_dn: float, samples: int) -> bool:
         return False
     for noise in np.unique(once.quiet_dn)[::-1]:
         own = once.quiet_dn <= noise
-        if (strong & own).sum() >= max(_LEAST, _COMPLETE * own.sum()):
+        n, of = int((strong & own).sum()), int(own.sum())
+        tail = scipy.stats.binom.sf(n - 1, of, _TAIL) > _BY_TAIL
+        if n >= max(_LEAST, _COMPLETE * of) and not tail:
             return True
     return False
 
@@ -148,8 +167,10 @@ def _returning(hits: Hits, counted: Flags, pixels: int) -> Flags | None:
     rare = times[(times > 0) & (times <= 2)]
     twice = int((rare == 2).sum())
     expected = float(rare.sum()) ** 2 / (2 * pixels)
-    chance = scipy.stats.poisson.sf(twice - 1, expected) > _BY_CHANCE
+    chance = scipy.stats.poisson.sf(twice - 1, expected) > _TWICE
     again = times > (2 if chance else 1)
-    if again.sum() > _RETURNING * ((times > 0) & ~again).sum():
+    once = int(((times > 0) & ~again).sum())
+    blinks = np.bincount(which[counted & (hits.ratio > STRONG)], minlength=times.size) > 0
+    if again.sum() > _RETURNING * once or (again & blinks).sum() > _BLINKING * once:
         return None
     return np.asarray(again[which])

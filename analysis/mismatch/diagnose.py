@@ -36,6 +36,7 @@ from analysis.mismatch.remarks import remark_on_sizes, remarks_on
 from analysis.mismatch.segments import second_path
 from analysis.mismatch.settle import would_settle
 from analysis.mismatch.source import Source
+from analysis.mismatch.spikes import told_besides, with_spikes, without_spikes
 from analysis.mismatch.split import Split
 from analysis.mismatch.state import Setting, State
 from analysis.mismatch.taking import layout_of
@@ -96,14 +97,14 @@ def _found(
     step: Callable[[], None],
 ) -> Finding:
     """Return the finding; `how` is the seed and the number of processes."""
-    recording = whole_cells(recording)
-    source = Source(recording)
+    stored, asked = whole_cells(recording), words
+    recording, source, spikes = without_spikes(stored, camera)
     first = unsettled(recording, source)
-    words = told_beside(words, first)
+    words = told_besides(told_beside(words, first), spikes)
     split, layout = _taken(recording, source, without(Split.of(recording), first))
     development = split.development
     numbers = {e.name: e.numbers for e in layout.exposures}
-    remarks = (*remarks_on(recording, development, layout), *(() if words else (_LOCATED,)))
+    remarks = (*remarks_on(stored, development, layout), *(() if asked else (_LOCATED,)))
     # What is left out proves nothing either: copies of a frame are told from any simulation.
     split = split.without(development.keys() - {e.name for e in layout.exposures})
     album, frames_of = Album(layout), partial(_frames_of, source, numbers)
@@ -118,9 +119,9 @@ def _found(
         search = Search(setting, camera, whole, words, step)
         proof = _proof_without(trial, whole, _calibrated_to(setting, whole, camera), step, source)
         evidence = evidence_of(whole, whole, album if large else trial.numbers.album, split)
-        found = _finding(camera, whole, whole, search, {}, proof, {})
-        found = with_first_frames(found, first)
-        return _said(found, remarks, evidence, words)
+        found = with_first_frames(_finding(camera, whole, whole, search, {}, proof, {}), first)
+        found = with_spikes(found, spikes, stored, split, asked)
+        return _said(found, remarks, evidence, asked)
     base = whole if large else State.of(setting, camera, step)
     # Of a large recording lines are looked for, and measured, in the same frames.
     frames = WholeFrames(with_all_frames(layout) if large else layout, frames_of)
@@ -156,9 +157,9 @@ def _found(
         final = whole if everything is None else everything
         departures = Change(len(whole.mismatches), len(final.mismatches))
         proof = replace(proof, discrepancies=departures)
-    found = _finding(camera, whole, final, search, gains, proof, known)
-    found = with_first_frames(found, first)
-    return _said(found, remarks, evidence, words)
+    found = with_first_frames(_finding(camera, whole, final, search, gains, proof, known), first)
+    found = with_spikes(found, spikes, stored, split, asked)
+    return _said(found, remarks, evidence, asked)
 
 
 def _taken(recording: Recording, source: Source, split: Split) -> tuple[Split, Layout]:

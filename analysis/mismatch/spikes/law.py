@@ -1,0 +1,133 @@
+"""How often spikes hit and how high they are, and what that says of frames it was not told by.
+
+Spikes of mean height m are exponential above any limit, so those above `SPIKE` noises of an
+exposure tell m wherever it is; of all hits a share exp(-limit / m) is seen there. At the white
+level a height is known to be no less.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import exp, log, nan, pi, sqrt
+
+import numpy as np
+import scipy.optimize
+import scipy.sparse.csgraph
+import scipy.stats
+from numpy.typing import NDArray
+
+from analysis.mismatch.finding import Gain
+from analysis.mismatch.spikes.hits import Hits
+from analysis.mismatch.spikes.population import SPIKE, Spikes
+from dsis.recording import Recording
+
+Array = NDArray[np.float64]
+Frames = Mapping[str, Sequence[int]]
+MOST_NATS = 100.0  # that one spike may count
+_ENDS = (0.025, 0.975)
+_WIDEST = 1e3  # times the mean of what is seen: where the mean height is looked for
+
+
+@dataclass(frozen=True)
+class SpikeLaw:
+    """Spikes of exponential height that hit every sample alike.
+
+    Attributes
+    ----------
+    share, share_error
+        Of samples hit; the error is that of a Poisson count of tracks, samples that touch.
+    mean_dn, mean_error_dn
+        Mean height above the pixel's median.
+    """
+
+    share: float
+    share_error: float
+    mean_dn: float
+    mean_error_dn: float
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """Samples looked at above their limits, and the spikes above these."""
+
+    samples: Array
+    limits_dn: Array
+    hits: Hits
+
+    @classmethod
+    def of(cls, spikes: Spikes, recording: Recording, frames: Frames) -> "_Seen":
+        samples, limits, which = [], [], np.zeros(spikes.hits.frame.size, bool)
+        for number, noise in spikes.quiet_dn.items():
+            own = frames.get(recording.exposures[number].name, ())
+            samples.append(np.full(4, len(own) * recording.rows * recording.columns / 4))
+            limits.append(SPIKE * noise.reshape(-1))
+            which |= (spikes.hits.exposure == number) & np.isin(spikes.hits.frame, list(own))
+        return cls(np.concatenate(samples), np.concatenate(limits), spikes.hits.of(which))
+
+
+def law_of(spikes: Spikes, recording: Recording, frames: Frames) -> SpikeLaw | None:
+    """Return the likeliest law of the spikes of some frames; None: they have none.
+
+    Its log-likelihood is n log s - s sum(samples exp(-limit / m)) - sum(height) / m - u log m with
+    n hits, u of which are below the white level.
+    """
+    seen = _Seen.of(spikes, recording, frames)
+    n, heights = seen.hits.frame.size, seen.hits.height_dn
+    if not n:
+        return None
+    known = max(int((~seen.hits.clipped).sum()), 1)
+
+    def less(log_mean: float) -> float:
+        m = exp(log_mean)
+        shown = float(seen.samples @ np.exp(-seen.limits_dn / m))
+        return n * log(shown) + float(heights.sum()) / m + known * log_mean
+
+    start = log(float(heights.mean()))
+    ends = (start - log(_WIDEST), start + log(_WIDEST))
+    mean = exp(float(scipy.optimize.minimize_scalar(less, bounds=ends, method="bounded").x))
+    share = n / float(seen.samples @ np.exp(-seen.limits_dn / mean))
+    sizes = _tracks(seen.hits)
+    error = sqrt(float(sizes @ sizes)) / n  # of a compound Poisson count
+    return SpikeLaw(share, share * error, mean, mean * max(error, 1 / sqrt(known)))
+
+
+def heldout_gain(
+    spikes: Spikes, recording: Recording, law: SpikeLaw | None, locked: Frames
+) -> Gain:
+    """Return what locked frames gain by a law that the others tell, nats per frame.
+
+    A spike counts ln of its density beside that of normal noise, `MOST_NATS` at most, and every
+    sample costs the share of spikes that would be seen there. Frames without a spike are many and
+    those with one alike: the interval is that of the Poisson count of tracks (Garwood, Biometrika
+    28, 1936), which frames drawn anew do not tell where it is small.
+    """
+    frames = sum(
+        len(locked.get(recording.exposures[number].name, ())) for number in spikes.quiet_dn
+    )
+    if law is None or not frames:
+        return Gain(nan, (-np.inf, np.inf))
+    seen = _Seen.of(spikes, recording, locked)
+    cost = law.share * float(seen.samples @ np.exp(-seen.limits_dn / law.mean_dn))
+    sd, z = seen.hits.noise_dn, seen.hits.ratio
+    density = log(law.share / law.mean_dn) - seen.hits.height_dn / law.mean_dn
+    noise = -0.5 * z**2 - np.log(sd * sqrt(2 * pi))
+    nats = np.clip(density - noise, -MOST_NATS, MOST_NATS)
+    n = _tracks(seen.hits).size
+    one = float(nats.sum()) / n if n else MOST_NATS
+    low = scipy.stats.chi2.ppf(_ENDS[0], 2 * n) / 2 if n else 0.0
+    high = scipy.stats.chi2.ppf(_ENDS[1], 2 * n + 2) / 2
+    value, *ends = ((count * one - cost) / frames for count in (float(n), float(low), float(high)))
+    return Gain(value, (ends[0], ends[1]))
+
+
+def _tracks(hits: Hits) -> Array:
+    """Return how many samples each track has: those of a frame that touch."""
+    if not hits.frame.size:
+        return np.zeros(0)
+    touch = (
+        (hits.exposure[:, np.newaxis] == hits.exposure)
+        & (hits.frame[:, np.newaxis] == hits.frame)
+        & (np.abs(hits.row[:, np.newaxis] - hits.row) <= 1)
+        & (np.abs(hits.column[:, np.newaxis] - hits.column) <= 1)
+    )
+    _, labels = scipy.sparse.csgraph.connected_components(touch, directed=False)
+    return np.bincount(labels).astype(np.float64)

@@ -1,0 +1,176 @@
+"""Whether far samples are spikes that no law of noise makes: few, strong, positive, one-off."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.stats
+from numpy.typing import NDArray
+
+from analysis.mismatch.scenes import SCENE
+from analysis.mismatch.source import Source
+from analysis.mismatch.spikes.hits import Hits, Looked, hits_of
+from dsis.camera import Camera
+from dsis.recording import Recording
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+SPIKE = 8.0  # noises of the pixel: what is taken for a spike where there are any
+STRONG = 30.0  # noises: no law of noise
+_ELECTRONS = 20.0  # of a strong spike: one electron of few may be far out of the noise
+_LIT = 2.0  # times the variance of the darkest exposure: light tells what an electron is
+_LEAST = 3
+_BY_TAIL = 0.02  # chance that so many are strong
+_MOST = 1e-4  # of the samples
+_COMPLETE = 0.8  # of the spikes, where noise is least, that are strong
+_TAIL = 0.25  # as many would be of a tail that falls with the square of the distance, and more
+_NEGATIVE = 0.1  # of the spikes
+_RETURNING = 0.2  # pixels that come back, beside the spikes
+_BLINKING = 0.05  # of them, where they rise as high: others may do so once
+_TWICE = 1e-3  # chance that so many pixels are hit twice
+_ECHO = 0.1  # of a spike: as much smaller a sample in its row, its column or around it follows it
+_LAG = 0.3  # of a spike, that stays at its pixel
+_NEAR = 4  # rows and columns, and frames after
+
+
+@dataclass(frozen=True)
+class Spikes:
+    """The spikes of a recording, strongest first, and what follows them.
+
+    Attributes
+    ----------
+    hits
+        One-off positive samples of uniform exposures and scenes.
+    echoes
+        Samples that a spike drags along: of its row, its column, or its pixel afterwards.
+    quiet_dn
+        Noise of uniform exposures by number, as rows and columns of the colour filter: (2, 2).
+    """
+
+    hits: Hits
+    echoes: Hits
+    quiet_dn: dict[int, Array]
+
+    @property
+    def replaced(self) -> Hits:
+        """All samples that are put aside."""
+        return Hits.joined([self.hits, self.echoes])
+
+
+def spikes_of(recording: Recording, source: Source, camera: Camera) -> Spikes | None:
+    """Return rare strong spikes; None: there are none that a law of noise could not make.
+
+    A camera that has impulses already is asked nothing.
+    """
+    if any(effect.kind == "impulse" for effect in camera.effect):
+        return None
+    uniform: dict[int, Looked] = {}
+    scenes: list[Looked] = []
+    for number, exposure in enumerate(recording.exposures):
+        if len(exposure.frames) < 2:
+            continue
+        looked = hits_of(recording, source, camera, number)
+        if exposure.kind == SCENE:
+            scenes += [] if looked is None else [looked]
+        elif looked is None:
+            return None
+        else:
+            uniform[number] = looked
+    if not uniform:
+        return None
+    count = _samples(recording, uniform)
+    hits = Hits.joined([*(own.hits for own in uniform.values()), *(own.hits for own in scenes)])
+    echo = _echoes(hits)
+    again = _returning(hits, ~echo, recording.rows * recording.columns)
+    if again is None:
+        return None
+    once = ~echo & ~again & (np.abs(hits.ratio) > SPIKE)
+    in_uniform = np.isin(hits.exposure, list(uniform))
+    if not _certain(hits.of(once & in_uniform), _electron_dn(camera, uniform), count):
+        return None
+    spikes = hits.of(once & (hits.ratio > 0))
+    spikes = spikes.of(np.argsort(-spikes.ratio, kind="stable"))
+    quiet = {number: own.noise_dn for number, own in uniform.items()}
+    return Spikes(spikes, _following(hits.of(echo & ~again), spikes), quiet)
+
+
+def _electron_dn(camera: Camera, uniform: dict[int, Looked]) -> float:
+    """Return what one electron adds, DN, at most: by the camera or by noise that grows with light.
+
+    The model's numbers may be wrong; its shot noise is what no spike may be.
+    """
+    variance = np.array([float((own.noise_dn**2).mean()) for own in uniform.values()])
+    level = np.array([float(own.level_dn.mean()) for own in uniform.values()])
+    dimmest = int(level.argmin())
+    above = level - level[dimmest]
+    lit = (above > 0) & (variance > _LIT * variance[dimmest])
+    slopes = (variance[lit] - variance[dimmest]) / above[lit]
+    return max([s.slope for s in camera.noise.segment] + [float(s) for s in slopes])
+
+
+def _samples(recording: Recording, uniform: dict[int, Looked]) -> int:
+    frames = sum(len(recording.exposures[number].frames) for number in uniform)
+    return frames * recording.rows * recording.columns
+
+
+def _certain(once: Hits, electron_dn: float, samples: int) -> bool:
+    """Return whether one-off samples are no tail of a law of noise.
+
+    Spikes of one law of heights fall below thirty noises where noise is large: so whether nearly
+    all are above is asked of the exposures where it is least, as many as say so.
+    """
+    strong = (once.ratio > STRONG) & (once.height_dn > _ELECTRONS * electron_dn)
+    positive = once.ratio > 0
+    if strong.sum() < _LEAST or positive.sum() > _MOST * samples:
+        return False
+    if (~positive).sum() > _NEGATIVE * positive.sum():
+        return False
+    for noise in np.unique(once.quiet_dn)[::-1]:
+        own = once.quiet_dn <= noise
+        n, of = int((strong & own).sum()), int(own.sum())
+        tail = scipy.stats.binom.sf(n - 1, of, _TAIL) > _BY_TAIL
+        if n >= max(_LEAST, _COMPLETE * of) and not tail:
+            return True
+    return False
+
+
+def _echoes(hits: Hits) -> Flags:
+    """Return which samples a much stronger one of the frame, or of a frame before, drags along."""
+    found = np.zeros(hits.height_dn.size, bool)
+    size = np.abs(hits.height_dn)
+    for i in np.flatnonzero(hits.ratio > STRONG):
+        own = hits.exposure == hits.exposure[i]
+        here = own & (hits.frame == hits.frame[i])
+        down, right = np.abs(hits.row - hits.row[i]), np.abs(hits.column - hits.column[i])
+        beside = (down == 0) | (right == 0) | ((down <= _NEAR) & (right <= _NEAR))
+        found |= here & beside & (size < _ECHO * size[i])
+        later = hits.frame - hits.frame[i]
+        pixel = own & (down == 0) & (right == 0) & (later > 0) & (later <= _NEAR)
+        found |= pixel & (size < _LAG * size[i])
+    return found
+
+
+def _following(echoes: Hits, spikes: Hits) -> Hits:
+    """Return the echoes of what was taken for spikes."""
+    both = Hits.joined([spikes, echoes])
+    return both.of(_echoes(both) & (np.arange(both.frame.size) >= spikes.frame.size))
+
+
+def _returning(hits: Hits, counted: Flags, pixels: int) -> Flags | None:
+    """Return which samples are of pixels that come back; None: those are too many beside others.
+
+    As many pixels as chance hits twice do not.
+    """
+    site = np.stack([hits.row, hits.column])
+    _, which = np.unique(site, axis=1, return_inverse=True)
+    which = which.reshape(-1)
+    times = np.bincount(which, weights=counted, minlength=which.max(initial=0) + 1)
+    rare = times[(times > 0) & (times <= 2)]
+    twice = int((rare == 2).sum())
+    expected = float(rare.sum()) ** 2 / (2 * pixels)
+    chance = scipy.stats.poisson.sf(twice - 1, expected) > _TWICE
+    again = times > (2 if chance else 1)
+    once = int(((times > 0) & ~again).sum())
+    blinks = np.bincount(which[counted & (hits.ratio > STRONG)], minlength=times.size) > 0
+    if again.sum() > _RETURNING * once or (again & blinks).sum() > _BLINKING * once:
+        return None
+    return np.asarray(again[which])

@@ -1,0 +1,304 @@
+"""Rare strong spikes are counted one by one and put aside; what resembles them is left alone."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from analysis.mismatch import find_mismatch
+from analysis.mismatch.source import Source
+from analysis.mismatch.spikes import Cleaned, Spikes, spikes_of, with_spikes
+from analysis.mismatch.spikes.cleaned import cleaned, without_spikes
+from analysis.mismatch.spikes.law import heldout_gain, law_of
+from analysis.mismatch.split import Split
+from dsis.cfa import Cfa
+from dsis.effects import registry
+from dsis.recording import RecordedExposure, Sensor
+from mismatch_findings import NOTHING
+from mismatch_recordings import InMemory, camera
+
+Array = NDArray[np.float64]
+ROWS, COLUMNS, BLACK, WHITE, READ, SLOPE = 128, 192, 64.0, 4095, 2.0, 0.5
+MODEL = camera(segments=((SLOPE, READ**2, None),))
+DARKS, FLATS = 3, (200.0, 600.0, 1500.0)
+EVERYTHING = frozenset({"impulse"})
+Change = Callable[[np.random.Generator, dict[str, Array]], None]
+
+
+def made(
+    seed: int,
+    change: Change | None = None,
+    *,
+    frames: int = 12,
+    cfa: str = "MONO",
+    scene: bool = False,
+    clean: Callable[[np.random.Generator, Array], Array] | None = None,
+) -> InMemory:
+    """Return darks and flats by plain numpy, changed before they become codes."""
+    rng = np.random.default_rng(seed)
+    pattern = rng.normal(0, 1, (ROWS, COLUMNS))
+    levels = {f"dark-{i}": 0.0 * pattern for i in range(DARKS)}
+    levels |= {f"flat-{i}": level * (1 + 0.01 * pattern) for i, level in enumerate(FLATS)}
+    if scene:
+        levels["scene"] = np.repeat(rng.uniform(5, 3000, (ROWS // 8, COLUMNS // 8)), 8, 0).repeat(
+            8, 1
+        )
+    noise = clean or (lambda rng, mean: rng.normal(mean, np.sqrt(SLOPE * mean.clip(0) + READ**2)))
+    stacks = {n: np.stack([noise(rng, mean) for _ in range(frames)]) for n, mean in levels.items()}
+    if change is not None:
+        change(rng, stacks)
+    codes = {
+        n: np.clip(np.rint(own + BLACK), 0, WHITE).astype(np.uint16) for n, own in stacks.items()
+    }
+    exposures = tuple(
+        RecordedExposure(
+            name,
+            name.partition("-")[0],  # type: ignore[arg-type] # one of the kinds
+            0.01 * (i + 1),
+            None if name.startswith("dark") else float(i),
+            tuple(Path(str(k)) for k in range(frames)),
+        )
+        for i, name in enumerate(stacks)
+    )
+    sensor = Sensor(name="s", cfa=Cfa(cfa), black_level=BLACK, white_level=WHITE, bit_depth=12)
+    return InMemory(sensor, exposures, ROWS, COLUMNS, Path(), codes)
+
+
+def spikes(count: int, mean_dn: float = 1500.0) -> Change:
+    """Return what adds exactly so many spikes, anywhere."""
+
+    def change(rng: np.random.Generator, stacks: dict[str, Array]) -> None:
+        sizes = np.cumsum([own.size for own in stacks.values()])
+        places = rng.choice(sizes[-1], count, replace=False)
+        for own, end in zip(stacks.values(), sizes, strict=True):
+            here = places[(places >= end - own.size) & (places < end)] - (end - own.size)
+            own.reshape(-1)[here] += rng.exponential(mean_dn, here.size)
+
+    return change
+
+
+def found(recording: InMemory) -> Spikes | None:
+    return spikes_of(recording, Source(recording), MODEL)
+
+
+def samples(recording: InMemory) -> int:
+    return sum(len(e.frames) for e in recording.exposures) * ROWS * COLUMNS
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(
+    ("count", "cfa", "scene", "frames"),
+    [
+        (13, "MONO", False, 12),
+        (13, "RGGB", True, 12),
+        (40, "RGGB", False, 12),
+        (40, "MONO", True, 4),
+        (13, "MONO", False, 3),
+        (9, "RGGB", False, 2),
+    ],
+)
+def test_spikes_are_counted(seed: int, count: int, cfa: str, scene: bool, frames: int) -> None:
+    recording = made(seed, spikes(count), cfa=cfa, scene=scene, frames=frames)
+    own = found(recording)
+    assert own is not None
+    everything = {e.name: range(frames) for e in recording.exposures}
+    law = law_of(own, recording, everything)
+    assert law is not None
+    assert abs(law.share - count / samples(recording)) < 3 * law.share_error
+    # In logarithms, for of few heights the error that is known is in proportion to their mean.
+    assert abs(np.log(law.mean_dn / 1500)) < 3 * law.mean_error_dn / law.mean_dn
+    assert 0.6 * count < own.hits.frame.size <= count
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_many_spikes_some_at_one_pixel_some_clipped(seed: int) -> None:
+    recording = made(seed, spikes(45, 2500.0))
+    own = found(recording)
+    assert own is not None
+    assert own.hits.clipped.sum() > 3
+    law = law_of(own, recording, {e.name: range(12) for e in recording.exposures})
+    assert law is not None
+    assert abs(law.mean_dn - 2500) < 3 * law.mean_error_dn
+
+    def twice(rng: np.random.Generator, stacks: dict[str, Array]) -> None:
+        spikes(20)(rng, stacks)
+        stacks["dark-0"][3, 10, 20] += 900
+        stacks["dark-0"][7, 10, 20] += 1100
+
+    own = found(made(seed, twice))
+    assert own is not None
+    here = (own.hits.row == 10) & (own.hits.column == 20)
+    assert set(own.hits.frame[here]) >= {3, 7}
+
+
+def test_spikes_are_put_aside_and_nothing_else() -> None:
+    def change(rng: np.random.Generator, stacks: dict[str, Array]) -> None:
+        spikes(20)(rng, stacks)
+        stacks["dark-1"][5, 40, 50] += 3000
+        stacks["dark-1"][5, 40, 52] += 60  # what it leaves in the sample read two later
+        stacks["dark-1"][6, 40, 50] += 90  # and in the next frame
+
+    stored = made(1, change)
+    own, source, some = without_spikes(stored, MODEL)
+    assert isinstance(own, Cleaned)
+    assert some is not None
+    dark = own.exposure("dark-1")
+    assert [int(own.frame(dark, k)[40, c]) for k, c in ((5, 50), (5, 52), (6, 50))] == (
+        pytest.approx([64] * 3, abs=5)
+    )
+    assert some.echoes.frame.size == 2
+    changed = 0
+    for e in stored.exposures:
+        for k, frame in enumerate(source.frames(e.name, range(12))):
+            assert (frame == own.frame(e, k)).all()
+            changed += int((frame != stored.frame(e, k)).sum())
+    assert changed == some.replaced.frame.size
+    assert found(replace(cleaned(stored, some.replaced))) is None  # type: ignore[arg-type]
+
+
+def test_locked_frames_prove_the_effect() -> None:
+    recording = made(2, spikes(40))
+    own, split = found(recording), Split.of(recording)
+    told = with_spikes(NOTHING, own, recording, split, EVERYTHING)
+    (effect,) = told.omitted_physics
+    assert effect.effect == "impulse"
+    assert effect.heldout_gain.ci95[0] > 0
+    assert told.mismatches[0].explained_by == "impulse"
+    assert told.mismatches[0].where.pixels is not None
+    assert told.unexplained == ()
+    assert told.verdict == "omitted_physics"
+    (added,) = told.camera.effect
+    values = {name: one.value for name, one in effect.parameters.items()}
+    assert added.model_dump(exclude={"kind"}) == pytest.approx(values)
+    for words, parts in ((frozenset[str](), split), (EVERYTHING, split.without(FLATS_AND_DARKS))):
+        left = with_spikes(NOTHING, own, recording, parts, words)
+        assert left.verdict == "unexplained"
+        assert [m.statistic for m in left.unexplained] == ["one_off_outliers"]
+        assert left.camera is NOTHING.camera
+    assert with_spikes(NOTHING, None, recording, split, EVERYTHING) is NOTHING
+
+
+FLATS_AND_DARKS = frozenset(e.name for e in made(0).exposures)
+
+
+def test_the_gain_of_a_law_that_is_not_there_is_a_loss() -> None:
+    recording = made(3, spikes(40))
+    own, split = found(recording), Split.of(recording)
+    assert own is not None
+    law = law_of(own, recording, split.development)
+    assert law is not None
+    assert heldout_gain(own, recording, law, split.locked).ci95[0] > 0
+    none = replace(own, hits=own.hits.of(np.zeros(own.hits.frame.size, bool)))
+    lost = heldout_gain(none, recording, law, split.locked)
+    assert lost.ci95[0] <= lost.nats_per_frame < 0 < lost.ci95[1]
+    assert law_of(none, recording, split.development) is None
+    assert not np.isfinite(heldout_gain(own, recording, None, split.locked).ci95[0])
+
+
+def test_a_camera_that_has_impulses_is_asked_nothing() -> None:
+    recording = made(4, spikes(40))
+    has = camera(registry()["impulse"](per_megapixel_frame=20.0, mean_dn=1500.0))
+    assert spikes_of(recording, Source(recording), has) is None
+
+
+def test_a_diagnosis_names_them() -> None:
+    told = find_mismatch(MODEL, made(5, spikes(13)), seed=1, vocabulary=frozenset({"impulse"}))
+    assert [one.effect for one in told.omitted_physics] == ["impulse"]
+    assert told.searched
+
+
+def few_electrons(rng: np.random.Generator, mean: Array) -> Array:
+    """Return light of 60 DN an electron, and a dark current of one electron in 1e4 samples."""
+    electrons: Array = rng.poisson(mean / 60 + 5e-5) * 60.0
+    return electrons + rng.normal(0, 1.5, mean.shape)
+
+
+def student(rng: np.random.Generator, mean: Array) -> Array:
+    """Return read noise of heavy tails."""
+    return rng.normal(mean, np.sqrt(SLOPE * mean.clip(0))) + READ * rng.standard_t(3, mean.shape)
+
+
+def jumping(dwell: float, share: float, height_dn: float) -> Change:
+    """Return what makes some pixels jump between two levels."""
+
+    def change(rng: np.random.Generator, stacks: dict[str, Array]) -> None:
+        which = np.argwhere(rng.random((ROWS, COLUMNS)) < share)
+        heights = rng.exponential(height_dn, len(which))
+        state = rng.random(len(which)) < 0.5
+        for own in stacks.values():
+            for frame in own:
+                state ^= rng.random(len(which)) < 1 / dwell
+                frame[tuple(which.T)] += heights * (state - 0.5)
+
+    return change
+
+
+def blinking(rng: np.random.Generator, stacks: dict[str, Array]) -> None:
+    """Make few pixels rise now and then, always high."""
+    which = np.argwhere(rng.random((ROWS, COLUMNS)) < 2e-3)
+    for own in stacks.values():
+        for frame in own:
+            frame[tuple(which.T)] += 500 * (rng.random(len(which)) < 0.05)
+
+
+def hot(rng: np.random.Generator, stacks: dict[str, Array]) -> None:
+    """Make hot pixels with the shot noise of their charge."""
+    which = rng.random((ROWS, COLUMNS)) < 5e-3
+    for i, own in enumerate(stacks.values()):
+        charge = rng.exponential(400.0 * (1 + i), which.sum())
+        own[:, which] += rng.normal(charge, np.sqrt(SLOPE * charge), (len(own), charge.size))
+
+
+def dusty(rng: np.random.Generator, stacks: dict[str, Array]) -> None:
+    """Take light away where dust lies."""
+    dust = np.where(rng.random((ROWS, COLUMNS)) < 0.02, rng.uniform(0, 0.9, (ROWS, COLUMNS)), 0)
+    for name, own in stacks.items():
+        if name.startswith("flat"):
+            np.multiply(own, 1 - dust, out=own)
+
+
+def glitches(rng: np.random.Generator, stacks: dict[str, Array]) -> None:
+    """Lift three rows of single frames."""
+    for name in ("dark-0", "flat-0", "flat-1"):
+        stacks[name][rng.integers(12), rng.integers(ROWS)] += 300
+
+
+def both_ways(rng: np.random.Generator, stacks: dict[str, Array]) -> None:
+    for own in stacks.values():
+        which = rng.random(own.shape) < 5e-5
+        own[which] += rng.choice([-1, 1], which.sum()) * rng.exponential(1500, which.sum())
+
+
+@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize(
+    ("change", "clean"),
+    [
+        (None, None),
+        (None, student),
+        (None, few_electrons),
+        (jumping(2.0, 0.01, 40.0), None),
+        (jumping(2.0, 0.001, 600.0), None),
+        (jumping(8.0, 0.002, 600.0), None),
+        (jumping(50.0, 0.002, 600.0), None),
+        (blinking, None),
+        (hot, None),
+        (dusty, None),
+        (glitches, None),
+        (both_ways, None),
+    ],
+)
+@pytest.mark.parametrize("frames", [3, 12])
+def test_what_resembles_spikes_is_left_alone(
+    seed: int,
+    change: Change | None,
+    clean: Callable[[np.random.Generator, Array], Array] | None,
+    frames: int,
+) -> None:
+    if change is glitches and frames < 12:
+        return
+    recording = made(100 + seed, change, clean=clean, frames=frames)
+    assert found(recording) is None
+    assert without_spikes(recording, MODEL)[0] is recording

@@ -71,7 +71,7 @@ def test_dark_current_is_believed_alone_and_beside_a_glow(growth: Any) -> None:
 def test_another_effect_or_one_that_has_its_mean_denies_nothing() -> None:
     assert uneven(_state(_glow(0.1)), registry()["row_noise"](sigma_dn=1.0)) is None
     assert uneven(_state(_glow(0.1)), None) is None
-    named = registry()["amp_glow"](dn_per_s=300.0)
+    named = registry()["amp_glow"](dn_per_s=3.0)
     assert uneven(_state(_glow(0.1), "time", named), DARK_CURRENT) is None
 
 

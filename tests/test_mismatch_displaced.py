@@ -266,3 +266,11 @@ def test_lines_that_differ_anew_are_no_fixed_ones(
 def test_other_effects_are_not_asked() -> None:
     state = _lines(2.0, 0.0)
     assert displaced(state, "prnu", state.vector.values, np.ones(3)) is None
+
+
+@pytest.mark.parametrize(("z", "denied"), [(3.0, False), (19.0, True)])
+def test_columns_whose_spectrum_is_not_flat_are_no_white_noise(z: float, denied: bool) -> None:
+    keys = (Key("column_spectrum_peak", "all"), Key("column_variance", "exposure", "dark"))
+    null = SimpleNamespace(departures=lambda _: np.array([z, 30.0]), mean=np.zeros(2))
+    state: Any = SimpleNamespace(vector=SimpleNamespace(keys=keys), null=null, mismatches=())
+    assert (displaced(state, "column_noise", null.mean) is not None) is denied

@@ -57,8 +57,8 @@ def displaced(state: State, kind: str, mean: Array, without: Array | None = None
         return _of_neighbours(state) or _of_limits(state) or _of_codes(state)
     if kind in _LINES:
         return _of_new_lines(state, _LINES[kind], without)
-    if kind == "row_noise":
-        return _of_alike_rows(state)
+    if kind in _WHITE:
+        return _WHITE[kind](state)
     if kind in _GREENS:
         return _of_colours(state, mean - without)
     return shared_otherwise(state, kind, without)
@@ -278,6 +278,27 @@ def _of_alike_rows(state: State) -> Denial | None:
     )
 
 
+def _of_coloured_columns(state: State) -> Denial | None:
+    """Return how white noise of columns is denied by a spectrum that is not flat; None: it is not.
+
+    Offsets that are drawn anew for each column have no frequency. Where one stands far out of the
+    spectrum of column means, with all that is named, columns are alike for another reason, which
+    may make all that they differ by.
+    """
+    left = state.null.departures(state.vector)
+    most = max(
+        (
+            float(z)
+            for key, z in zip(state.vector.keys, left, strict=False)
+            if key.statistic == "column_spectrum_peak"
+        ),
+        default=0.0,
+    )
+    if most <= FAR_OFF:
+        return None
+    return Denial(0.0, "the spectrum of column means is not flat, as that of white noise is")
+
+
 def _beyond_pixels(state: State) -> float:
     """Return which share of the variance of rows' means is not that of noise of single pixels.
 
@@ -297,3 +318,7 @@ def _beyond_pixels(state: State) -> float:
             weights += weight
     ratio = total / weights if weights else 1.0
     return max(1 - 1 / ratio, 0.0) if ratio > 0 else 0.0
+
+
+_WHITE = {"row_noise": _of_alike_rows, "column_noise": _of_coloured_columns}
+"""Noise that is drawn anew for each line, and what denies that."""

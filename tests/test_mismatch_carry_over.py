@@ -18,15 +18,8 @@ from planter import Choice, draw_case, plant
 from planter.case import Effect as Planted
 
 from analysis.mismatch import find_mismatch
-from analysis.mismatch.bank.carryover import (
-    AXES,
-    PLACES,
-    CarryOver,
-    CarryOverSums,
-    Samples,
-    profile,
-    sawteeth,
-)
+from analysis.mismatch.bank.carryover import AXES, CarryOver, CarryOverSums
+from analysis.mismatch.bank.sawtooth import PLACES, Samples, profile, sawteeth
 from analysis.mismatch.candidates.candidate import Proposal
 from analysis.mismatch.memory import Memory
 from analysis.mismatch.observe import observe

@@ -6,8 +6,8 @@ from math import log
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.mismatch.bank.carryover import PLACES, sawteeth
 from analysis.mismatch.bank.edges import edge_shapes
+from analysis.mismatch.bank.sawtooth import PLACES, sawteeth
 from analysis.mismatch.bank.seams import SMOOTH_DEGREE, beyond_smooth, seam_shapes
 from analysis.mismatch.contradicted import Denial, rival
 from analysis.mismatch.displaced import displaced

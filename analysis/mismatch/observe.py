@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.bank.bulk import Bulk
-from analysis.mismatch.bank.carryover import Samples
 from analysis.mismatch.bank.coherent import Peak, SpectrumSums
 from analysis.mismatch.bank.common import common
 from analysis.mismatch.bank.local import local_scalars, variances, widened
 from analysis.mismatch.bank.maps import ALONE
 from analysis.mismatch.bank.parts import Parts, parts
+from analysis.mismatch.bank.sawtooth import Samples
 from analysis.mismatch.bank.scalars import NAMES, UNKNOWN, Number, scalars
 from analysis.mismatch.bank.standing import NAME as FIXED_WAVE
 from analysis.mismatch.bank.standing import standing

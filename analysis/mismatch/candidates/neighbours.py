@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.mismatch.bank.carryover import PLACES, Sawtooth, sawteeth
+from analysis.mismatch.bank.sawtooth import PLACES, Sawtooth, sawteeth
 from analysis.mismatch.candidates.candidate import Candidate, Proposal, proposals
 from analysis.mismatch.clues import Clues, alike
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.mismatch.bank.carryover import Samples, profile, sawteeth
+from analysis.mismatch.bank.sawtooth import Samples, profile, sawteeth
 from analysis.mismatch.evidence import Curve
 from analysis.mismatch.observe import Observation
 

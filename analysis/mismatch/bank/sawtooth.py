@@ -1,0 +1,130 @@
+"""A converter's residue, of samples and the codes before them: the sawtooth that explains most."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from math import nan, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsis.compiled import kernel
+
+PERIODS = (8, 16, 32, 64, 128, 256, 512, 1024)
+"""Codes of a residue's period that are looked at: the steps of converters are powers of two."""
+
+PLACES = 32
+"""Places of a step in its period that are looked at."""
+
+FOLDED = PERIODS[-1]
+_FINER = 8  # places of a step between two of `PLACES`
+Array = NDArray[np.float64]
+Frame = NDArray[np.int32]
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Samples of one exposure, and what was read before each: a column each.
+
+    Attributes
+    ----------
+    one, other
+        Codes of the sample before, of two frames, folded at `PERIODS[-1]`.
+    moved
+        Change of the sample between the frames, what goes with that of the one before taken off,
+        in standard deviations.
+    before
+        Change of the sample before, DN.
+    variance_dn2
+        Of the change.
+    square_dn2
+        Sum of the squares of `before`.
+    follows
+        What was taken off, in proportion to `before`.
+    """
+
+    one: Frame
+    other: Frame
+    moved: Array
+    before: Array
+    variance_dn2: float
+    square_dn2: float
+    follows: float = 0.0
+
+
+@dataclass(frozen=True)
+class Sawtooth:
+    """The residue that explains what samples have from those before: see `AdcMemory`."""
+
+    step_dn: float
+    period: int
+    at_code: float
+    chi2: float
+
+
+@lru_cache(maxsize=8)
+def sawteeth(samples: tuple[Samples, ...], *, whole: bool = False) -> tuple[Sawtooth, ...]:
+    """Return for each of `PERIODS` the sawtooth that explains most, by least squares.
+
+    `whole`: of what goes in proportion too. Between its steps a residue is nothing else.
+    """
+    found = []
+    for period in PERIODS:
+        best, coarse = Sawtooth(0.0, period, 0.0, 0.0), period / PLACES
+        for at in coarse * np.arange(PLACES):
+            best = _better(samples, best, float(at), whole=whole)
+        for at in best.at_code + coarse / _FINER * np.arange(1 - _FINER, _FINER):
+            best = _better(samples, best, float(at) % period, whole=whole)
+        found.append(best)
+    return tuple(found)
+
+
+def _better(samples: Sequence[Samples], best: Sawtooth, at: float, *, whole: bool) -> Sawtooth:
+    """Return the better of a sawtooth and that of its period which falls at `at`."""
+    phase = (np.arange(FOLDED) - at) / best.period
+    residue = phase - np.floor(phase) - 0.5
+    top = bottom = 0.0
+    for own in samples:
+        square, moved, before = _against(residue, own.one, own.other, own.moved, own.before)
+        top += moved / sqrt(own.variance_dn2)
+        top += whole * own.follows * before / own.variance_dn2
+        bottom += (square - (not whole) * before**2 / own.square_dn2) / own.variance_dn2
+    if bottom > 0 and top**2 / bottom > best.chi2:
+        return Sawtooth(top / bottom, best.period, at, top**2 / bottom)
+    return best
+
+
+def profile(samples: Sequence[Samples], period: int, parts: int) -> tuple[Array, Array]:
+    """Return what samples have from the codes before them, over a period, and its error, DN.
+
+    By least squares over equal parts of the period: (part,), about their mean; nan where codes did
+    not occur.
+    """
+    normal, score = np.zeros((parts, parts)), np.zeros(parts)
+    for own in samples:
+        one, other = (code % period * parts // period for code in (own.one, own.other))
+        apart = np.zeros((one.size, parts))
+        np.add.at(apart, (np.arange(one.size), one), 1.0)
+        np.add.at(apart, (np.arange(one.size), other), -1.0)
+        along = own.before @ apart / own.square_dn2
+        apart -= own.before[:, np.newaxis] * along
+        normal += apart.T @ apart / own.variance_dn2
+        score += apart.T @ own.moved / sqrt(own.variance_dn2)
+    inverse = np.linalg.pinv(normal, rcond=1e-6, hermitian=True)
+    errors = np.sqrt(np.maximum(np.diag(inverse), 0.0))
+    met = np.diag(normal) > 0
+    return np.where(met, inverse @ score, nan), np.where(met, errors, nan)
+
+
+@kernel
+def _against(
+    residue: Array, one: Frame, other: Frame, moved: Array, before: Array
+) -> tuple[float, float, float]:
+    """Return the sums of a residue's change squared, times what moved, and what moved before."""
+    square = along = through = 0.0
+    for i in range(one.size):
+        apart = residue[one[i]] - residue[other[i]]
+        square += apart * apart
+        along += apart * moved[i]
+        through += apart * before[i]
+    return square, along, through

@@ -13,6 +13,7 @@ from scipy.stats import chi2, norm
 from analysis.mismatch.candidates.response import skewness_below
 from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.layout import Place
+from analysis.mismatch.leftout import left_out
 from analysis.mismatch.recalibrate import code_step
 from analysis.mismatch.resolved import FAR_OFF
 from analysis.mismatch.sharing import of_charge, shared_otherwise
@@ -39,7 +40,8 @@ def displaced(state: State, kind: str, mean: Array, without: Array | None = None
     of noise that leans. Where that leaves half of the misfit or less, there may be no bend; nor
     where variances scatter no more than codes that are not equally wide make them. Of a bend that
     levels show nothing is asked. Of filters and crosstalk, how alike neighbours are at each level;
-    of greens that differ, what other colours share with them.
+    of greens that differ, what other colours share with them. Of widths of codes, whether it is
+    codes that never occur which make them differ.
 
     Parameters
     ----------
@@ -57,8 +59,8 @@ def displaced(state: State, kind: str, mean: Array, without: Array | None = None
         return _of_neighbours(state) or _of_limits(state) or _of_codes(state)
     if kind in _LINES:
         return _of_new_lines(state, _LINES[kind], without)
-    if kind in _WHITE:
-        return _WHITE[kind](state)
+    if kind in _SAID:
+        return _SAID[kind](state)
     if kind in _GREENS:
         return _of_colours(state, mean - without)
     return shared_otherwise(state, kind, without)
@@ -320,5 +322,9 @@ def _beyond_pixels(state: State) -> float:
     return max(1 - 1 / ratio, 0.0) if ratio > 0 else 0.0
 
 
-_WHITE = {"row_noise": _of_alike_rows, "column_noise": _of_coloured_columns}
-"""Noise that is drawn anew for each line, and what denies that."""
+_SAID = {
+    "row_noise": _of_alike_rows,
+    "column_noise": _of_coloured_columns,
+    "adc_dnl": left_out,
+}
+"""What of an effect a state says by itself: that lines are drawn anew, widths of codes too."""

@@ -25,7 +25,7 @@ from analysis.mismatch.layout import Layout, Place, Taken
 from analysis.mismatch.scenes import Local
 from analysis.mismatch.summed import ChannelSums, Looked, SensorSums, measure
 from analysis.mismatch.touches import RECORDED, SPECTRA, SPIKES
-from dsis.measures import Channel, Lattice, Measured
+from dsis.measures import Channel, Lattice, Measured, Middle
 from dsis.recording.ahead import in_order
 
 Array = NDArray[np.float64]
@@ -97,6 +97,8 @@ class Observation:
         Kept on demand: samples and those read before, by axis, of each exposure.
     lattices
         Where the codes lie that occur, by exposure and channel, clipped ends left out.
+    middles
+        Kept on demand: codes in the middle of their histograms, by exposure and channel.
     """
 
     levels: Mapping[Place, Level]
@@ -109,6 +111,7 @@ class Observation:
     local: Mapping[Place, Level] = field(default_factory=dict)
     carried: Mapping[str, tuple[Samples, ...]] = field(default_factory=dict)
     lattices: Mapping[Place, Lattice] = field(default_factory=dict)
+    middles: Mapping[Place, Middle] = field(default_factory=dict)
 
     def level(self, place: Place) -> Level | None:
         """Return mean and variance at a place, of a scene or not; None: it is none."""
@@ -184,6 +187,7 @@ def observing(
     levels: dict[Place, Level] = {}
     found: dict[Place, Mapping[str, Number]] = {}
     lattices: dict[Place, Lattice] = {}
+    middles: dict[Place, Middle] = {}
     sums: dict[str, ChannelSums] = {}
     whole = SensorSums(layout, samples=kept.images and kept.samples, made=kept.made)
 
@@ -199,6 +203,7 @@ def observing(
         still = {name for name in layout.channels if (one.exposure, name) in layout.still}
         whole.add(one, still=bool(still))
         lattices |= _lattices(one.exposure, measured)
+        middles |= _middles(one.exposure, measured) if kept.images else {}
         if watch is not None:
             watch(one.exposure, measured)
         for name, channel in measured.channels.items():
@@ -230,7 +235,15 @@ def observing(
         local,
         whole.memory.samples,
         lattices,
+        middles,
     )
+
+
+def _middles(exposure: str, measured: Measured) -> dict[Place, Middle]:
+    """Return the middle of each channel's histogram, where it holds enough samples."""
+    codes = {name: channel.codes for name, channel in measured.channels.items()}
+    own = {(exposure, name): one.middle for name, one in codes.items() if one is not None}
+    return {place: middle for place, middle in own.items() if middle is not None}
 
 
 def _lattices(exposure: str, measured: Measured) -> dict[Place, Lattice]:

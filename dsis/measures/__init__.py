@@ -5,7 +5,7 @@ scalar measures and their units are `MEASURES`, the arrays behind them are in `C
 """
 
 from dsis.measures.accumulator import Accumulator, measure_exposure
-from dsis.measures.codes import Codes, Lattice
+from dsis.measures.codes import Codes, Lattice, Middle
 from dsis.measures.estimate import Estimate
 from dsis.measures.measured import Channel, Measured
 from dsis.measures.pairs import PairVariance
@@ -21,6 +21,7 @@ __all__ = [
     "Estimate",
     "Lattice",
     "Measured",
+    "Middle",
     "PairVariance",
     "Response",
     "measure",

@@ -26,6 +26,8 @@ _LEAST_CODES = 4  # whose common step is larger by chance once in 8 times, much 
 _LEAK = 1e-7  # of the smooth density's power is let into the band
 _REMEMBERED = 4096  # transforms up to this size keep their bands: 17 MB at most
 _LEAST_DOF, _NODES = 4.0, 20
+_MIDDLE = (0.05, 0.95)  # of the samples: there no density is less than a tenth of its mean
+_EXPECTED = 300.0  # samples a code there on average: at a tenth of it none is missed by chance
 
 
 @dataclass(frozen=True)
@@ -50,6 +52,32 @@ class Lattice:
     def phase(self, step: int) -> int:
         """Return what codes leave when divided by a step that their own is a multiple of, DN."""
         return self.code % step
+
+
+@dataclass(frozen=True)
+class Middle:
+    """Codes in the middle of a histogram, and which of them never occur.
+
+    Attributes
+    ----------
+    first, last
+        Codes at 5 and 95 % of the samples, DN.
+    step
+        Between codes that a converter gives, DN.
+    absent
+        Codes between that never occur, though each would many times were all equally wide, DN:
+        int64, ascending.
+    """
+
+    first: int
+    last: int
+    step: int
+    absent: NDArray[np.int64]
+
+    @property
+    def codes(self) -> int:
+        """How many there are, absent or not."""
+        return (self.last - self.first) // self.step + 1
 
 
 class CodeCounts:
@@ -157,6 +185,21 @@ class Codes:
         if not used.size:
             return None
         return Lattice(self.lowest + int(used[0]), int(np.gcd.reduce(np.diff(used))))
+
+    @property
+    def middle(self) -> Middle | None:
+        """The middle of the histogram; None: its codes have too few samples to tell absent ones."""
+        if self.lattice is None or self.lattice.step < 1:
+            return None
+        step = self.lattice.step
+        counts = self.counts[(self.lattice.code - self.lowest) % step :: step]
+        start = self.lowest + (self.lattice.code - self.lowest) % step
+        first, last = np.searchsorted(np.cumsum(counts), np.array(_MIDDLE) * counts.sum())
+        inside = counts[first : last + 1]
+        if inside.size < _LEAST_CODES or inside.mean() < _EXPECTED:
+            return None
+        absent = start + step * (first + np.flatnonzero(inside == 0))
+        return Middle(int(start + step * first), int(start + step * last), step, absent)
 
     @cached_property
     def _inner(self) -> NDArray[np.intp]:

@@ -19,7 +19,7 @@ sys.path.insert(0, str(Path(__file__).parent))  # processes that are started afr
 from planter.finder import FINDER, diagnose
 from planter.ledger import fingerprint, versions, work_through
 from second.cases import conceal, hand_values, seal
-from second.dealing import deal
+from second.dealing import deal, deal_unlisted
 from second.judging import judge
 from second.summary import figures, parameters, shortfalls
 
@@ -27,7 +27,8 @@ from second.summary import figures, parameters, shortfalls
 def concealed(options: argparse.Namespace) -> dict[str, dict[str, Any]]:
     """Write all recordings and the key; print its hash; return it."""
     tasks = {}
-    for hand in deal(options.seed, options.cases):
+    hands = deal_unlisted() if options.unlisted else deal(options.seed, options.cases)
+    for hand in hands:
         name = f"case-{hand.number:03d}"
         folder = str(options.work / name)
         tasks[name] = {"hand": hand_values(hand), "seed": options.seed, "folder": folder}
@@ -59,12 +60,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--cases", type=int, default=48)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--unlisted", action="store_true", help="each effect on no list, alone")
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--work", type=Path)
     parser.add_argument("--finder", default=FINDER)
     options = parser.parse_args()
     if options.work is None:
-        options.work = Path(gettempdir()) / f"dsis-second-{options.seed}-{options.cases}"
+        which = "unlisted" if options.unlisted else options.cases
+        options.work = Path(gettempdir()) / f"dsis-second-{options.seed}-{which}"
     options.work.mkdir(parents=True, exist_ok=True)
     key = concealed(options)
     tasks = {

@@ -12,6 +12,7 @@ from scipy.stats import chi2, norm
 
 from analysis.mismatch.candidates.response import skewness_below
 from analysis.mismatch.contradicted import Denial
+from analysis.mismatch.gathered import gathered
 from analysis.mismatch.layout import Place
 from analysis.mismatch.leftout import left_out
 from analysis.mismatch.recalibrate import code_step
@@ -326,5 +327,7 @@ _SAID = {
     "row_noise": _of_alike_rows,
     "column_noise": _of_coloured_columns,
     "adc_dnl": left_out,
+    "read_noise_spread": gathered,
+    "rts": gathered,
 }
-"""What of an effect a state says by itself: that lines are drawn anew, widths of codes too."""
+"""What a state says of an effect by itself: whether lines, codes or pixels differ one by one."""

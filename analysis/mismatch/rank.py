@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from analysis.mismatch.candidates import CANDIDATES, Proposal
 from analysis.mismatch.credited import joined, together
 from analysis.mismatch.instance import (
+    LINES,
     Frequency,
     frequency_of,
     instance,
@@ -42,6 +43,7 @@ _COSINE = 0.5  # of what two predictions change, from which they change the same
 _SPARSE = 4  # times as many simulations
 _BY_FRAME = frozenset({"frame_variance"})
 _BY_JUMPS = frozenset({"rts"})
+_BY_FRAMES = _BY_JUMPS | LINES
 # A sign: half of the pairs of frames show nothing, half show it twice. A band: one bin's phase.
 # Pink noise and bands of rows: most of it in a frame's mean and in the first few bins. Gains that
 # neighbours share: in few patches. Hot pixels: the few brightest ones.
@@ -111,9 +113,9 @@ def ranked(
     predictor = state.predictor()
     before = predictor.loglik(state.null.mean)
     tried = _tried(state, kinds, memory, step, settled, apart, possible)
-    tried = [  # frames tell jumps of few pixels from what has the same sums
-        (max(value, before + shown(own.effect)) if kind in _BY_JUMPS else value, kind, own)
-        for value, kind, own in tried
+    told = partial(_at_once, shown)
+    tried = [  # frames tell jumps of few pixels from what has the same sums, and waves from noise
+        (max(value, before + _gained(state, own, told)), kind, own) for value, kind, own in tried
     ]
     tried.sort(key=lambda one: -one[0])
     best = max((value for value, _, _ in tried), default=0.0)
@@ -162,15 +164,28 @@ def _in_order(state: State, found: Sequence[Fit], shown: Callable[[Effect], floa
     """Return fitted effects with their gains, the best first."""
     predictor = state.predictor()
     judged = ~_others(state, [own.mean for _, _, own in found])
-    fitted, there = [], state.camera.effect
+    fitted = []
     for kind, start, own in found:
         gain = predictor.gain(own.mean, start.of_pixels, judged) - start.price
-        # Frames tell a wave from noise, and not from one that the camera has there already.
-        if not any(same_place(start.effect, one, state.setting.layout) for one in there):
-            paid = 0 if kind in _BY_JUMPS else start.price  # odds of all sizes have paid for them
-            gain = max(gain, shown(start.effect) - paid)
-        fitted.append(Ranked(gain, kind, start, own))
+        fitted.append(Ranked(max(gain, _gained(state, start, shown)), kind, start, own))
     return sorted(fitted, key=lambda one: -one.gain)
+
+
+def _at_once(shown: Callable[[Effect], float], effect: Effect) -> float:
+    """Return what whole frames gain by an effect that they tell before it is fitted."""
+    return shown(effect) if effect.kind in _BY_FRAMES else -np.inf
+
+
+def _gained(state: State, start: Proposal, shown: Callable[[Effect], float]) -> float:
+    """Return what whole frames gain by an effect, less its price; minus infinity: nothing.
+
+    They tell a wave from noise, and not from one that the camera has there already.
+    """
+    effect = start.effect
+    if any(same_place(effect, one, state.setting.layout) for one in state.camera.effect):
+        return -np.inf
+    paid = 0.0 if effect.kind in _BY_JUMPS else start.price  # odds of all sizes have paid for them
+    return shown(effect) - paid
 
 
 def _once_more(state: State, found: Sequence[Fit]) -> list[Fit]:

@@ -37,6 +37,11 @@ def deal(seed: int, count: int) -> list[Hand]:
     ]
 
 
+def deal_unlisted() -> list[Hand]:
+    """Return a hand for each effect that is on no list: that alone."""
+    return [Hand(number, (), kind, False, False) for number, kind in enumerate(UNLISTED)]
+
+
 def _effects(seed: int, count: int) -> list[tuple[list[str], str | None]]:
     g = np.random.default_rng([seed, 1])
     nulls = round(0.25 * count)

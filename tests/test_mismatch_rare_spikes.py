@@ -159,6 +159,24 @@ def test_spikes_are_put_aside_and_nothing_else() -> None:
     assert found(replace(cleaned(stored, some.replaced))) is None  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize("frames", [2, 3])
+def test_what_stands_in_place_of_a_spike_has_moved_with_its_frame(frames: int) -> None:
+    def change(rng: np.random.Generator, stacks: dict[str, Array]) -> None:
+        spikes(9)(rng, stacks)
+        stacks["dark-1"][0] += 40
+        stacks["dark-1"][:2, [40, 60], [50, 70]] += 1000 * np.eye(2)
+
+    stored = made(4, change, frames=frames)
+    own, _, some = without_spikes(stored, MODEL)
+    assert some is not None
+    dark = own.exposure("dark-1")
+    moved = [own.frame(dark, k)[y, x] for k, y, x in ((0, 40, 50), (1, 60, 70))]
+    # In one frame alone a pixel has its pattern and noise of 2.2 DN.
+    assert moved == pytest.approx([BLACK + 40, BLACK], abs=9)
+    here = (some.hits.exposure == 1) & np.isin(some.hits.row, [40, 60])
+    assert some.hits.height_dn[here] == pytest.approx([1000, 1000], abs=12)
+
+
 def test_locked_frames_prove_the_effect() -> None:
     recording = made(2, spikes(40))
     own, split = found(recording), Split.of(recording)

@@ -97,7 +97,7 @@ def calibrate(
     """
     switches = tuple(s.upper_dn for s in camera.noise.segment if s.upper_dn is not None)
     left_out = frozenset([interpolated] if interpolated else [])
-    left_out |= flattened(layout, seen.levels)
+    left_out |= flattened(layout, seen.levels, camera)
     start = camera.black_level - layout.black_dn
     slopes = [s.slope for s in camera.noise.segment]
     spiky = _spiky(seen.levels)

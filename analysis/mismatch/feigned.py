@@ -32,6 +32,7 @@ _GROWING = frozenset({"row_prnu", "column_prnu"})
 _CLEAR = 5.0  # standard errors of what stands out
 _LEAST_NUMBER = 0.5  # of a cube root of a variance: below, its error is another's
 _SHAPED = frozenset({"half_seam", "parity", STATISTIC})
+_NEIGHBOURS = frozenset({"fixed_correlation_0_1", "fixed_correlation_1_0", "fixed_patch_variance"})
 _MOST = 0.5  # of a pattern's variance, or of tails, that something else may feign
 _SCATTER = 1.84  # see `coded`
 _FEW_ELECTRONS = 1.0  # skewness of shot noise of one electron: read noise beside it lessens it
@@ -48,7 +49,7 @@ def of_another(state: State, effect: Effect, without: Array) -> Denial | None:
     return (
         feigned(state, kind, without)
         or outlying(state, kind)
-        or waved(state, kind)
+        or coloured(state, kind)
         or stepped(state, kind)
         or edged(state, kind)
         or single(state, effect)
@@ -336,15 +337,16 @@ def outlying(state: State, kind: str) -> Denial | None:
     return Denial(most / plain, "few pixels that stand far out make most of what it would explain")
 
 
-def waved(state: State, kind: str) -> Denial | None:
-    """Return how a pattern of all pixels is denied by a wave that stands in its map; None: not.
+def coloured(state: State, kind: str) -> Denial | None:
+    """Return how a pattern of all pixels is denied by a map that is not white; None: it is not.
 
     A pattern that is drawn anew for each pixel has the same power at all frequencies, as noise has.
-    Where a wave is left unexplained, and half of the map's variance beyond noise, lines and smooth
-    surfaces is of few frequencies, all pixels may be alike but for it: the median bin knows of the
-    many.
+    Where a wave is left unexplained, or that neighbours are alike, and half of the map's variance
+    beyond noise, lines and smooth surfaces is of few frequencies, all pixels may be alike but for
+    it: the median bin knows of the many.
     """
-    if kind not in _MAPS or all(m.statistic != FIXED_WAVE for m in state.mismatches):
+    called = {m.statistic for m in state.mismatches} & {FIXED_WAVE, *_NEIGHBOURS}
+    if kind not in _MAPS or not called:
         return None
     plain, most = 0.0, 0.0
     for image, noise in _maps(state, kind):
@@ -354,8 +356,8 @@ def waved(state: State, kind: str) -> Denial | None:
         most += white_level(power, 1) - 1
     if plain <= 0 or most >= _MOST * plain:
         return None
-    why = "a wave that stands still makes most of what it would explain"
-    return Denial(max(most / plain, 0.0), why)
+    why = "a wave that stands still makes" if FIXED_WAVE in called else "neighbours have in common"
+    return Denial(max(most / plain, 0.0), f"{why} most of what it would explain")
 
 
 def _maps(state: State, kind: str) -> list[tuple[Array, float]]:

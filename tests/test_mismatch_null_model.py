@@ -48,6 +48,24 @@ def test_rounding_is_undone(mean: float, sigma: float) -> None:
     assert stretch > 0
 
 
+@pytest.mark.parametrize("sigma", [1.0, 4.5, 12.0, 60.0])
+@pytest.mark.parametrize("above", [-0.5, 0.0, 1.0, 2.0, 3.0])
+@pytest.mark.parametrize("at_white", [False, True])
+def test_what_an_end_of_the_converter_cuts_off_is_undone(
+    sigma: float, above: float, at_white: bool
+) -> None:
+    """Noise `above` standard deviations from the lowest code or the white level, by scipy."""
+    codes = np.arange(4096)
+    mean = 4095 - above * sigma if at_white else above * sigma
+    edges = np.concatenate([[-np.inf], codes[1:] - 0.5, [np.inf]])
+    share = np.diff(norm.cdf(edges, mean, sigma))
+    recorded = float(share @ codes)
+    back, variance, stretch = unrounded(recorded, float(share @ (codes - recorded) ** 2), 4095)
+    assert back == pytest.approx(mean, abs=1e-4 * sigma)
+    assert variance == pytest.approx(sigma**2, rel=1e-4)
+    assert 1 <= stretch < 20
+
+
 @given(
     step=st.integers(2, 40),
     part=st.floats(0, 1, exclude_max=True),

@@ -10,6 +10,8 @@ _WIDE = 1.0  # DN; above, and away from the ends, rounding adds 1/12 to 1e-8
 _REACH = 8.0
 _LEAST_LOG = -14.0  # of a variance, codes^2: less is none
 _SOLVED = 1e-8  # codes and squared codes
+_CUT = 5.0  # recorded standard deviations: nearer to an end noise was cut, and was wider before
+_WIDER = 4.0  # times as wide, and as far out of it, at most: beyond, little is left of its shape
 _NARROW = (0.08, 0.12, 0.17, 0.24, 0.34, 0.48)  # standard deviations, codes
 
 
@@ -72,7 +74,8 @@ def unrounded(
         mean, last = (mean_dn - phase_dn) / step_dn, (white_dn - phase_dn) // step_dn
         before, variance, grown = unrounded(mean, variance_dn2 / step_dn**2, last)
         return before * step_dn + phase_dn, variance * step_dn**2, grown
-    if variance_dn2 > 4 * _WIDE**2 and variance_dn2**0.5 * _REACH < mean_dn:
+    end = min(mean_dn, white_dn - mean_dn)
+    if variance_dn2 > 4 * _WIDE**2 and variance_dn2**0.5 * _REACH < end:
         return mean_dn, variance_dn2 - 1 / 12, 1.0
     if variance_dn2 <= 1e-4:
         return mean_dn, variance_dn2, np.inf
@@ -82,8 +85,11 @@ def unrounded(
         return np.asarray(_recorded(float(at[0]), float(at[1]), white_dn) - recorded)
 
     usual = np.array([mean_dn, np.log(max(variance_dn2 - 1 / 12, 0.03))])
-    most = max(np.log(variance_dn2 + 1), usual[1] + 1e-3)
-    inside = ([mean_dn - 1, _LEAST_LOG], [mean_dn + 1, most])
+    far, wider, sd = 1.0, 1.0, variance_dn2**0.5
+    if sd > _WIDE / 2 and end < _CUT * sd:
+        far, wider = max(_WIDER * sd, 1.0), _WIDER**2
+    most = max(np.log(wider * variance_dn2 + 1), usual[1] + 1e-3)
+    inside = ([mean_dn - far, _LEAST_LOG], [mean_dn + far, most])
     found = least_squares(miss, usual, bounds=inside, xtol=1e-13, ftol=1e-13, gtol=1e-13)
     if np.abs(found.fun).max() > _SOLVED:  # narrow noise: far from the start, past flat stretches
         starts = [

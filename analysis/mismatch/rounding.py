@@ -62,23 +62,24 @@ def unrounded(
     white_dn: float,
     step_dn: float = 1.0,
     phase_dn: float = 0.0,
-) -> tuple[float, float, float]:
-    """Return the mean and the variance before rounding, and by how much its error grows.
+) -> tuple[float, float, float, float]:
+    """Return the mean and the variance before rounding, and by how much their errors grow.
 
     The inverse of `rounded`. The third is the standard error of the variance before rounding over
-    that of a normal variate of the recorded variance: mean and variance of few codes err together,
-    as their third and fourth moments say. Where all samples have one code nothing can be told: the
-    variance comes back as recorded, and the third is infinite.
+    that of a normal variate of the recorded variance, the fourth that of the mean over that of the
+    recorded one: mean and variance of few codes err together, as their third and fourth moments
+    say. Where all samples have one code nothing can be told: the variance comes back as recorded,
+    and the third and the fourth are infinite.
     """
     if step_dn != 1:
         mean, last = (mean_dn - phase_dn) / step_dn, (white_dn - phase_dn) // step_dn
-        before, variance, grown = unrounded(mean, variance_dn2 / step_dn**2, last)
-        return before * step_dn + phase_dn, variance * step_dn**2, grown
+        before, variance, *errors = unrounded(mean, variance_dn2 / step_dn**2, last)
+        return before * step_dn + phase_dn, variance * step_dn**2, errors[0], errors[1]
     end = min(mean_dn, white_dn - mean_dn)
     if variance_dn2 > 4 * _WIDE**2 and variance_dn2**0.5 * _REACH < end:
-        return mean_dn, variance_dn2 - 1 / 12, 1.0
+        return mean_dn, variance_dn2 - 1 / 12, 1.0, 1.0
     if variance_dn2 <= 1e-4:
-        return mean_dn, variance_dn2, np.inf
+        return mean_dn, variance_dn2, np.inf, np.inf
     recorded = np.array([mean_dn, variance_dn2])
 
     def miss(at: Array) -> Array:
@@ -102,13 +103,16 @@ def unrounded(
         found = min(found, other, key=lambda one: float(one.cost))
     mean, log_variance = (float(value) for value in found.x)
     variance = float(np.exp(log_variance))
-    inverse = np.linalg.pinv(np.asarray(found.jac), rcond=1e-9)[1] * variance
+    inverse = np.linalg.pinv(np.asarray(found.jac), rcond=1e-9)
+    inverse[1] *= variance
     codes, share = _codes(mean, variance**0.5, white_dn)
     second, third, fourth = (float((share * (codes - mean_dn) ** k).sum()) for k in (2, 3, 4))
-    errors = np.array([[second, third], [third, fourth - second**2]])
-    grown = float(inverse @ errors @ inverse) / (2 * variance_dn2**2)
-    solved = bool(np.abs(found.fun).max() < _SOLVED) and grown > 0
-    return mean, variance, float(np.sqrt(grown)) if solved else np.inf
+    apart = np.array([[second, third], [third, fourth - second**2]])
+    of_mean, of_variance = (float(row @ apart @ row) for row in inverse)
+    if np.abs(found.fun).max() >= _SOLVED or not of_variance > 0:
+        return mean, variance, np.inf, np.inf
+    grown = np.sqrt([of_variance / (2 * variance_dn2**2), of_mean / variance_dn2])
+    return mean, variance, float(grown[0]), float(grown[1])
 
 
 def _recorded(mean_dn: float, log_variance: float, white_dn: float) -> Array:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from analysis.photon_transfer import fit_camera
-from dsis.camera import BaseNoise, Camera, Segment, read_camera
+from dsis.camera import BaseNoise, Camera, Segment, read_camera, write_camera
 from dsis.cfa import Cfa
 from dsis.cli import main
 from dsis.effects import registry
@@ -72,6 +72,20 @@ def test_what_cannot_be_fitted_gets_a_message(
     ):
         assert main(arguments) == 2
         assert capsys.readouterr().err.startswith("dsis: ")
+
+
+def test_messages_name_the_file_that_was_given(
+    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    few, mono = tmp_path / "few", tmp_path / "mono.toml"
+    simulate(PLANTED, [flat("flat", 900.0, frames=2, exposure_time_s=0.01)], 8, 8, few, seed=1)
+    write_camera(PLANTED.model_copy(update={"cfa": Cfa.MONO}), mono)
+    for arguments, file, key in (
+        (["fit", str(few), "-o", str(tmp_path / "camera.toml")], few, "exposure"),
+        (["simulate", str(mono), "--like", str(recording), "-o", "x"], mono, "cfa"),
+    ):
+        assert main(["camera", *arguments]) == 2
+        assert capsys.readouterr().err.startswith(f"dsis: {file}: {key}: ")
 
 
 def test_the_same_sensor_with_the_recordings_own_seed(tmp_path: Path) -> None:

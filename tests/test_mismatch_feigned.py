@@ -6,9 +6,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter
 
 from analysis.mismatch.bank.key import Key
-from analysis.mismatch.feigned import feigned, heated, outlying, stepped
+from analysis.mismatch.feigned import coloured, feigned, heated, outlying, stepped
 
 NUMBERS = (0, 1, 2, 4, 5, 6)  # of eight frames two are locked
 FRAMES, PIXELS = 6, 200_000
@@ -178,3 +179,47 @@ def test_few_pixels_that_stand_out_are_no_pattern(
     assert (outlying(state, kind) is not None) == denied
     state.mismatches[0].statistic = "fixed_pixel_variance"
     assert outlying(state, kind) is None
+
+
+@pytest.mark.parametrize("shape", [(40, 60), (61, 97), (96, 128)])
+@pytest.mark.parametrize(("kind", "name"), [("dsnu", "offset"), ("prnu", "gain")])
+@pytest.mark.parametrize(
+    ("pattern", "bend", "denied"),
+    [(0.0, 0.0, True), (0.0, 2.0, True), (0.3, 0.0, True), (1.5, 0.0, False), (1.5, 2.0, False)],
+)
+def test_a_wave_is_no_pattern_of_all_pixels(
+    shape: tuple[int, int], kind: str, name: str, pattern: float, bend: float, denied: bool
+) -> None:
+    """A wave of variance 1, of straight crests or bent ones, in noise of 1, rows and a tilt."""
+    rng = np.random.default_rng(3)
+    y, x = np.indices(shape)
+    angle = 2 * np.pi * (0.11 * x + 0.07 * y) + bend * np.sin(2 * np.pi * y / shape[0])
+    image = rng.normal(0, 1, shape) + pattern * rng.normal(0, 1, shape) + np.sqrt(2) * np.cos(angle)
+    image += rng.normal(0, 1, (shape[0], 1)) + 3 * x / shape[1]
+    state: Any = SimpleNamespace(
+        setting=SimpleNamespace(seen=SimpleNamespace(images={("MONO", name): (image, 1.0)})),
+        mismatches=[SimpleNamespace(statistic="fixed_spectral_peak")],
+    )
+    assert (coloured(state, kind) is not None) == denied
+    state.mismatches[0].statistic = "fixed_pixel_variance"
+    assert coloured(state, kind) is None
+
+
+@pytest.mark.parametrize("shape", [(40, 60), (61, 97), (96, 128)])
+@pytest.mark.parametrize(
+    ("width", "pattern", "denied"),
+    [(1.0, 0.0, True), (2.0, 0.3, True), (2.0, 1.5, False), (0.0, 1.0, False)],
+)
+def test_what_neighbours_have_in_common_is_no_pattern_of_single_pixels(
+    shape: tuple[int, int], width: float, pattern: float, denied: bool
+) -> None:
+    """A field of variance 1 that a Gaussian of `width` pixels has smoothed, in noise of 1."""
+    rng = np.random.default_rng(5)
+    field = gaussian_filter(rng.normal(0, 1, shape), width) if width else np.zeros(shape)
+    image = field / (field.std() or 1.0) + np.hypot(1, pattern) * rng.normal(0, 1, shape)
+    state: Any = SimpleNamespace(
+        setting=SimpleNamespace(seen=SimpleNamespace(images={("MONO", "offset"): (image, 1.0)})),
+        mismatches=[SimpleNamespace(statistic="fixed_correlation_0_1")],
+    )
+    assert (coloured(state, "dsnu") is not None) == denied
+    assert coloured(state, "prnu") is None

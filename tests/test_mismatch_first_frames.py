@@ -1,7 +1,11 @@
 """First frames that follow darkness are left out, and said to be; frames that wander are not."""
 
+import tracemalloc
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,6 +17,7 @@ from analysis.mismatch.split import Split
 from analysis.mismatch.unsettled import (
     STATISTIC,
     Unsettled,
+    _frame_means,
     told_beside,
     unsettled,
     with_first_frames,
@@ -83,6 +88,24 @@ def test_nothing_is_left_out_of_what_does_not_differ_or_wanders(tmp_path: Path, 
     flicker = 1 + 0.01 * rng.normal(0, 1, (3, 8)) * (seed % 2)
     warming = 1 + 0.01 * np.linspace(0, 1, 8) * (seed % 3)  # all along, and no first frame
     assert seen(written(tmp_path, seed, flicker * warming)) == ()
+
+
+def test_frames_are_read_one_by_one() -> None:
+    """Of ten frames of a large sensor no ten are held as floats."""
+    frame = np.zeros((500, 500), np.uint16)
+    noise = np.random.default_rng(1).integers(0, 7, frame.shape, np.uint16)  # variance 4
+
+    def frames(_name: str, numbers: Sequence[int]) -> Iterator[NDArray[np.uint16]]:
+        return (frame + np.uint16(k) + noise * np.uint16(k == 9) for k in numbers)
+
+    source: Any = SimpleNamespace(frames=frames)
+    tracemalloc.start()
+    means, white = _frame_means(source, "flat", range(10))
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert means == pytest.approx([*range(9), 12], abs=0.02)
+    assert white == pytest.approx(np.full(10, 4 / 2 / frame.size), rel=0.02)
+    assert peak < 6 * 8 * frame.size
 
 
 def test_one_exposure_says_nothing_of_first_frames(tmp_path: Path) -> None:

@@ -12,8 +12,10 @@ from analysis.mismatch.uneven import uneven
 from analysis.mismatch.unmet import _of_its_map
 from analysis.mismatch.wander import wandering_dn2
 from dsis.effects import registry
+from mismatch_recordings import camera
 
 SLOPE, READ = 2.0, 30.0
+MODEL = camera(segments=((SLOPE, READ, None),))
 
 
 def _layout(flats: int) -> Any:
@@ -52,13 +54,41 @@ SIGNALS = [100.0, 400.0, 900.0, 1600.0, 2500.0]
 def test_flats_at_the_full_well_are_left_out(
     full_well: float, curvature: float, expected: set[str]
 ) -> None:
-    found = flattened(_layout(5), _levels(SIGNALS, full_well, curvature))
+    found = flattened(_layout(5), _levels(SIGNALS, full_well, curvature), MODEL)
     assert found == expected
 
 
 def test_two_flats_below_are_needed() -> None:
-    assert flattened(_layout(2), _levels(SIGNALS[:2], 300.0)) == frozenset()
-    assert flattened(_layout(3), _levels(SIGNALS[:3], 800.0)) == {"flat-2"}
+    assert flattened(_layout(2), _levels(SIGNALS[:2], 300.0), MODEL) == frozenset()
+    assert flattened(_layout(3), _levels(SIGNALS[:3], 800.0), MODEL) == {"flat-2"}
+
+
+def _two_paths(signals: list[float], switch: float, slope: float) -> Any:
+    """Return levels of two read-out paths, the slope of the second smaller."""
+    found = {("dark", "MONO"): SimpleNamespace(level_dn=0.0, variance_dn2=READ)}
+    for i, x in enumerate(signals):
+        variance = READ + SLOPE * x if x < switch else 2 * READ + slope * x
+        found[f"flat-{i}", "MONO"] = SimpleNamespace(level_dn=x, variance_dn2=variance)
+    return found
+
+
+@pytest.mark.parametrize("slope", [0.5, 0.2, 0.1])
+def test_a_path_of_less_slope_is_no_full_well(slope: float) -> None:
+    signals = [150.0, 300.0, 600.0, 900.0, 1200.0, 2000.0, 3300.0]
+    levels = _two_paths(signals, 1000.0, slope)
+    two = camera(segments=((SLOPE, READ, 1000.0), (slope, 2 * READ, None)))
+    assert flattened(_layout(7), levels, two) == frozenset()
+    # Slope and intercept a fifth off are numbers to be fitted.
+    off = camera(segments=((1.2 * SLOPE, READ, 1000.0), (0.8 * slope, 2 * READ, None)))
+    assert flattened(_layout(7), levels, off) == frozenset()
+    levels["flat-6", "MONO"].variance_dn2 = 2 * READ  # the well is full, not only the first path
+    assert flattened(_layout(7), levels, two) == {"flat-6"}
+
+
+@pytest.mark.parametrize("slope", [0.5, 0.3])
+def test_a_path_that_the_camera_lacks_is_no_full_well(slope: float) -> None:
+    signals = [150.0, 300.0, 600.0, 900.0, 1200.0, 1700.0, 2500.0, 3300.0]
+    assert flattened(_layout(8), _two_paths(signals, 1000.0, slope), MODEL) == frozenset()
 
 
 def test_levels_are_known_no_better_than_frames_that_wander_allow() -> None:

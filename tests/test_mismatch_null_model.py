@@ -42,10 +42,30 @@ def test_wide_noise_adds_sheppard_s_twelfth() -> None:
 )
 def test_rounding_is_undone(mean: float, sigma: float) -> None:
     shift, added = rounded(mean, sigma**2, 4095)
-    back, variance, stretch = unrounded(mean + shift, sigma**2 + added, 4095)
+    back, variance, stretch, _ = unrounded(mean + shift, sigma**2 + added, 4095)
     assert back == pytest.approx(mean, abs=1e-6)
     assert variance == pytest.approx(sigma**2, rel=1e-5)
     assert stretch > 0
+
+
+@pytest.mark.parametrize("sigma", [1.0, 4.5, 12.0, 60.0])
+@pytest.mark.parametrize("above", [-0.5, 0.0, 1.0, 2.0, 3.0])
+@pytest.mark.parametrize("at_white", [False, True])
+def test_what_an_end_of_the_converter_cuts_off_is_undone(
+    sigma: float, above: float, at_white: bool
+) -> None:
+    """Noise `above` standard deviations from the lowest code or the white level, by scipy."""
+    codes = np.arange(4096)
+    mean = 4095 - above * sigma if at_white else above * sigma
+    edges = np.concatenate([[-np.inf], codes[1:] - 0.5, [np.inf]])
+    share = np.diff(norm.cdf(edges, mean, sigma))
+    recorded = float(share @ codes)
+    square = float(share @ (codes - recorded) ** 2)
+    back, variance, stretch, wider = unrounded(recorded, square, 4095)
+    assert back == pytest.approx(mean, abs=1e-4 * sigma)
+    assert variance == pytest.approx(sigma**2, rel=1e-4)
+    assert 1 <= stretch < 20
+    assert 0.9 < wider < 8
 
 
 @given(
@@ -68,31 +88,36 @@ def test_coarse_rounding_from_any_phase_is_the_law_of_its_codes(
     assert mean + shift == pytest.approx(level, abs=1e-6 * step)
     assert sd**2 + added == pytest.approx(variance, abs=1e-6 * step**2)
     if 7 * sd < mean < 255 - 7 * sd:
-        back, before, _ = unrounded(level, variance, 255, step, phase)
+        back, before, *_ = unrounded(level, variance, 255, step, phase)
         assert back == pytest.approx(mean, abs=1e-5 * step)
         assert before == pytest.approx(sd**2, rel=1e-5)
 
 
-@pytest.mark.parametrize(("mean", "sigma"), [(48.243, 0.25), (48.4, 0.3), (48.0, 0.8)])
+@pytest.mark.parametrize(
+    ("mean", "sigma"), [(48.243, 0.25), (48.4, 0.3), (48.0, 0.8), (0.0, 4.5), (3.0, 4.5)]
+)
 def test_errors_of_few_codes_are_those_of_repeated_samples(mean: float, sigma: float) -> None:
-    """Spread of what is undone, over that of a normal variate of the recorded variance."""
+    """Spread of what is undone, over those of a normal variate of the recorded variance."""
     rng, n, repeats = np.random.default_rng(3), 20_000, 150
     shift, added = rounded(mean, sigma**2, 4095)
-    _, _, stretch = unrounded(mean + shift, sigma**2 + added, 4095)
-    samples = np.rint(rng.normal(mean, sigma, (repeats, n)))
-    own = [unrounded(float(x.mean()), float(x.var()), 4095)[1] for x in samples]
+    *_, stretch, wider = unrounded(mean + shift, sigma**2 + added, 4095)
+    samples = np.maximum(np.rint(rng.normal(mean, sigma, (repeats, n))), 0)
+    own = np.array([unrounded(float(x.mean()), float(x.var()), 4095)[:2] for x in samples])
     normal = (sigma**2 + added) * (2 / n) ** 0.5
     # Of 150 repeats a spread is known to 6 %.
-    assert np.std(own, ddof=1) / normal == pytest.approx(stretch, rel=0.2)
+    assert own[:, 1].std(ddof=1) / normal == pytest.approx(stretch, rel=0.2)
+    plain = ((sigma**2 + added) / n) ** 0.5
+    assert own[:, 0].std(ddof=1) / plain == pytest.approx(wider, rel=0.2)
 
 
 @given(mean=st.floats(0, 4000), variance=st.floats(0, 4))
 def test_any_mean_and_variance_can_be_asked(mean: float, variance: float) -> None:
     """Fixed offsets beside narrow noise leave pairs that no rounded normal noise has."""
-    before, noise, stretch = unrounded(mean, variance, 4095)
+    before, noise, stretch, wider = unrounded(mean, variance, 4095)
     assert np.isfinite(before)
     assert np.isfinite(noise)
     assert stretch > 0
+    assert wider > 0
 
 
 def test_a_single_code_says_nothing_of_the_noise() -> None:

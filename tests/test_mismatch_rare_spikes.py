@@ -1,5 +1,6 @@
 """Rare strong spikes are counted one by one and put aside; what resembles them is left alone."""
 
+import tracemalloc
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -12,7 +13,8 @@ from analysis.mismatch import find_mismatch
 from analysis.mismatch.source import Source
 from analysis.mismatch.spikes import Cleaned, Spikes, spikes_of, with_spikes
 from analysis.mismatch.spikes.cleaned import cleaned, without_spikes
-from analysis.mismatch.spikes.law import heldout_gain, law_of
+from analysis.mismatch.spikes.hits import Hits
+from analysis.mismatch.spikes.law import _tracks, heldout_gain, law_of
 from analysis.mismatch.split import Split
 from dsis.cfa import Cfa
 from dsis.effects import registry
@@ -21,6 +23,7 @@ from mismatch_findings import NOTHING
 from mismatch_recordings import InMemory, camera
 
 Array = NDArray[np.float64]
+Places = NDArray[np.intp]
 ROWS, COLUMNS, BLACK, WHITE, READ, SLOPE = 128, 192, 64.0, 4095, 2.0, 0.5
 MODEL = camera(segments=((SLOPE, READ**2, None),))
 DARKS, FLATS = 3, (200.0, 600.0, 1500.0)
@@ -134,6 +137,24 @@ def test_many_spikes_some_at_one_pixel_some_clipped(seed: int) -> None:
     assert set(own.hits.frame[here]) >= {3, 7}
 
 
+def test_saturated_flats_say_nothing_of_how_often_spikes_hit() -> None:
+    def change(rng: np.random.Generator, stacks: dict[str, Array]) -> None:
+        spikes(30)(rng, stacks)
+        stacks["flat-1"] += 4 * WHITE
+        stacks["flat-2"] += 4 * WHITE
+
+    recording = made(6, change)
+    own = found(recording)
+    assert own is not None
+    everything = {e.name: range(12) for e in recording.exposures}
+    others = {name: k for name, k in everything.items() if name not in ("flat-1", "flat-2")}
+    law, same = law_of(own, recording, everything), law_of(own, recording, others)
+    assert law is not None
+    assert law == same
+    hits = own.hits.frame.size  # of four exposures, most of them seen
+    assert hits / (4 * 12 * ROWS * COLUMNS) == pytest.approx(law.share, rel=0.1)
+
+
 def test_spikes_are_put_aside_and_nothing_else() -> None:
     def change(rng: np.random.Generator, stacks: dict[str, Array]) -> None:
         spikes(20)(rng, stacks)
@@ -159,6 +180,24 @@ def test_spikes_are_put_aside_and_nothing_else() -> None:
     assert found(replace(cleaned(stored, some.replaced))) is None  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize("frames", [2, 3])
+def test_what_stands_in_place_of_a_spike_has_moved_with_its_frame(frames: int) -> None:
+    def change(rng: np.random.Generator, stacks: dict[str, Array]) -> None:
+        spikes(9)(rng, stacks)
+        stacks["dark-1"][0] += 40
+        stacks["dark-1"][:2, [40, 60], [50, 70]] += 1000 * np.eye(2)
+
+    stored = made(4, change, frames=frames)
+    own, _, some = without_spikes(stored, MODEL)
+    assert some is not None
+    dark = own.exposure("dark-1")
+    moved = [own.frame(dark, k)[y, x] for k, y, x in ((0, 40, 50), (1, 60, 70))]
+    # In one frame alone a pixel has its pattern and noise of 2.2 DN.
+    assert moved == pytest.approx([BLACK + 40, BLACK], abs=9)
+    here = (some.hits.exposure == 1) & np.isin(some.hits.row, [40, 60])
+    assert some.hits.height_dn[here] == pytest.approx([1000, 1000], abs=12)
+
+
 def test_locked_frames_prove_the_effect() -> None:
     recording = made(2, spikes(40))
     own, split = found(recording), Split.of(recording)
@@ -182,6 +221,26 @@ def test_locked_frames_prove_the_effect() -> None:
 
 
 FLATS_AND_DARKS = frozenset(e.name for e in made(0).exposures)
+
+
+def test_a_track_of_spikes_counts_once() -> None:
+    """Pixels that touch, in one frame, are one particle's; memory is that of hits, not of pairs."""
+
+    def hits_at(exposure: Places, frame: Places, row: Places, column: Places) -> Hits:
+        zero = np.zeros(row.size)
+        codes = zero.astype(np.uint16)
+        return Hits(exposure, frame, row, column, zero, zero, zero, codes, zero > 0)
+
+    row = np.array([5, 6, 7, 20, 20, 20, 20])
+    column = np.array([5, 6, 6, 30, 30, 30, 32])
+    frame, exposure = np.array([0, 0, 0, 0, 1, 0, 0]), np.array([0, 0, 0, 0, 0, 1, 0])
+    assert sorted(_tracks(hits_at(exposure, frame, row, column))) == [1, 1, 1, 1, 3]
+    many = np.arange(20_000)
+    tracemalloc.start()
+    assert _tracks(hits_at(0 * many, many // 5000, many % 5000, 3 * (many % 7))).size == many.size
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 100e6
 
 
 def test_the_gain_of_a_law_that_is_not_there_is_a_loss() -> None:

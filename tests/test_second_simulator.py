@@ -19,6 +19,7 @@ sys.path.insert(0, str(BENCHMARKS))
 from second.building import build  # noqa: E402
 from second.cases import conceal, hand_values, seal  # noqa: E402
 from second.chain import simulate  # noqa: E402
+from second.charge import moved  # noqa: E402
 from second.dealing import Hand, deal  # noqa: E402
 from second.judging import COMPARABLE, judge  # noqa: E402
 from second.oracles import ORACLES, z_of  # noqa: E402
@@ -128,6 +129,22 @@ def test_hands_are_dealt_alike_again_and_all_effects_in_turn() -> None:
     assert sum(not hand.listed and not hand.unlisted for hand in hands) == 12
     both = [kind for seed in (101, 202) for hand in deal(seed, 48) for kind in hand.listed]
     assert set(both) == set(LISTED)
+
+
+def test_lag_that_stays_again_is_no_number_of_lag_that_does_not() -> None:
+    """Frames two apart are alike by the square; of two taps they are not alike at all."""
+    fraction, shape = 0.12, (400, 300)
+    case = {"h": shape[0], "w": shape[1], "seed": 1, "exposures": [{"kind": "flat"}]}
+    effect = {"kind": "image_lag", "fraction": fraction, "start": "steady"}
+    light, slope = np.full((6, *shape), 400.0), np.ones((6, *shape))
+    noise = np.random.default_rng(2).normal(0, 20, light.shape)
+    q = moved(case, {"image_lag": effect}, 0, light + noise, (light[0], slope[0])) - 400
+    lag = [float((q[k:] * q[: 6 - k]).mean() / (q * q).mean()) for k in (1, 2)]
+    assert lag == pytest.approx([fraction, fraction**2], abs=FIVE_SIGMA / np.sqrt(4 * q[0].size))
+    taps = 0.5 - np.sqrt(0.25 - fraction / (1 + 2 * fraction))  # that have the first of these
+    assert taps * (1 - taps) / (taps**2 + (1 - taps) ** 2) == pytest.approx(fraction)
+    assert taps < 0.91 * fraction
+    assert "image_lag" not in COMPARABLE
 
 
 def test_findings_are_judged_by_the_key() -> None:

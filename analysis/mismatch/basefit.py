@@ -21,6 +21,7 @@ CLIPPED_SHARE = 1e-3
 _ROUNDS = 8
 _PLAIN = 2.0  # growth of an error below which rounding hides nothing
 _MOST_ERROR = 0.5  # of a variance before rounding
+_UNTOLD = 1e3  # growth of a level's error at most: rounding has hidden it
 _HUBER = 4.0  # standard deviations from which a level counts less
 
 
@@ -28,15 +29,16 @@ _HUBER = 4.0  # standard deviations from which a level counts less
 class Offsets:
     """What the simulated camera adds to level (DN) and pixel variance (DN^2), by place.
 
-    `stretch` is by how much an error of the recorded variance grows on the way back. Where spikes
-    dominate the variances, `bulk_dn2` is what is added to the variance of the many, and that is
-    fitted: the base numbers are theirs.
+    `stretch` is by how much an error of the recorded variance grows on the way back, `wider` by how
+    much that of a level. Where spikes dominate the variances, `bulk_dn2` is what is added to the
+    variance of the many, and that is fitted: the base numbers are theirs.
     """
 
     level_dn: Mapping[Place, float] = field(default_factory=dict)
     variance_dn2: Mapping[Place, float] = field(default_factory=dict)
     stretch: Mapping[Place, float] = field(default_factory=dict)
     bulk_dn2: Mapping[Place, float] = field(default_factory=dict)
+    wider: Mapping[Place, float] = field(default_factory=dict)
 
     def fitted(self, levels: Mapping[Place, Level]) -> tuple[Mapping[Place, Level], "Offsets"]:
         """Return levels and offsets that the base numbers are fitted to."""
@@ -180,7 +182,11 @@ def _black(
         if not places:
             black[channel], error[channel] = nominal, np.nan
             continue
-        weight = np.array([1 / max(levels[p].level_error_dn, 1e-9) ** 2 for p in places])
+        errors = [
+            max(levels[p].level_error_dn, 1e-9) * min(offsets.wider.get(p, 1.0), _UNTOLD)
+            for p in places
+        ]
+        weight = np.array([1 / error**2 for error in errors])
         value = np.array([levels[p].level_dn - offsets.level_dn.get(p, 0.0) for p in places])
         black[channel] = float((weight * value).sum() / weight.sum())
         error[channel] = float(1 / sqrt(weight.sum()))

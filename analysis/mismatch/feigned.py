@@ -6,9 +6,12 @@ from math import log
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.mismatch.bank.coherent import white_level
 from analysis.mismatch.bank.edges import edge_shapes
+from analysis.mismatch.bank.parts import parts
 from analysis.mismatch.bank.sawtooth import PLACES, sawteeth
 from analysis.mismatch.bank.seams import SMOOTH_DEGREE, beyond_smooth, seam_shapes
+from analysis.mismatch.bank.standing import NAME as FIXED_WAVE
 from analysis.mismatch.contradicted import Denial, rival
 from analysis.mismatch.displaced import displaced
 from analysis.mismatch.edged import STATISTIC, edged, single
@@ -29,6 +32,7 @@ _GROWING = frozenset({"row_prnu", "column_prnu"})
 _CLEAR = 5.0  # standard errors of what stands out
 _LEAST_NUMBER = 0.5  # of a cube root of a variance: below, its error is another's
 _SHAPED = frozenset({"half_seam", "parity", STATISTIC})
+_NEIGHBOURS = frozenset({"fixed_correlation_0_1", "fixed_correlation_1_0", "fixed_patch_variance"})
 _MOST = 0.5  # of a pattern's variance, or of tails, that something else may feign
 _SCATTER = 1.84  # see `coded`
 _FEW_ELECTRONS = 1.0  # skewness of shot noise of one electron: read noise beside it lessens it
@@ -45,6 +49,7 @@ def of_another(state: State, effect: Effect, without: Array) -> Denial | None:
     return (
         feigned(state, kind, without)
         or outlying(state, kind)
+        or coloured(state, kind)
         or stepped(state, kind)
         or edged(state, kind)
         or single(state, effect)
@@ -322,16 +327,43 @@ def outlying(state: State, kind: str) -> Denial | None:
     """
     if kind not in _MAPS or all(m.statistic != "outlying_pixels" for m in state.mismatches):
         return None
-    images = state.setting.seen.images
     plain, most = 0.0, 0.0
-    for channel in sorted({channel for channel, _ in images}):
-        own = [images[channel, name] for name in _MAPS[kind] if (channel, name) in images]
-        if not own:
-            continue
-        image, noise = own[0]
+    for image, noise in _maps(state, kind):
         low, high = np.percentile(image, [25, 75])
         plain += float(image.var()) / noise**2 - 1
         most += variance_of_quartiles(float(low), float(high)) / noise**2 - 1
     if plain <= 0 or most >= _MOST * plain:
         return None
     return Denial(most / plain, "few pixels that stand far out make most of what it would explain")
+
+
+def coloured(state: State, kind: str) -> Denial | None:
+    """Return how a pattern of all pixels is denied by a map that is not white; None: it is not.
+
+    A pattern that is drawn anew for each pixel has the same power at all frequencies, as noise has.
+    Where a wave is left unexplained, or that neighbours are alike, and half of the map's variance
+    beyond noise, lines and smooth surfaces is of few frequencies, all pixels may be alike but for
+    it: the median bin knows of the many.
+    """
+    called = {m.statistic for m in state.mismatches} & {FIXED_WAVE, *_NEIGHBOURS}
+    if kind not in _MAPS or not called:
+        return None
+    plain, most = 0.0, 0.0
+    for image, noise in _maps(state, kind):
+        part = parts(image, noise)
+        power = np.abs(np.fft.rfft2(part.pixels)[1:, 1:-1]) ** 2 / image.size
+        plain += part.square - 1
+        most += white_level(power, 1) - 1
+    if plain <= 0 or most >= _MOST * plain:
+        return None
+    why = "a wave that stands still makes" if FIXED_WAVE in called else "neighbours have in common"
+    return Denial(max(most / plain, 0.0), f"{why} most of what it would explain")
+
+
+def _maps(state: State, kind: str) -> list[tuple[Array, float]]:
+    """Return the maps and their noise, of each channel, that a pattern of pixels is seen in."""
+    images = state.setting.seen.images
+    return [
+        next(images[channel, name] for name in _MAPS[kind] if (channel, name) in images)
+        for channel in sorted({channel for channel, name in images if name in _MAPS[kind]})
+    ]

@@ -3,19 +3,25 @@
 from collections.abc import Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.mismatch.layout import Layout, Place
 from analysis.mismatch.observe import Level
+from dsis.camera import Camera
 
+Array = NDArray[np.float64]
 _LEAST = 2  # flats below, that say which variance to expect
 _SHARE = 0.3  # of the shot noise expected: no law but a limit of charge takes more
 
 
-def flattened(layout: Layout, levels: Mapping[Place, Level]) -> frozenset[str]:
+def flattened(layout: Layout, levels: Mapping[Place, Level], camera: Camera) -> frozenset[str]:
     """Return the brightest flats in which a channel has lost most of its shot noise.
 
     Charge that has reached the full well, below the white level, has none: such an exposure says
-    nothing of slope, intercept or light, and a line through it is wrong for all others.
+    nothing of slope, intercept or light, and a line through it is wrong for all others. What to
+    expect is in proportion to the camera's shot noise, whose slope may fall where another read-out
+    path begins; of a path that the camera lacks the noise grows again, beyond a share of what a
+    flat below has.
     """
     flats = [e.name for e in layout.uniform if e.kind == "flat"]
     found: set[str] = set()
@@ -24,17 +30,20 @@ def flattened(layout: Layout, levels: Mapping[Place, Level]) -> frozenset[str]:
         darks = [
             levels[e.name, channel].variance_dn2 for e in layout.uniform if e.kind == "dark"
         ] or [0.0]
-        read = float(np.median(darks))
-        while len(own) > _LEAST and _lost(levels, own, channel, read):
+        signal = np.array([levels[name, channel].level_dn for name in own], np.float32)
+        shot = np.array([levels[name, channel].variance_dn2 for name in own]) - np.median(darks)
+        line = camera.segments.variance_dn2
+        expected = (line(signal) - line(np.zeros_like(signal))).astype(np.float64)
+        while len(own) > _LEAST and _lost(shot[: len(own)], expected[: len(own)]):
             found.add(own.pop())
     return frozenset(found)
 
 
-def _lost(levels: Mapping[Place, Level], own: list[str], channel: str, read_dn2: float) -> bool:
-    """Return whether the brightest of some flats has lost most of its shot noise."""
-    *below, top = (levels[name, channel] for name in own)
-    slopes = [(one.variance_dn2 - read_dn2) / one.level_dn for one in below if one.level_dn > 0]
-    if not slopes:
+def _lost(shot_dn2: Array, expected_dn2: Array) -> bool:
+    """Return whether the last of some flats, the brightest, has lost most of its shot noise."""
+    known = expected_dn2[:-1] > 0
+    if not known.any():
         return False
-    expected = float(np.median(slopes)) * top.level_dn
-    return expected > 0 and top.variance_dn2 - read_dn2 < _SHARE * expected
+    of_others = float(np.median(shot_dn2[:-1][known] / expected_dn2[:-1][known]))
+    least = min(of_others * expected_dn2[-1], shot_dn2[:-1].max())
+    return bool(least > 0 and shot_dn2[-1] < _SHARE * least)

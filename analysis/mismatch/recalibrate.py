@@ -97,7 +97,7 @@ def calibrate(
     """
     switches = tuple(s.upper_dn for s in camera.noise.segment if s.upper_dn is not None)
     left_out = frozenset([interpolated] if interpolated else [])
-    left_out |= flattened(layout, seen.levels)
+    left_out |= flattened(layout, seen.levels, camera)
     start = camera.black_level - layout.black_dn
     slopes = [s.slope for s in camera.noise.segment]
     spiky = _spiky(seen.levels)
@@ -248,18 +248,19 @@ def _undone(
 
     `codes` are step and phase, see `codes_of`.
     """
-    shift, added, stretch, bulk = {}, {}, {}, {}
+    shift, added, stretch, bulk, wider = {}, {}, {}, {}, {}
     for place, level in levels.items():
         mean = level.level_dn + layout.black_dn
-        before, variance, slope = unrounded(mean, level.variance_dn2, layout.white_dn, *codes)
+        before, variance, slope, grown = unrounded(
+            mean, level.variance_dn2, layout.white_dn, *codes
+        )
         shift[place], added[place] = mean - before, level.variance_dn2 - variance
-        stretch[place] = slope
+        stretch[place], wider[place] = slope, grown
         if spiky:
             many = unrounded(mean, level.bulk_dn2, layout.white_dn, *codes)
-            shift[place], bulk[place], stretch[place] = (
-                mean - many[0], level.bulk_dn2 - many[1], many[2]
-            )  # fmt: skip
-    return Offsets(shift, added, stretch, bulk)
+            shift[place], bulk[place] = mean - many[0], level.bulk_dn2 - many[1]
+            stretch[place], wider[place] = many[2:]
+    return Offsets(shift, added, stretch, bulk, wider)
 
 
 def _rounding(model: Model, layout: Layout, fit: BaseFit, *, spiky: bool) -> Offsets:
@@ -285,6 +286,7 @@ def _sum(first: Offsets, second: Offsets) -> Offsets:
         added(first.variance_dn2, second.variance_dn2),
         first.stretch,
         added(first.bulk_dn2, second.bulk_dn2),
+        first.wider,
     )
 
 

@@ -10,6 +10,8 @@ _WIDE = 1.0  # DN; above, and away from the ends, rounding adds 1/12 to 1e-8
 _REACH = 8.0
 _LEAST_LOG = -14.0  # of a variance, codes^2: less is none
 _SOLVED = 1e-8  # codes and squared codes
+_CUT = 5.0  # recorded standard deviations: nearer to an end noise was cut, and was wider before
+_WIDER = 4.0  # times as wide, and as far out of it, at most: beyond, little is left of its shape
 _NARROW = (0.08, 0.12, 0.17, 0.24, 0.34, 0.48)  # standard deviations, codes
 
 
@@ -60,30 +62,35 @@ def unrounded(
     white_dn: float,
     step_dn: float = 1.0,
     phase_dn: float = 0.0,
-) -> tuple[float, float, float]:
-    """Return the mean and the variance before rounding, and by how much its error grows.
+) -> tuple[float, float, float, float]:
+    """Return the mean and the variance before rounding, and by how much their errors grow.
 
     The inverse of `rounded`. The third is the standard error of the variance before rounding over
-    that of a normal variate of the recorded variance: mean and variance of few codes err together,
-    as their third and fourth moments say. Where all samples have one code nothing can be told: the
-    variance comes back as recorded, and the third is infinite.
+    that of a normal variate of the recorded variance, the fourth that of the mean over that of the
+    recorded one: mean and variance of few codes err together, as their third and fourth moments
+    say. Where all samples have one code nothing can be told: the variance comes back as recorded,
+    and the third and the fourth are infinite.
     """
     if step_dn != 1:
         mean, last = (mean_dn - phase_dn) / step_dn, (white_dn - phase_dn) // step_dn
-        before, variance, grown = unrounded(mean, variance_dn2 / step_dn**2, last)
-        return before * step_dn + phase_dn, variance * step_dn**2, grown
-    if variance_dn2 > 4 * _WIDE**2 and variance_dn2**0.5 * _REACH < mean_dn:
-        return mean_dn, variance_dn2 - 1 / 12, 1.0
+        before, variance, *errors = unrounded(mean, variance_dn2 / step_dn**2, last)
+        return before * step_dn + phase_dn, variance * step_dn**2, errors[0], errors[1]
+    end = min(mean_dn, white_dn - mean_dn)
+    if variance_dn2 > 4 * _WIDE**2 and variance_dn2**0.5 * _REACH < end:
+        return mean_dn, variance_dn2 - 1 / 12, 1.0, 1.0
     if variance_dn2 <= 1e-4:
-        return mean_dn, variance_dn2, np.inf
+        return mean_dn, variance_dn2, np.inf, np.inf
     recorded = np.array([mean_dn, variance_dn2])
 
     def miss(at: Array) -> Array:
         return np.asarray(_recorded(float(at[0]), float(at[1]), white_dn) - recorded)
 
     usual = np.array([mean_dn, np.log(max(variance_dn2 - 1 / 12, 0.03))])
-    most = max(np.log(variance_dn2 + 1), usual[1] + 1e-3)
-    inside = ([mean_dn - 1, _LEAST_LOG], [mean_dn + 1, most])
+    far, wider, sd = 1.0, 1.0, variance_dn2**0.5
+    if sd > _WIDE / 2 and end < _CUT * sd:
+        far, wider = max(_WIDER * sd, 1.0), _WIDER**2
+    most = max(np.log(wider * variance_dn2 + 1), usual[1] + 1e-3)
+    inside = ([mean_dn - far, _LEAST_LOG], [mean_dn + far, most])
     found = least_squares(miss, usual, bounds=inside, xtol=1e-13, ftol=1e-13, gtol=1e-13)
     if np.abs(found.fun).max() > _SOLVED:  # narrow noise: far from the start, past flat stretches
         starts = [
@@ -96,13 +103,16 @@ def unrounded(
         found = min(found, other, key=lambda one: float(one.cost))
     mean, log_variance = (float(value) for value in found.x)
     variance = float(np.exp(log_variance))
-    inverse = np.linalg.pinv(np.asarray(found.jac), rcond=1e-9)[1] * variance
+    inverse = np.linalg.pinv(np.asarray(found.jac), rcond=1e-9)
+    inverse[1] *= variance
     codes, share = _codes(mean, variance**0.5, white_dn)
     second, third, fourth = (float((share * (codes - mean_dn) ** k).sum()) for k in (2, 3, 4))
-    errors = np.array([[second, third], [third, fourth - second**2]])
-    grown = float(inverse @ errors @ inverse) / (2 * variance_dn2**2)
-    solved = bool(np.abs(found.fun).max() < _SOLVED) and grown > 0
-    return mean, variance, float(np.sqrt(grown)) if solved else np.inf
+    apart = np.array([[second, third], [third, fourth - second**2]])
+    of_mean, of_variance = (float(row @ apart @ row) for row in inverse)
+    if np.abs(found.fun).max() >= _SOLVED or not of_variance > 0:
+        return mean, variance, np.inf, np.inf
+    grown = np.sqrt([of_variance / (2 * variance_dn2**2), of_mean / variance_dn2])
+    return mean, variance, float(grown[0]), float(grown[1])
 
 
 def _recorded(mean_dn: float, log_variance: float, white_dn: float) -> Array:

@@ -165,10 +165,12 @@ def _of_kind(
 
 def _frame_means(source: Source, name: str, numbers: Sequence[int]) -> Array:
     """Return the means of frames and the variances that noise of single pixels gives them."""
-    frames = [np.asarray(f, np.float64) for f in source.frames(name, numbers)]
-    noise = float(np.var(frames[-1] - frames[-2]) / 2 / frames[-1].size)
-    means = np.array([frame.mean() for frame in frames])
-    return np.stack([means, np.full(means.size, noise)])
+    means, before, last = [], np.zeros(0), np.zeros(0)
+    for frame in source.frames(name, numbers):
+        before, last = last, np.asarray(frame, np.float64)
+        means.append(last.mean())
+    noise = float(np.var(last - before) / 2 / last.size)
+    return np.stack([means, np.full(len(means), noise)])
 
 
 def _deviation(some: Sequence[Array]) -> float | None:

@@ -1,10 +1,14 @@
 """`dsis camera`: camera models, fitted to recordings and simulated."""
 
 import argparse
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 from dsis.cli.arguments import Add, Commands, add_jobs, add_seed, adder, whole
 from dsis.cli.progress import progress_bar
+from dsis.errors import InputError
 
 
 def add_camera(commands: Commands) -> None:
@@ -60,9 +64,10 @@ def camera_fit(options: argparse.Namespace) -> None:
     from dsis.recording import read_recording
 
     recording = read_recording(options.recording)
-    with progress_bar("fit") as progress:
-        fit = fit_camera(recording, options.segments, threads=options.jobs, progress=progress)
-    write_fit(fit, options.out)
+    with _called({recording.sensor.name: options.recording}):
+        with progress_bar("fit") as progress:
+            fit = fit_camera(recording, options.segments, threads=options.jobs, progress=progress)
+        write_fit(fit, options.out)
     print(summary(fit))
     print(f"camera model in {options.out}")
 
@@ -76,7 +81,8 @@ def camera_simulate(options: argparse.Namespace) -> None:
     camera = read_camera(options.camera)
     maps = read_maps(options.camera) if options.same_sensor else None
     recording = read_recording(options.like)
-    with progress_bar("simulate") as progress:
+    named = _called({f"camera {camera.name!r}": options.camera})
+    with named, progress_bar("simulate") as progress:
         simulate_like(
             camera,
             recording,
@@ -88,3 +94,13 @@ def camera_simulate(options: argparse.Namespace) -> None:
         )
     frames = sum(len(exposure.frames) for exposure in recording.exposures)
     print(f"{frames} frames in {len(recording.exposures)} exposures, simulated, in {options.out}")
+
+
+@contextmanager
+def _called(files: Mapping[str, Path]) -> Iterator[None]:
+    """Name files as the user did, in faults that know the name of a sensor or a camera only."""
+    try:
+        yield
+    except InputError as error:
+        faults = [replace(f, file=str(files.get(f.file, f.file))) for f in error.faults]
+        raise InputError(faults) from None

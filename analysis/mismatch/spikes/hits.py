@@ -51,7 +51,8 @@ class Hits:
     quiet_dn
         Of its channel in the exposure.
     instead
-        The pixel's code without it: the lower median of the other frames.
+        The pixel's code without it: the lower median of the other frames, as they would be if they
+        had moved as this one.
     clipped
         Whether it is at the white level.
     """
@@ -219,13 +220,16 @@ def _exact(
         for k, image in enumerate(source.frames(watch.exposure.name, range(len(places)))):
             series[k] = image[rows, columns]
             common.append(watch.common(image, k, places[k]))
-    above = watch.middle(0)[rows, columns].astype(np.float64) - watch.black
-    shift = np.stack([own.at(rows, columns, above) for own in moved])
+    middle = np.minimum.reduce(watch.middles)  # of two frames the one without the spike
+    above = middle[rows, columns].astype(np.float64) - watch.black
+    beyond = np.stack([own.at(rows, columns, above) for own in moved])
+    # Of two frames each has moved from the other: half of that from where both would be.
+    shift = beyond / len(watch.middles)
     each = np.arange(frame.size)
     seen = [_seen(watch, series, shift, frame, (rows, columns), i) for i in range(frame.size)]
     heights, noise, instead = np.array(seen).reshape(-1, 3).T
     # What the frame has in common beyond its own movement counts for no spike.
-    beside = np.concatenate(common) - shift[frame, each][:, np.newaxis]
+    beside = np.concatenate(common) - beyond[frame, each][:, np.newaxis]
     up, down = np.maximum(beside.max(1), 0), np.minimum(beside.min(1), 0)
     heights = np.where(heights > 0, np.maximum(heights - up, 0), np.minimum(heights - down, 0))
     hits = Hits(
@@ -253,7 +257,7 @@ def _seen(
     """Return the height of a far sample, its pixel's noise, DN, and the code it has without it.
 
     No less noise than its channel has, than the pixel has in the frames where it is not far, or
-    than light of its level makes. The code is one that occurs, unless the whole frame moved.
+    than light of its level makes. The code is one that occurs, unless whole frames moved.
     """
     rows, columns = at
     k, values = frame[i], series[:, i] - shift[:, i]
@@ -266,9 +270,9 @@ def _seen(
     lit = float(watch.noise[site] ** 2 + max(float(ends[0] - ends[1]), 0.0))
     own = float(calm.var(ddof=1)) if calm.size > 1 else 0.0
     noise = float(np.sqrt(max(lit, own)))
-    codes = np.sort(np.delete(series[:, i], k))
-    instead = codes[(codes.size - 1) // 2]
-    moved = shift[k, i] - np.median(np.delete(shift[:, i], k))
-    if abs(moved) > _STILL * noise:
-        instead = np.clip(np.rint(instead + moved), 0, watch.white)
+    codes = np.delete(series[:, i], k)
+    instead = np.sort(codes)[(codes.size - 1) // 2]
+    if np.abs(shift[k, i] - np.delete(shift[:, i], k)).max() > _STILL * noise:
+        still = np.sort(others)[(codes.size - 1) // 2]
+        instead = np.clip(np.rint(still + shift[k, i]), 0, watch.white)
     return float(values[k] - level), noise, float(instead)

@@ -1,8 +1,8 @@
 """How often spikes hit and how high they are, and what that says of frames it was not told by.
 
 Spikes of mean height m are exponential above any limit, so those above `SPIKE` noises of an
-exposure tell m wherever it is; of all hits a share exp(-limit / m) is seen there. At the white
-level a height is known to be no less.
+exposure tell m wherever it is; of all hits a share exp(-limit / m) is seen there, and none where
+all is at the white level. At that level a height is known to be no less.
 """
 
 from collections.abc import Mapping, Sequence
@@ -11,9 +11,11 @@ from math import exp, log, nan, pi, sqrt
 
 import numpy as np
 import scipy.optimize
+import scipy.sparse
 import scipy.sparse.csgraph
 import scipy.stats
 from numpy.typing import NDArray
+from scipy.spatial import KDTree
 
 from analysis.mismatch.finding import Gain
 from analysis.mismatch.spikes.hits import Hits
@@ -60,7 +62,8 @@ class _Seen:
             own = frames.get(recording.exposures[number].name, ())
             samples.append(np.full(4, len(own) * recording.rows * recording.columns / 4))
             limits.append(SPIKE * noise.reshape(-1))
-            which |= (spikes.hits.exposure == number) & np.isin(spikes.hits.frame, list(own))
+            here = (spikes.hits.exposure == number) & np.isin(spikes.hits.frame, list(own))
+            which |= here & np.isfinite(noise)[spikes.hits.row % 2, spikes.hits.column % 2]
         return cls(np.concatenate(samples), np.concatenate(limits), spikes.hits.of(which))
 
 
@@ -123,11 +126,9 @@ def _tracks(hits: Hits) -> Array:
     """Return how many samples each track has: those of a frame that touch."""
     if not hits.frame.size:
         return np.zeros(0)
-    touch = (
-        (hits.exposure[:, np.newaxis] == hits.exposure)
-        & (hits.frame[:, np.newaxis] == hits.frame)
-        & (np.abs(hits.row[:, np.newaxis] - hits.row) <= 1)
-        & (np.abs(hits.column[:, np.newaxis] - hits.column) <= 1)
-    )
+    # Other exposures and frames lie two apart.
+    at = np.stack([2 * hits.exposure, 2 * hits.frame, hits.row, hits.column], 1)
+    one, other = KDTree(at).query_pairs(1.0, p=np.inf, output_type="ndarray").T
+    touch = scipy.sparse.coo_array((np.ones(one.size), (one, other)), shape=(len(at), len(at)))
     _, labels = scipy.sparse.csgraph.connected_components(touch, directed=False)
     return np.bincount(labels).astype(np.float64)

@@ -43,7 +43,8 @@ class Spikes:
     echoes
         Samples that a spike drags along: of its row, its column, or its pixel afterwards.
     quiet_dn
-        Noise of uniform exposures by number, as rows and columns of the colour filter: (2, 2).
+        Noise of uniform exposures by number, as rows and columns of the colour filter: (2, 2);
+        infinite where a spike has no room below the white level.
     """
 
     hits: Hits
@@ -89,7 +90,11 @@ def spikes_of(recording: Recording, source: Source, camera: Camera) -> Spikes | 
         return None
     spikes = hits.of(once & (hits.ratio > 0))
     spikes = spikes.of(np.argsort(-spikes.ratio, kind="stable"))
-    quiet = {number: own.noise_dn for number, own in uniform.items()}
+    white = recording.sensor.white_level
+    quiet = {
+        number: np.where(own.level_dn + SPIKE * own.noise_dn < white, own.noise_dn, np.inf)
+        for number, own in uniform.items()
+    }
     return Spikes(spikes, _following(hits.of(echo & ~again), spikes), quiet)
 
 

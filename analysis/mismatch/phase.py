@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from analysis.mismatch.bandgain import gain_of_bands
 from analysis.mismatch.instance import Frequency, frequency_of, same_line
 from analysis.mismatch.layout import Layout
+from analysis.mismatch.paired import Pairs, pairs_of
 from analysis.mismatch.projections import LEAST, SURE, FramesOf, Power, projections
 from analysis.mismatch.rowlaw import RowLaw
 from analysis.mismatch.rowpower import Size, row_powers
@@ -185,6 +186,11 @@ class WholeFrames:
         anywhere = float(np.log(self.layout.rows * self.layout.columns / 2 / share))
         chosen = float(np.log(_FEW)) if kept and _of_pixels(frequency) else anywhere
         return line.there(power, kept=kept, real=real) - chosen
+
+    @cached_property
+    def pairs(self) -> Pairs:
+        """What successive frames share, of even and of odd numbers."""
+        return pairs_of(self.layout, self.frames_of)
 
     @cached_property
     def rows(self) -> RowLaw:

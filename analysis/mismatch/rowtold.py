@@ -6,6 +6,7 @@ from dataclasses import replace
 from analysis.mismatch.contradicted import Denial, rival
 from analysis.mismatch.jumptold import PIXELS, as_pixels_show, unlike_pixels
 from analysis.mismatch.mapped import as_maps_show
+from analysis.mismatch.paired import STEADY
 from analysis.mismatch.phase import WholeFrames
 from analysis.mismatch.rank import LEAST_GAIN, TOLD_APART, Ranked, alike
 from analysis.mismatch.state import State
@@ -48,6 +49,8 @@ def unlike_frames(
 
     Frames do where the other of both, which was not fitted or has no word, is as likely.
     """
+    if best.kind in STEADY and frames is not None and (paired := frames.pairs.denial(best.kind)):
+        return paired
     if best.kind in PIXELS:
         return unlike_pixels(state.camera, frames, best, others)
     odds = _odds(state, frames, best.kind)

@@ -3,7 +3,8 @@
 Each law is of the statistics alone, whatever makes them: physics without a word, too.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,9 +23,13 @@ from analysis.mismatch.state import State
 from analysis.mismatch.straight import curves, misfit, misfits
 
 Array = NDArray[np.float64]
+Left = dict[tuple[Place, str], tuple[float, float]]
 _BENDS = frozenset({"nonlinearity", "dual_gain", "dual_gain_mismatch"})
 _PAIRS = {"correlation_0_1": 2, "correlation_1_0": 2, "correlation_1_1": 4}
 """How many neighbours of a pixel a correlation is that of."""
+_ADJACENT = ("correlation_0_1", "correlation_1_0")
+_GRAINS = np.geomspace(1.0, 8.0, 13)  # inverse correlations of neighbours in what they share
+_LEAST = 0.05  # of a variance is other noise
 _LINES = {"row_fpn": "row", "row_prnu": "row", "column_fpn": "column", "column_prnu": "column"}
 _GREENS = frozenset({"channel_imbalance", "tap_mismatch"})
 _BESIDE = ("R", "Gr", "Gb", "B")
@@ -89,7 +94,27 @@ def _of_neighbours(state: State) -> Denial | None:
     for (place, statistic), (rest, _) in left.items():
         factors[place] = factors.get(place, 1.0) + _PAIRS[statistic] * rest
     why = "neighbours are alike for another reason, and have as covariance what variances lack"
-    return _straightened(state, factors.get, why)
+    return _straightened(state, factors.get, why) or _of_grains(state, left)
+
+
+def _of_grains(state: State, left: Left) -> Denial | None:
+    """Return how a bend is denied by noise that neighbours share as it grows; None: it is not.
+
+    Noise on top of all other, in grains of some pixels - of light that interferes, say - adds to
+    variances k times the covariance of pixels side by side, 1 / k its own correlation.
+    """
+    shared: dict[Place, float] = {}
+    for (place, statistic), (rest, _) in left.items():
+        if statistic in _ADJACENT:
+            shared[place] = shared.get(place, 0.0) + max(rest, 0.0) / len(_ADJACENT)
+    why = "neighbours are alike, and what they share makes variances grow"
+    found = [_straightened(state, partial(_less, shared, k), why) for k in _GRAINS]
+    return min((one for one in found if one), key=lambda one: one.share, default=None)
+
+
+def _less(shared: Mapping[Place, float], times: float, at: Place, usual: float) -> float:
+    """Return which share of a variance is left without what is shared, so many times."""
+    return max(usual - times * shared.get(at, 0.0), _LEAST)
 
 
 def _of_charge(state: State) -> Denial | None:
@@ -172,7 +197,7 @@ def _variance_below(limit: float) -> float:
     return below - limit * density + limit**2 * (1 - below) - mean**2
 
 
-def _left(state: State, statistics: Iterable[str]) -> dict[tuple[Place, str], tuple[float, float]]:
+def _left(state: State, statistics: Iterable[str]) -> Left:
     """Return what is left of statistics that differ for certain, and its standard deviation."""
     certain = {m.statistic for m in state.mismatches}.intersection(statistics)
     return {

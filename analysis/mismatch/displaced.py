@@ -20,7 +20,7 @@ from analysis.mismatch.recalibrate import code_step
 from analysis.mismatch.resolved import FAR_OFF
 from analysis.mismatch.sharing import of_charge, shared_otherwise
 from analysis.mismatch.state import State
-from analysis.mismatch.straight import curves, misfit, misfits
+from analysis.mismatch.straight import curves, misfit, misfits, upwards
 
 Array = NDArray[np.float64]
 Left = dict[tuple[Place, str], tuple[float, float]]
@@ -103,6 +103,8 @@ def _of_grains(state: State, left: Left) -> Denial | None:
     Noise on top of all other, in grains of some pixels - of light that interferes, say - adds to
     variances k times the covariance of pixels side by side, 1 / k its own correlation.
     """
+    if not upwards(state):
+        return None
     shared: dict[Place, float] = {}
     for (place, statistic), (rest, _) in left.items():
         if statistic in _ADJACENT:

@@ -36,6 +36,18 @@ def bent(state: State) -> bool:
     return sum(found) > 2.0  # of chi-squared
 
 
+def upwards(state: State) -> bool:
+    """Return whether variances bend upwards: what is added to lines goes with the square."""
+    score = 0.0
+    for signal, variance, weight, _ in curves(state):
+        root = np.sqrt(weight) / variance
+        scaled = signal / max(float(signal.max()), 1e-300)
+        design = np.stack([np.ones_like(scaled), scaled, scaled**2], 1) * root[:, np.newaxis]
+        square = np.linalg.lstsq(design, variance * root, rcond=None)[0][2]
+        score += float(square) * float((root**2).sum()) ** 0.5
+    return score > 0
+
+
 def curves(state: State) -> Iterator[tuple[Array, Array, Array, list[Place]]]:
     """Yield signals, variances, weights of their logarithms and places of each channel."""
     levels, signals = state.setting.seen.levels, state.calibrated.fit.signal_dn

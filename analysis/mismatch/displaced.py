@@ -13,6 +13,7 @@ from scipy.stats import chi2, norm
 from analysis.mismatch.candidates.response import skewness_below
 from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.layout import Place
+from analysis.mismatch.linemeans import of_alike_samples
 from analysis.mismatch.recalibrate import code_step
 from analysis.mismatch.resolved import FAR_OFF
 from analysis.mismatch.sharing import of_charge, shared_otherwise
@@ -39,7 +40,8 @@ def displaced(state: State, kind: str, mean: Array, without: Array | None = None
     of noise that leans. Where that leaves half of the misfit or less, there may be no bend; nor
     where variances scatter no more than codes that are not equally wide make them. Of a bend that
     levels show nothing is asked. Of filters and crosstalk, how alike neighbours are at each level;
-    of greens that differ, what other colours share with them.
+    of noise of whole lines, how alike samples along them are; of greens that differ, what other
+    colours share with them.
 
     Parameters
     ----------
@@ -58,7 +60,7 @@ def displaced(state: State, kind: str, mean: Array, without: Array | None = None
     if kind in _LINES:
         return _of_new_lines(state, _LINES[kind], without)
     if kind in _WHITE:
-        return _WHITE[kind](state)
+        return _WHITE[kind](state) or of_alike_samples(state, kind, mean, without)
     if kind in _GREENS:
         return _of_colours(state, mean - without)
     return shared_otherwise(state, kind, without)

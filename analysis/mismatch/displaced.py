@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.stats import chi2, norm
 
+from analysis.mismatch.brighter import no_brighter_alike
 from analysis.mismatch.candidates.response import skewness_below
 from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.layout import Place
@@ -39,9 +40,9 @@ def displaced(state: State, kind: str, mean: Array, without: Array | None = None
     what they would be without: by covariances that neighbours have instead, or by what is cut off
     of noise that leans. Where that leaves half of the misfit or less, there may be no bend; nor
     where variances scatter no more than codes that are not equally wide make them. Of a bend that
-    levels show nothing is asked. Of filters and crosstalk, how alike neighbours are at each level;
-    of noise of whole lines, how alike samples along them are; of greens that differ, what other
-    colours share with them.
+    levels show nothing is asked. Of filters, crosstalk and charge that repels charge, how alike
+    neighbours are at each level; of noise of whole lines, how alike samples along them are; of
+    greens that differ, what other colours share with them.
 
     Parameters
     ----------
@@ -63,7 +64,7 @@ def displaced(state: State, kind: str, mean: Array, without: Array | None = None
         return _WHITE[kind](state) or of_alike_samples(state, kind, mean, without)
     if kind in _GREENS:
         return _of_colours(state, mean - without)
-    return shared_otherwise(state, kind, without)
+    return shared_otherwise(state, kind, without) or no_brighter_alike(state, kind, without)
 
 
 def _seen_in_levels(state: State, without: Array, mean: Array) -> bool:

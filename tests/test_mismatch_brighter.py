@@ -42,7 +42,8 @@ def _state(law: str, cfa: str, axes: tuple[int, ...], pink: float = 0.0) -> Stat
         rows, columns = frames.shape[1:]
         signal = SIGNALS[name] * np.tile(response, (rows // 2, columns // 2))
         light = rng.normal(0, 1, frames.shape) * np.sqrt(SLOPE * signal)
-        given = {"light": SHARE / 2, "charge": SHARE * signal / BRIGHTEST, "none": 0.0}[law]
+        charge = SHARE * signal / BRIGHTEST
+        given = {"light": SHARE / 2, "charge": charge, "both": SHARE + charge, "none": 0.0}[law]
         noise = _exchanged(light, np.broadcast_to(given, signal.shape), axes)
         read = rng.normal(0, READ**0.5, frames.shape)
         read = (read + pink * np.roll(read, 1, 2)) / (1 + pink**2) ** 0.5
@@ -70,6 +71,11 @@ def test_neighbours_that_are_alike_the_more_the_brighter_do_not(
     cfa: str, axes: tuple[int, ...], pink: float
 ) -> None:
     state = _state("charge", cfa, axes, pink)
+    assert no_brighter_alike(state, KIND, state.null.mean) is None
+
+
+def test_charge_beside_neighbours_that_share_light_for_another_reason_stays() -> None:
+    state = _state("both", "MONO", (1, 2))
     assert no_brighter_alike(state, KIND, state.null.mean) is None
 
 

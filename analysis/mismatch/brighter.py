@@ -24,26 +24,27 @@ def no_brighter_alike(state: State, kind: str, without: Array) -> Denial | None:
     noise v in common; where the share is a S, S the signal, a (S_p v_p + S_n v_n). Next pixels
     along rows have one share, those along columns another. Noise of read-out may be alike for any
     reason of its own: beside that, of any size, both laws are judged, and denied is the second
-    where the first is likelier at odds of 20. What charge takes from variances counts, for it or
-    against it, where they would lie on a line without. `without` are the numbers predicted without
-    the effect.
+    where the first is likelier at odds of 20, and the second beside it is not. What charge takes
+    from variances counts, for it or against it, where they would lie on a line without. `without`
+    are the numbers predicted without the effect.
     """
     if kind != _KIND:
         return None
-    alike = light = 0.0
+    alike = light = besides = 0.0
     taken: dict[Place, float] = {}
     for pairs in _pairs(state, without):
-        light += _fitted(pairs, pairs.shot.sum(1))[1]
-        shape = (pairs.shot * pairs.signal).sum(1)
+        all_light, shape = pairs.shot.sum(1), (pairs.shot * pairs.signal).sum(1)
+        light += _fitted(pairs, all_light)[1]
         factor, gain = _fitted(pairs, shape)
         alike += gain
+        besides += _fitted(pairs, shape, all_light)[1]
         for place, one in zip(pairs.places, factor * shape / pairs.scale, strict=True):
             taken[place] = taken.get(place, 0.0) + 2 * float(one)
     if straight_beside(state, _KIND):
         before, after = misfits(state, lambda at, default: default + taken.get(at, 0.0))
         alike += (before - after) / 2
     behind = light - alike
-    if behind <= TOLD_APART:
+    if behind <= TOLD_APART or besides > TOLD_APART:
         return None
     return rival(behind, "neighbours share noise of light alone, no more of it the brighter it is")
 
@@ -109,14 +110,15 @@ def _beside(layout: Layout, place: Place, step: tuple[int, int]) -> Place:
     return place[0], next(name for name, own in layout.sites.items() if own == at)
 
 
-def _fitted(pairs: _Pairs, covariance: Array) -> tuple[float, float]:
+def _fitted(pairs: _Pairs, covariance: Array, *others: Array) -> tuple[float, float]:
     """Return the factor of a covariance, none below zero, and what it gains, nats.
 
-    Beside a covariance of the noise of read-out, of any size.
+    Beside a covariance of the noise of read-out and others, of any size.
     """
     unit = pairs.scale * pairs.sd
-    values, shape, beside = pairs.values / pairs.sd, covariance / unit, pairs.read_dn2 / unit
-    length = float(beside @ beside)
-    own = shape - beside * (float(shape @ beside) / length) if length > 0 else shape
+    beside = np.stack([pairs.read_dn2, *others], 1) / unit[:, np.newaxis]
+    own, values = covariance / unit, pairs.values / pairs.sd
+    own = own - beside @ np.linalg.lstsq(beside, own, rcond=None)[0]
+    values = values - beside @ np.linalg.lstsq(beside, values, rcond=None)[0]
     square, through = float(own @ own), max(float(own @ values), 0.0)
     return (through / square, through**2 / (2 * square)) if square > 0 else (0.0, 0.0)

@@ -36,10 +36,10 @@ def of_alike_samples(state: State, kind: str, mean: Array, without: Array) -> De
     mean, without
         The numbers predicted with it, and without it.
     """
-    line = _LINES.get(kind)
-    alike = None if line is None else _Alike.of(state, line)
-    if alike is None or not (alike.near or alike.far):
+    line, called = _LINES.get(kind), {m.statistic for m in state.mismatches}
+    if line is None or called.isdisjoint({*_NEXT[line], _FARTHER}):
         return None
+    alike = _Alike.of(state, line)
     seen = fake = 0.0
     for i, key in enumerate(state.vector.keys):
         known = state.null.known[i] and np.isfinite(mean[i]) and np.isfinite(without[i])

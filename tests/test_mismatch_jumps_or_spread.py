@@ -8,8 +8,16 @@ import pytest
 from analysis.mismatch.jumptold import as_pixels_show, unlike_pixels
 from analysis.mismatch.phase import WholeFrames
 from analysis.mismatch.rank import Ranked
+from dsis.effects import Effect
+from dsis.effects.rts import Rts
 
-SURE = 7.0
+TAILS = "heavy_tailed_read_noise"
+
+
+def _nothing(effect: Effect) -> float:
+    """Return what numbers gain by an effect, nats."""
+    del effect
+    return 0.0
 
 
 def _ranked(**gains: float) -> list[Ranked]:
@@ -17,14 +25,15 @@ def _ranked(**gains: float) -> list[Ranked]:
     return [Ranked(gain, kind, nothing, nothing) for kind, gain in gains.items()]
 
 
-def _frames(gain: float, spread: float) -> WholeFrames:
+def _frames(jumping: float, spread: float) -> WholeFrames:
     made = WholeFrames(Stub(), lambda _: [])  # type: ignore[arg-type] # a stub
-    made.__dict__["_telegraph"] = Stub(gain=gain, spread=spread)
+    values = {"pixel_fraction": 0.01, "amplitude_dn": 8.0, "switch_probability": 0.2}
+    made.__dict__["_telegraph"] = Stub(jumping=jumping, spread=spread, values=values)
     return made
 
 
 @pytest.mark.parametrize(
-    ("gain", "spread", "first", "second"),
+    ("jumping", "spread", "first", "second"),
     [
         (-1.0, 80.0, "read_noise_spread", 2.0),  # 80 nats behind: as good as none
         (-1.0, 10.0, "read_noise_spread", 30.0),
@@ -34,10 +43,10 @@ def _frames(gain: float, spread: float) -> WholeFrames:
     ],
 )
 def test_frames_break_the_tie_that_numbers_leave(
-    gain: float, spread: float, first: str, second: float
+    jumping: float, spread: float, first: str, second: float
 ) -> None:
     fitted = _ranked(rts=40.0, read_noise_spread=38.0, impulse=1.0)
-    best, *others = as_pixels_show(_frames(gain, spread), fitted)
+    best, *others = as_pixels_show(_frames(jumping, spread), fitted)
     assert (best.kind, best.gain) == (first, 40.0)
     (other,) = (one for one in others if one.kind in ("rts", "read_noise_spread"))
     assert other.gain == second
@@ -53,13 +62,16 @@ def test_what_numbers_tell_apart_is_not_asked() -> None:
 
 
 @pytest.mark.parametrize(
-    ("gain", "spread", "best", "why"),
+    ("jumping", "spread", "best", "why"),
     [
         (-1.0, 80.0, "rts", "differs"),
         (15.0, -9.0, "read_noise_spread", "jump"),
         (45.0, -9.0, "hot_pixels", "jump"),
         (15.0, -9.0, "hot_pixels", None),  # jumps do not tell more than hot pixels explain
+        (45.0, -9.0, TAILS, "jump"),
+        (15.0, -9.0, TAILS, None),
         (-1.0, 80.0, "hot_pixels", None),
+        (-1.0, 80.0, TAILS, None),
         (15.0, -9.0, "rts", None),
         (-1.0, 80.0, "read_noise_spread", None),
         (15.0, 80.0, "rts", None),  # both are sure
@@ -67,19 +79,35 @@ def test_what_numbers_tell_apart_is_not_asked() -> None:
     ],
 )
 def test_pixels_deny_what_stands_in_for_another(
-    gain: float, spread: float, best: str, why: str | None
+    jumping: float, spread: float, best: str, why: str | None
 ) -> None:
     """Where the word for what they show is missing nothing else is named for it."""
     (first,) = _ranked(**{best: 40.0})
     bare: Any = Stub(effect=())
-    denial = unlike_pixels(bare, _frames(gain, spread), first, _ranked(impulse=3.0))
+    frames, others = _frames(jumping, spread), _ranked(impulse=3.0)
+    denial = unlike_pixels(bare, frames, first, others, _nothing)
     assert (denial is not None and denial.why.endswith(why)) if why else denial is None
+
+
+@pytest.mark.parametrize("best", ["hot_pixels", TAILS])
+def test_what_jumps_explain_of_the_numbers_counts(best: str) -> None:
+    """Frames gain 15 nats by jumps, and numbers 30 by the same: 40 by another are fewer."""
+    (first,) = _ranked(**{best: 40.0})
+    bare: Any = Stub(effect=())
+    asked: list[Effect] = []
+    for more, denied in ((30.0, True), (20.0, False)):
+        denial = unlike_pixels(
+            bare, _frames(15.0, -9.0), first, [], lambda one, m=more: asked.append(one) or m
+        )
+        assert (denial is not None) == denied
+    jumps = Rts(pixel_fraction=0.01, amplitude_dn=8.0, switch_probability=0.2)
+    assert asked == [jumps, jumps]  # as frames tell them
 
 
 def test_pixels_deny_nothing_beside_the_other() -> None:
     (rts, spread), frames = _ranked(rts=40.0, read_noise_spread=30.0), _frames(-1.0, 80.0)
     bare: Any = Stub(effect=())
     there: Any = Stub(effect=(Stub(kind="read_noise_spread"),))
-    assert unlike_pixels(bare, frames, rts, [spread]) is None  # it was fitted as well
-    assert unlike_pixels(there, frames, rts, []) is None
-    assert unlike_pixels(bare, None, rts, []) is None
+    assert unlike_pixels(bare, frames, rts, [spread], _nothing) is None  # it was fitted as well
+    assert unlike_pixels(there, frames, rts, [], _nothing) is None
+    assert unlike_pixels(bare, None, rts, [], _nothing) is None

@@ -82,9 +82,12 @@ def _recorded(seed: int, kind: str, **how: float) -> Telegraph | None:
         shot = np.sqrt(sd**2 - NOISE[0] ** 2)
         state = rng.random(pixels) < 0.5
         frames = []
+        memory = how.get("memory", 0.0)
+        white = rng.normal(size=pixels) if memory else np.zeros(pixels)
         for _ in range(STACK):
             state ^= rng.random(pixels) < how.get("switching", 0.5)
-            read = NOISE[0] * spread * rng.normal(size=pixels)
+            white = memory * white + np.sqrt(1 - memory**2) * rng.normal(size=pixels)
+            read = NOISE[0] * spread * white
             if kind == "many tails":  # of pixels that differ, too
                 read *= np.sqrt(3 / rng.chisquare(5, pixels))
             if kind == "tails":
@@ -113,6 +116,7 @@ def test_a_population_that_jumps_is_told_with_its_numbers(seed: int) -> None:
     assert told.share_error < how["share"]
     assert told.amplitude_error_dn < how["amplitude"] / 2
     assert told.spread < SURE
+    assert told.jumping > SURE
 
 
 @pytest.mark.parametrize(
@@ -125,7 +129,7 @@ def test_pixels_that_are_noisy_otherwise_do_not_jump(
     kind: str, how: dict[str, float], seed: int
 ) -> None:
     told = _recorded(seed, kind, **how)
-    assert told is None or told.gain < np.log(20)
+    assert told is None or max(told.gain, told.jumping) < np.log(20)
     if kind in ("alike", "tails"):
         assert told is None or told.spread < SURE
 
@@ -138,6 +142,7 @@ def test_a_read_noise_that_spreads_is_told_from_jumps_of_few_or_many(
     told = _recorded(seed, "spread", log_sigma=log_sigma)
     assert told is not None
     assert told.spread > SURE
+    assert told.jumping < SURE
 
 
 @pytest.mark.parametrize("share", [0.1, 0.3])
@@ -146,6 +151,13 @@ def test_of_many_pixels_sums_tell_more(share: float) -> None:
     assert told is not None
     assert told.gain == -np.inf
     assert told.spread < SURE  # many jump: their noise does not spread by itself
+    assert told.jumping > SURE  # but sizes are told by sums
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_noise_of_all_pixels_that_is_alike_in_time_does_not_jump(seed: int) -> None:
+    told = _recorded(seed, "alike", memory=0.3)
+    assert told is None or told.jumping < SURE
 
 
 def test_codes_that_stand_still_tell_nothing() -> None:

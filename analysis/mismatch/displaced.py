@@ -11,11 +11,13 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.stats import chi2, norm
 
+from analysis.mismatch.brighter import no_brighter_alike
 from analysis.mismatch.candidates.response import skewness_below
 from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.gathered import gathered
 from analysis.mismatch.layout import Place
 from analysis.mismatch.leftout import left_out
+from analysis.mismatch.linemeans import of_alike_samples
 from analysis.mismatch.recalibrate import code_step
 from analysis.mismatch.resolved import FAR_OFF
 from analysis.mismatch.sharing import of_charge, shared_otherwise
@@ -45,9 +47,10 @@ def displaced(state: State, kind: str, mean: Array, without: Array | None = None
     what they would be without: by covariances that neighbours have instead, or by what is cut off
     of noise that leans. Where that leaves half of the misfit or less, there may be no bend; nor
     where variances scatter no more than codes that are not equally wide make them. Of a bend that
-    levels show nothing is asked. Of filters and crosstalk, how alike neighbours are at each level;
-    of greens that differ, what other colours share with them. Of widths of codes, whether it is
-    codes that never occur which make them differ.
+    levels show nothing is asked. Of filters, crosstalk and charge that repels charge, how alike
+    neighbours are at each level; of noise of whole lines, how alike samples along them are; of
+    greens that differ, what other colours share with them. Of widths of codes, whether it is
+    codes that never occur which make them differ; of pixels, whether those side by side do alike.
 
     Parameters
     ----------
@@ -66,10 +69,10 @@ def displaced(state: State, kind: str, mean: Array, without: Array | None = None
     if kind in _LINES:
         return _of_new_lines(state, _LINES[kind], without)
     if kind in _SAID:
-        return _SAID[kind](state)
+        return _SAID[kind](state) or of_alike_samples(state, kind, mean, without)
     if kind in _GREENS:
         return _of_colours(state, mean - without)
-    return shared_otherwise(state, kind, without)
+    return shared_otherwise(state, kind, without) or no_brighter_alike(state, kind, without)
 
 
 def _seen_in_levels(state: State, without: Array, mean: Array) -> bool:

@@ -1,16 +1,17 @@
 """Pixels whose read noise differs and pixels that jump: which of them whole frames show."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from analysis.mismatch.contradicted import Denial, rival
 from analysis.mismatch.phase import WholeFrames
 from analysis.mismatch.rank import LEAST_GAIN, SURE_GAIN, TOLD_APART, Ranked
 from dsis.camera import Camera
+from dsis.effects import Effect
 
 _OTHER = {"read_noise_spread": "rts", "rts": "read_noise_spread"}
 _HOT = "hot_pixels"  # what jumps seldom stays where it is in few frames
-_RIVALS = {**_OTHER, _HOT: "rts"}
+_RIVALS = {**_OTHER, _HOT: "rts", "heavy_tailed_read_noise": "rts"}
 PIXELS = frozenset(_RIVALS)
 _WORDS = {"read_noise_spread": "pixels whose read noise differs", "rts": "pixels that jump"}
 
@@ -44,13 +45,29 @@ def as_pixels_show(frames: WholeFrames | None, fitted: Sequence[Ranked]) -> list
 
 
 def unlike_pixels(
-    camera: Camera, frames: WholeFrames | None, best: Ranked, others: Sequence[Ranked]
+    camera: Camera,
+    frames: WholeFrames | None,
+    best: Ranked,
+    others: Sequence[Ranked],
+    explained: Callable[[Effect], float],
 ) -> Denial | None:
     """Return how single pixels deny the best of ranked effects; None: they do not.
 
     They do where they are sure of another, which was not fitted or has no word: of the other of
-    both, or, of hot pixels, that pixels jump, by more than those explain. Beside that other, which
-    the camera has, it is no rival.
+    both, or, of hot pixels and of tails, that pixels jump. These explain some of the numbers: jumps
+    as frames tell them, fitted to no number, must explain more, with what frames gain by them.
+    Beside that other, which the camera has, it is no rival.
+
+    Parameters
+    ----------
+    camera
+        Without the best.
+    frames
+        Whole frames.
+    best, others
+        The effects.
+    explained
+        Gives what numbers gain by another effect, nats.
     """
     other = _RIVALS.get(best.kind)
     there = {own.kind for own in camera.effect} | {one.kind for one in others}
@@ -58,6 +75,8 @@ def unlike_pixels(
         return None
     odds = frames.spread_rather(SURE_GAIN)
     against = odds if other == "read_noise_spread" else -odds
-    if against <= (best.gain if best.kind == _HOT else TOLD_APART):
+    if against > 0 and best.kind not in _OTHER and frames.jumps is not None:
+        against += explained(frames.jumps) - best.gain
+    if against <= TOLD_APART:
         return None
     return rival(against, f"frames of single pixels rather show {_WORDS[other]}")

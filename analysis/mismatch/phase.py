@@ -123,9 +123,15 @@ class WholeFrames:
         What one gains that is `sure` where the other is not, negative of jumps; else 0.
         """
         seen = self._telegraph
-        if seen is None or (seen.spread > sure) == (seen.gain > sure):
+        if seen is None or (seen.spread > sure) == (seen.jumping > sure):
             return 0.0
-        return seen.spread if seen.spread > sure else -seen.gain
+        return seen.spread if seen.spread > sure else -seen.jumping
+
+    @property
+    def jumps(self) -> Rts | None:
+        """The pixels that jump, of the most likely numbers; None: nothing is asked."""
+        seen = self._telegraph
+        return None if seen is None else Rts.model_validate({"kind": "rts", **seen.values})
 
     def line(self, effect: Effect) -> "Line | None":
         """Return amplitude and frequency of a line; None: too little is seen.

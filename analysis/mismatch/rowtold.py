@@ -2,14 +2,18 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
+from math import isfinite
 
 from analysis.mismatch.contradicted import Denial, rival
 from analysis.mismatch.jumptold import PIXELS, as_pixels_show, unlike_pixels
 from analysis.mismatch.mapped import as_maps_show
 from analysis.mismatch.paired import STEADY
 from analysis.mismatch.phase import WholeFrames
-from analysis.mismatch.rank import LEAST_GAIN, TOLD_APART, Ranked, alike
+from analysis.mismatch.polish import with_effects
+from analysis.mismatch.rank import LEAST_GAIN, TOLD_APART, Ranked, alike, replicates_for
 from analysis.mismatch.state import State
+from dsis.effects import Effect
 
 _OTHER = {"pink_noise": "row_banding", "row_banding": "pink_noise"}
 _WORDS = {"pink_noise": "1/f noise", "row_banding": "bands of rows"}
@@ -52,12 +56,22 @@ def unlike_frames(
     if best.kind in STEADY and frames is not None and (paired := frames.pairs.denial(best.kind)):
         return paired
     if best.kind in PIXELS:
-        return unlike_pixels(state.camera, frames, best, others)
+        return unlike_pixels(state.camera, frames, best, others, partial(_explained, state))
     odds = _odds(state, frames, best.kind)
     if odds is None or odds > TOLD_APART or _any(others, _OTHER[best.kind]):
         return None
     why = f"whole frames may as well show {_WORDS[_OTHER[best.kind]]}"
     return rival(-odds, why)
+
+
+def _explained(state: State, effect: Effect) -> float:
+    """Return what a state's numbers gain by an effect as it is, nats."""
+    camera = with_effects(state.camera, [effect])
+    if camera is None:
+        return 0.0
+    predictor = state.predictor(replicates_for(state.setting, [effect]))
+    gain = predictor.loglik(predictor.mean(camera)) - predictor.loglik(state.null.mean)
+    return gain if isfinite(gain) else 0.0
 
 
 def _odds(state: State, frames: WholeFrames | None, kind: str) -> float | None:

@@ -47,7 +47,7 @@ def shared_otherwise(state: State, kind: str, without: Array) -> Denial | None:
     own = _LAWS.get(kind)
     if own is None:
         return None
-    left = _left(state, without, _PAIRS)
+    left = left_by(state, without, _PAIRS)
     if not left:
         return None
     found = _gains(state.clues(), left)
@@ -73,7 +73,7 @@ def of_charge(state: State) -> Callable[[Place, float], float] | None:
     without = state.null.mean
     if len(others) < len(camera.effect):
         without = state.predictor().mean(camera.model_copy(update={"effect": others}))
-    left = _left(state, without, _BESIDE)
+    left = left_by(state, without, _BESIDE)
     found = _gains(state.clues(), left)
     charge = found[Law.CHARGE]
     if charge <= TOLD_APART or charge < max(found.values()) - TOLD_APART:
@@ -96,7 +96,7 @@ def evidences(state: State, without: Array) -> dict[Law, float]:
     without
         The numbers predicted without it.
     """
-    return _gains(state.clues(), _left(state, without, _PAIRS))
+    return _gains(state.clues(), left_by(state, without, _PAIRS))
 
 
 def _gains(clues: Clues, left: Left) -> dict[Law, float]:
@@ -149,7 +149,7 @@ def _unrounded(clues: Clues, place: Place) -> float:
     return max(1 - _ROUNDING * code_step(clues.camera) ** 2 / total, 0.0)
 
 
-def _left(state: State, without: Array, statistics: frozenset[str]) -> Left:
+def left_by(state: State, without: Array, statistics: frozenset[str]) -> Left:
     """Return place, value and its error of each correlation and channel: what an effect is to make.
 
     Not where the converter cuts noise off.

@@ -10,6 +10,8 @@ from analysis.mismatch.state import State
 
 Array = NDArray[np.float64]
 _LEAST_LEVELS = 4  # two of which a line takes
+_NONE = 2.0  # of chi-squared: 1 nat
+_BENDING = frozenset({"dual_gain", "dual_gain_mismatch", "nonlinearity", "saturation"})
 
 
 def misfits(state: State, factor: Callable[[Place, float], float]) -> tuple[float, float]:
@@ -33,7 +35,15 @@ def bent(state: State) -> bool:
         misfit(signal, np.array([expected[at] for at in places]), weight)
         for signal, _, weight, places in curves(state)
     )
-    return sum(found) > 2.0  # of chi-squared
+    return sum(found) > _NONE
+
+
+def straight_beside(state: State, kind: str) -> bool:
+    """Return whether variances of the model lie on a line but for what an effect takes of them."""
+    if any(own.kind in _BENDING - {kind} for own in state.camera.effect):
+        return False
+    line = state.calibrated.fit.line_dn2
+    return sum(misfit(x, line(x), weight) for x, _, weight, _ in curves(state)) <= _NONE
 
 
 def upwards(state: State) -> bool:

@@ -35,6 +35,7 @@ _SPIKY = np.array([1e-3, 0.01, 0.05, 0.15])  # shares of frames
 _PARTS: Array = np.geomspace(1e-4, 0.05, 32)  # of pixels: jumps of more are told by sums
 _MORE: Array = np.geomspace(0.07, 1.0, 8)  # which what else spreads the noise is told from
 _MANY, _SURELY = 0.03, 0.1  # share of pixels from which they are many, and how likely they may be
+_MOST = 0.5  # share of pixels from which all may be meant
 _GRID = 32  # amplitudes
 _STEPS = 200
 
@@ -54,6 +55,9 @@ class Telegraph:
         without, nats; minus infinity where the pixels that jump may be many.
     spread
         The same of read noises that spread over the pixels, beside jumps, few or many, or without.
+    jumping
+        The same of jumps, few or many, but not of most pixels. Rivals are also pixels as noisy that
+        do not jump, and most pixels, whose noise another cause may make alike in time.
     """
 
     share: float
@@ -64,6 +68,7 @@ class Telegraph:
     switching_error: float
     gain: float
     spread: float
+    jumping: float
 
     @property
     def known(self) -> bool:
@@ -101,16 +106,20 @@ class _Others:
         Of a variance that grows with exposure time: (pixel, added).
     spikes
         Of single noisy frames: (pixel, added, share).
+    twins
+        Of the variance that jumps of each height have, without any: (pixel, height).
     """
 
     own: Array
     grown: Array
     spikes: Array
+    twins: Array
 
     @property
     def most(self) -> Array:
         """The largest of each pixel: (pixel,)."""
-        every = [own.reshape(len(own), -1).max(1) for own in (self.own, self.grown, self.spikes)]
+        laws = (self.own, self.grown, self.spikes, self.twins)
+        every = [own.reshape(len(own), -1).max(1) for own in laws]
         return np.asarray(np.maximum(np.max(every, 0), 0.0))
 
     def laws(self, top: Array, weight: Array) -> Iterator[tuple[Array, float | None]]:
@@ -171,6 +180,7 @@ def telegraph(layout: Layout, frames_of: FramesOf) -> Telegraph | None:
     own = np.zeros((chosen.size, _RATIOS.size))
     grown = np.zeros((chosen.size, _ADDED.size))
     spikes = np.zeros((chosen.size, _SPIKES.size, _SPIKY.size))
+    twins = np.zeros((chosen.size, heights.size))
     for x, noise, time in blocks:
         some, dn2 = x[chosen], noise[chosen]
         jumps += of_jumps(some, dn2, heights, _SWITCHING)
@@ -178,7 +188,8 @@ def telegraph(layout: Layout, frames_of: FramesOf) -> Telegraph | None:
         part = time / longest if longest > 0 else 1.0
         grown += of_variances(some, dn2, _ADDED * least * part)
         spikes += of_spikes(some, dn2, _SPIKES * least, _SPIKY)
-    return _fitted(jumps, _Others(own, grown, spikes), weight, heights)
+        twins += of_variances(some, dn2, heights**2 / 4)
+    return _fitted(jumps, _Others(own, grown, spikes, twins), weight, heights)
 
 
 def _blocks(layout: Layout, frames_of: FramesOf) -> Iterator[tuple[Array, Array, float]]:
@@ -246,24 +257,38 @@ def _fitted(jumps: Array, others: _Others, weight: Array, heights: Array) -> Tel
     """Return the telegraphs that are likely beside the likeliest law of all other pixels."""
     top = np.maximum(others.most, jumps.max((1, 2)))
     jumping = np.exp(jumps - top[:, None, None])
+    still = np.exp(others.twins - top[:, None])
     amplitudes = np.geomspace(heights[0], heights[-1] / 2, _GRID)
-    found, alone, spreading = [], [], []
+    parts = np.concatenate([_PARTS, _MORE])
+    found, alone, spreading, many, rivals = [], [], [], [], []
     for beside, cost in others.laws(top, weight):
         alone.append(_sum(beside, weight))
-        parts = np.concatenate([_PARTS, _MORE]) if cost is None else _PARTS
         own = np.array(
             [[_of_shares(_of_heights(jumping[:, :, w], heights, a), beside, weight, parts)
               for a in amplitudes] for w in range(_SWITCHING.size)]
         )  # fmt: skip
-        best = max(alone[-1], float(own.max()))
-        spreading.append((cost is not None, best - (cost or 0.0)))
+        twins = [
+            _of_shares(_of_heights(still, heights, a), beside, weight, parts) for a in amplitudes
+        ]
+        few = own[:, :, : parts.size if cost is None else _PARTS.size]
+        best, chosen = max(alone[-1], float(few.max())), cost or 0.0
+        spreading.append((cost is not None, best - chosen))
+        minor, most = own[:, :, parts <= _MOST], own[:, :, parts > _MOST]
+        many.append(_mean(minor) - chosen)
+        rivals.append(max(alone[-1], float(np.max(twins)), _mean(most)) - chosen)
         found.append(own[:, :, : _PARTS.size])
-    gain = max(float(logsumexp(own)) for own in found) - log(found[0].size) - max(alone)
+    gain = max(_mean(own) for own in found) - max(alone)
     spread, other = (
         max(own for there, own in spreading if there == kind) for kind in (True, False)
     )
     # A mixture of laws takes some of the jumps; so sizes are those beside the best single law.
-    return _told(max(found[:-1], key=np.max), amplitudes, gain, spread - other)
+    sizes = max(found[:-1], key=np.max)
+    return _told(sizes, amplitudes, (gain, spread - other, max(many) - max(rivals)))
+
+
+def _mean(likely: Array) -> float:
+    """Return the logarithm of the mean likelihood."""
+    return float(logsumexp(likely)) - log(likely.size)
 
 
 def _of_shares(own: Array, beside: Array, weight: Array, parts: Array) -> Array:
@@ -272,12 +297,13 @@ def _of_shares(own: Array, beside: Array, weight: Array, parts: Array) -> Array:
     return np.asarray(np.log(np.maximum(likely, 1e-300)) @ weight)
 
 
-def _told(likely: Array, amplitudes: Array, gain: float, spread: float) -> Telegraph | None:
+def _told(likely: Array, amplitudes: Array, gains: tuple[float, float, float]) -> Telegraph | None:
     """Return the mean telegraph, from log-likelihoods (switching, amplitude, share).
 
     All three are as likely beforehand in their logarithms, and so are means; errors are the root
-    mean squares about them.
+    mean squares about them. `gains` are `gain`, `spread` and `jumping`.
     """
+    gain, *others = gains
     if not isfinite(gain):
         return None
     chance = np.exp(likely - logsumexp(likely))
@@ -290,7 +316,7 @@ def _told(likely: Array, amplitudes: Array, gain: float, spread: float) -> Teleg
         step = mean * float(np.diff(np.log(places)).mean())
         found.append((mean, sqrt(float(own @ (places - mean) ** 2) + step**2 / 12)))
     (switching, a), (amplitude, b), (share, c) = found
-    return Telegraph(share, c, amplitude, b, switching, a, -inf if many else gain, spread)
+    return Telegraph(share, c, amplitude, b, switching, a, -inf if many else gain, *others)
 
 
 def _of_heights(jumping: Array, heights: Array, amplitude: float) -> Array:

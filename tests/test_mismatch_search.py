@@ -94,7 +94,7 @@ def test_nothing_worse_is_claimed_where_two_tie(monkeypatch: pytest.MonkeyPatch)
     """Crosstalk and filtering tie; memory explains the same numbers worse; row noise others."""
     offered = [
         _ranked("spatial_filtering", 15.0, 0, 1, 2),
-        _ranked("adc_dnl", 14.0, 5),
+        _ranked("dark_current", 14.0, 5),
         _ranked("crosstalk", 13.5, 0, 1, 2),
         _ranked("readout_memory", 7.2, 0, 1, 2),
         _ranked("row_noise", 5.0, 8, 9),
@@ -102,7 +102,7 @@ def test_nothing_worse_is_claimed_where_two_tie(monkeypatch: pytest.MonkeyPatch)
 
     _offering(monkeypatch, offered)
     search = _search()
-    assert [one.kind for one in search._decided(STATE)] == ["adc_dnl", "row_noise"]
+    assert [one.kind for one in search._decided(STATE)] == ["dark_current", "row_noise"]
     assert [{one.kind for one in pair} for pair in search.ties] == [
         {"spatial_filtering", "crosstalk"}
     ]

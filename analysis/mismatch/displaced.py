@@ -12,12 +12,15 @@ from scipy.stats import chi2, norm
 
 from analysis.mismatch.candidates.response import skewness_below
 from analysis.mismatch.contradicted import Denial
+from analysis.mismatch.fewlines import of_few_lines
+from analysis.mismatch.latelight import of_late_light
 from analysis.mismatch.layout import Place
 from analysis.mismatch.recalibrate import code_step
 from analysis.mismatch.resolved import FAR_OFF
 from analysis.mismatch.sharing import of_charge, shared_otherwise
 from analysis.mismatch.state import State
 from analysis.mismatch.straight import curves, misfit, misfits
+from analysis.mismatch.wholelines import of_parts
 
 Array = NDArray[np.float64]
 _BENDS = frozenset({"nonlinearity", "dual_gain", "dual_gain_mismatch"})
@@ -56,12 +59,12 @@ def displaced(state: State, kind: str, mean: Array, without: Array | None = None
             return None
         return _of_neighbours(state) or _of_limits(state) or _of_codes(state)
     if kind in _LINES:
-        return _of_new_lines(state, _LINES[kind], without)
+        denial = of_few_lines(state, kind, without) or of_parts(state, kind)
+        return denial or _of_new_lines(state, _LINES[kind], without)
     if kind in _WHITE:
-        return _WHITE[kind](state)
-    if kind in _GREENS:
-        return _of_colours(state, mean - without)
-    return shared_otherwise(state, kind, without)
+        return of_few_lines(state, kind, without) or _WHITE[kind](state)
+    denial = _of_colours(state, mean - without) if kind in _GREENS else None
+    return denial or of_late_light(state, kind) or shared_otherwise(state, kind, without)
 
 
 def _seen_in_levels(state: State, without: Array, mean: Array) -> bool:

@@ -12,6 +12,7 @@ from analysis.mismatch.bank.seams import SMOOTH_DEGREE, beyond_smooth, seam_shap
 from analysis.mismatch.contradicted import Denial, rival
 from analysis.mismatch.displaced import displaced
 from analysis.mismatch.edged import STATISTIC, edged, single
+from analysis.mismatch.fewpatches import of_few_patches
 from analysis.mismatch.recalibrate import code_step
 from analysis.mismatch.resolved import FAR_OFF
 from analysis.mismatch.rivalled import rivalled
@@ -55,6 +56,7 @@ def of_another(state: State, effect: Effect, without: Array) -> Denial | None:
         or coded(state, kind, without)
         or lopsided(state, kind)
         or carried(state, effect)
+        or of_few_patches(state, effect)
         or displaced(state, kind, state.null.mean, without)
     )
 

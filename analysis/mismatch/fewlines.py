@@ -37,7 +37,7 @@ def of_few_lines(state: State, kind: str, without: Array) -> Denial | None:
     axis = _NEW.get(kind) or _FIXED.get(kind)
     if axis is None:
         return None
-    seen, signals = state.setting.seen, state.calibrated.fit.signal_dn
+    seen = state.setting.seen
     exposures = [e.name for e in state.setting.layout.uniform if (e.name, axis) in seen.lines]
     own = [seen.lines[name, axis] for name in exposures]
     few = moving_farther(own)
@@ -48,7 +48,7 @@ def of_few_lines(state: State, kind: str, without: Array) -> Denial | None:
     else:
         of_means = ("fixed_pixel_variance", f"fixed_{axis}_variance")
         factors = _factors(state, exposures, of_means, without)
-        channels = state.setting.layout.channels
+        signals, channels = state.calibrated.fit.signal_dn, state.setting.layout.channels
         light = [float(np.mean([signals[e, c] for c in channels])) for e in exposures]
         excess = _fixed(own, light if kind in _OF_LIGHT else [1.0] * len(own), factors)
     whole, rest = float(excess.sum()), float(excess[~few].sum())

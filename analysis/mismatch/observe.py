@@ -15,6 +15,7 @@ from analysis.mismatch.bank.common import common
 from analysis.mismatch.bank.linemeans import AXES, Axis, LineMeans
 from analysis.mismatch.bank.local import local_scalars, variances, widened
 from analysis.mismatch.bank.maps import ALONE
+from analysis.mismatch.bank.motion import MotionSums
 from analysis.mismatch.bank.parts import Parts, parts
 from analysis.mismatch.bank.sawtooth import Samples
 from analysis.mismatch.bank.scalars import NAMES, UNKNOWN, Number, scalars
@@ -287,7 +288,9 @@ def _scenes(
     local: dict[Place, Level] = {}
     for exposure in layout.pictures:
         scene = layout.scenes[exposure.name]
-        measured = measure(layout, map(scene.steadied, frames_of(exposure.name)), made=made)
+        motion = MotionSums(scene)
+        seen = motion.watching(map(scene.steadied, frames_of(exposure.name)))
+        measured = measure(layout, seen, made=made)
         if watch is not None:
             watch(exposure.name, measured)
         frames, parts = len(exposure.numbers), scene.channels
@@ -295,6 +298,7 @@ def _scenes(
             signals = {name: layout.signal_dn[exposure.name, name] for name in measured.channels}
             alike = common(measured.channels, signals, frames, layout.sites)
             shared[exposure.name] = widened(alike, measured.channels, parts)
+        shared[exposure.name] = {**shared.get(exposure.name, {}), **motion.numbers()}
         for name, channel in measured.channels.items():
             own = parts[name]
             found[exposure.name, name] = local_scalars(channel, frames, own)

@@ -90,3 +90,12 @@ def test_whole_columns_that_differ_are_believed(cfa: Cfa, spread: float) -> None
         lines = np.random.default_rng(seed).normal(0, spread, COLUMNS)
         gain = np.tile(lines, (ROWS, 1)) + 0.3 * _dust(seed)
         assert of_parts(_state(gain, cfa, seed), "column_prnu") is None
+
+
+@pytest.mark.parametrize("cfa", [Cfa.MONO, Cfa.RGGB])
+def test_columns_that_differ_as_their_neighbours_do_are_none_by_themselves(cfa: Cfa) -> None:
+    for seed in (1, 2, 3):
+        lines = ndimage.gaussian_filter1d(np.random.default_rng(seed).normal(size=COLUMNS), 3.0)
+        said = of_parts(_state(np.tile(0.005 * lines, (ROWS, 1)), cfa, seed), "column_prnu")
+        assert said is not None
+        assert "neighbours" in said.why

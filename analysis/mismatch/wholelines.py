@@ -25,13 +25,14 @@ def of_parts(state: State, kind: str) -> Denial | None:
     they move the mean of a line, and few of its parts. So the median of every other part and that
     of the rest covary by the variance of lines, whatever their noise, and by none of what is in
     less than half of the parts. Where that is less than half of what means of lines have, for sure,
-    something else makes these differ.
+    something else makes these differ. So it does where lines that lie beside one another in a
+    channel are alike: those of lines are drawn for each by itself.
     """
     if kind not in _MAPS:
         return None
     axis = int(kind.startswith("column"))
     images = _images(state, _MAPS[kind])
-    products, whole, lines = [], 0.0, 0
+    products, beside, whole, lines = [], [], 0.0, 0
     for image, noise in images.values():
         across = image if axis else image.T  # (along the line, line)
         if len(across) < _PARTS * _LEAST_PIXELS:
@@ -40,16 +41,23 @@ def of_parts(state: State, kind: str) -> Denial | None:
         parts = [beyond_smooth(part.mean(0)) / noise for part in np.array_split(across, _PARTS)]
         every, other = np.median(parts[::2], 0), np.median(parts[1::2], 0)
         products.append(every * other)
+        beside.append(means[1:] * means[:-1])
         single = typical_square(np.diff(across, axis=0)) / 2 / noise**2  # of pixels by themselves
         whole += float((means**2).sum()) - single * means.size / len(across)
         lines += means.size
     if not products or whole <= 0:
         return None
-    own = np.concatenate(products)
+    own, near = np.concatenate(products), np.concatenate(beside)
+    name = "columns" if axis else "rows"
+    alike = float(near.sum()) - _SURE * float(near.std()) * near.size**0.5
+    if alike > _MOST * whole:
+        return Denial(
+            max(1 - float(near.sum()) / whole, 0.0), f"{name} differ as their neighbours do"
+        )
     seen = float(own.sum()) + _SURE * float(own.std()) * lines**0.5
     if seen >= _MOST * whole:
         return None
-    why = f"most of what {'columns' if axis else 'rows'} differ by lies in few parts of them"
+    why = f"most of what {name} differ by lies in few parts of them"
     return Denial(max(float(own.sum()) / whole, 0.0), why)
 
 

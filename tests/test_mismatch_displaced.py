@@ -74,7 +74,7 @@ def _state(
     clues = SimpleNamespace(
         signal=lambda place: at[place],
         shot_share=lambda place: max(1 - READ / levels[place].variance_dn2, 0.0),
-        seen=SimpleNamespace(levels=levels),
+        seen=SimpleNamespace(levels=levels, images={}, lines={}, surfaces={}),
         camera=SimpleNamespace(effect=(), noise=segment),
     )
     return SimpleNamespace(
@@ -82,7 +82,7 @@ def _state(
         clues=lambda: clues,
         calibrated=SimpleNamespace(fit=SimpleNamespace(signal_dn=at)),
         setting=SimpleNamespace(
-            seen=SimpleNamespace(levels=levels),
+            seen=SimpleNamespace(levels=levels, images={}, lines={}, surfaces={}),
             layout=SimpleNamespace(uniform=uniform, channels=("MONO",)),
         ),
         vector=SimpleNamespace(keys=tuple(keys), values=np.array(found)),
@@ -272,5 +272,10 @@ def test_other_effects_are_not_asked() -> None:
 def test_columns_whose_spectrum_is_not_flat_are_no_white_noise(z: float, denied: bool) -> None:
     keys = (Key("column_spectrum_peak", "all"), Key("column_variance", "exposure", "dark"))
     null = SimpleNamespace(departures=lambda _: np.array([z, 30.0]), mean=np.zeros(2))
-    state: Any = SimpleNamespace(vector=SimpleNamespace(keys=keys), null=null, mismatches=())
+    state: Any = SimpleNamespace(
+        vector=SimpleNamespace(keys=keys),
+        null=null,
+        mismatches=(),
+        setting=SimpleNamespace(seen=SimpleNamespace(lines={}), layout=SimpleNamespace(uniform=())),
+    )
     assert (displaced(state, "column_noise", null.mean) is not None) is denied

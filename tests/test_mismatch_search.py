@@ -23,10 +23,13 @@ from dsis.effects import registry
 NUMBERS = 12
 STATE: Any = SimpleNamespace(
     null=SimpleNamespace(known=np.ones(NUMBERS, bool), mean=np.zeros(NUMBERS), sd=np.ones(NUMBERS)),
-    vector=SimpleNamespace(keys=()),
+    vector=SimpleNamespace(keys=(), values=()),
     predictor=lambda _: None,
+    mismatches=(),
+    calibrated=SimpleNamespace(fit=SimpleNamespace(signal_dn={})),
     setting=SimpleNamespace(
-        layout=SimpleNamespace(rows=64, columns=96, uniform=()), seen=SimpleNamespace(levels={})
+        layout=SimpleNamespace(rows=64, columns=96, uniform=(), channels=()),
+        seen=SimpleNamespace(levels={}, middles={}, lines={}),
     ),
 )
 
@@ -38,7 +41,7 @@ def _ranked(kind: str, gain: float, *changed: int) -> Any:
         kind=kind,
         name=kind,
         gain=gain,
-        polished=SimpleNamespace(mean=mean),
+        polished=SimpleNamespace(mean=mean, effects=(None,)),
         mean=mean,
         proposal=SimpleNamespace(effect=None),
     )
@@ -94,7 +97,7 @@ def test_nothing_worse_is_claimed_where_two_tie(monkeypatch: pytest.MonkeyPatch)
     """Crosstalk and filtering tie; memory explains the same numbers worse; row noise others."""
     offered = [
         _ranked("spatial_filtering", 15.0, 0, 1, 2),
-        _ranked("dark_current", 14.0, 5),
+        _ranked("adc_dnl", 14.0, 5),
         _ranked("crosstalk", 13.5, 0, 1, 2),
         _ranked("readout_memory", 7.2, 0, 1, 2),
         _ranked("row_noise", 5.0, 8, 9),
@@ -102,7 +105,7 @@ def test_nothing_worse_is_claimed_where_two_tie(monkeypatch: pytest.MonkeyPatch)
 
     _offering(monkeypatch, offered)
     search = _search()
-    assert [one.kind for one in search._decided(STATE)] == ["dark_current", "row_noise"]
+    assert [one.kind for one in search._decided(STATE)] == ["adc_dnl", "row_noise"]
     assert [{one.kind for one in pair} for pair in search.ties] == [
         {"spatial_filtering", "crosstalk"}
     ]
@@ -306,7 +309,8 @@ def test_a_denied_decay_waits_as_others_do_and_leaves_other_edges(
     def decay(edge: str, gain: float) -> Any:
         effect = registry()["line_settling"](gain_percent=1.0, length_pixels=5.0, edge=edge)
         proposal = Proposal(effect, ("gain_percent",))
-        return Ranked(gain, "line_settling", proposal, SimpleNamespace(mean=np.zeros(NUMBERS)))
+        polished = SimpleNamespace(mean=np.zeros(NUMBERS), effects=(effect,))
+        return Ranked(gain, "line_settling", proposal, polished)
 
     left, top, other = decay("left", 50.0), decay("top", 20.0), _ranked("row_noise", 30.0, 0)
     other.proposal.effect = registry()["row_noise"](sigma_dn=1.0)

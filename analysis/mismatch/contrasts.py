@@ -20,6 +20,7 @@ from analysis.mismatch.bank.home import (
     together_too,
 )
 from analysis.mismatch.bank.key import MOSAIC, Key
+from analysis.mismatch.bank.motion import STATISTIC as MOTION
 from analysis.mismatch.bank.scalars import OF_MEAN_FRAMES
 from analysis.mismatch.basefit import colour
 from analysis.mismatch.layout import Layout
@@ -112,6 +113,8 @@ def _groups(reference: Vector, known: NDArray[np.bool_]) -> dict[tuple[str, str]
     groups: dict[tuple[str, str], list[int]] = {}
     for i, key in enumerate(reference.keys):
         names = []
+        if key.statistic == MOTION:  # of few scenes, each by itself
+            continue
         if key.scope == MOSAIC and known[i]:
             names = [(key.statistic, f"{MOSAIC}, {key.detail}" if key.detail else MOSAIC)]
         elif key.scope in ("exposure", SCENE) and known[i] and key.statistic != "code_spacing":

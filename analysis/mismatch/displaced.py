@@ -14,7 +14,9 @@ from scipy.stats import chi2, norm
 from analysis.mismatch.brighter import no_brighter_alike
 from analysis.mismatch.candidates.response import skewness_below
 from analysis.mismatch.contradicted import Denial
+from analysis.mismatch.fewlines import of_few_lines
 from analysis.mismatch.gathered import gathered
+from analysis.mismatch.latelight import of_late_light
 from analysis.mismatch.layout import Place
 from analysis.mismatch.leftout import left_out
 from analysis.mismatch.linemeans import of_alike_samples
@@ -23,6 +25,7 @@ from analysis.mismatch.resolved import FAR_OFF
 from analysis.mismatch.sharing import of_charge, shared_otherwise
 from analysis.mismatch.state import State
 from analysis.mismatch.straight import curves, misfit, misfits, upwards
+from analysis.mismatch.wholelines import of_parts
 
 Array = NDArray[np.float64]
 Left = dict[tuple[Place, str], tuple[float, float]]
@@ -67,12 +70,14 @@ def displaced(state: State, kind: str, mean: Array, without: Array | None = None
             return None
         return _of_neighbours(state) or _of_limits(state) or _of_codes(state)
     if kind in _LINES:
-        return _of_new_lines(state, _LINES[kind], without)
+        denial = of_few_lines(state, kind, without) or of_parts(state, kind)
+        return denial or _of_new_lines(state, _LINES[kind], without)
     if kind in _SAID:
-        return _SAID[kind](state) or of_alike_samples(state, kind, mean, without)
-    if kind in _GREENS:
-        return _of_colours(state, mean - without)
-    return shared_otherwise(state, kind, without) or no_brighter_alike(state, kind, without)
+        denial = of_few_lines(state, kind, without) or _SAID[kind](state)
+        return denial or of_alike_samples(state, kind, mean, without)
+    denial = _of_colours(state, mean - without) if kind in _GREENS else None
+    denial = denial or of_late_light(state, kind) or shared_otherwise(state, kind, without)
+    return denial or no_brighter_alike(state, kind, without)
 
 
 def _seen_in_levels(state: State, without: Array, mean: Array) -> bool:

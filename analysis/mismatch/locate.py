@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from analysis.mismatch.bank.home import TIME, homes, one_sided
 from analysis.mismatch.bank.key import MOSAIC, Key
+from analysis.mismatch.bank.motion import STATISTIC as MOTION
 from analysis.mismatch.bank.standing import NAME as FIXED_WAVE
 from analysis.mismatch.finding import Mismatch, Where
 from analysis.mismatch.layout import Layout
@@ -58,7 +59,10 @@ def tested(layout: Layout, null: Null, seen: Vector) -> tuple[Array, Array]:
             z[size + i] = 0.0
     # The largest of many bins says nothing where it is smaller than chance makes it.
     peaks = np.array(
-        [key.statistic.endswith(("spectrum_peak", "spectral_peak")) for key in null.keys]
+        [
+            key.statistic.endswith(("spectrum_peak", "spectral_peak")) or key.statistic == MOTION
+            for key in null.keys
+        ]
     )
     z[peaks] = np.maximum(z[peaks], 0.0)
     # No pattern is less than none: lower tails of these ratios of few degrees are heavy.

@@ -12,13 +12,16 @@ from numpy.typing import NDArray
 from analysis.mismatch.bank.bulk import Bulk
 from analysis.mismatch.bank.coherent import Peak, SpectrumSums
 from analysis.mismatch.bank.common import common
+from analysis.mismatch.bank.linemeans import AXES, Axis, LineMeans
 from analysis.mismatch.bank.local import local_scalars, variances, widened
 from analysis.mismatch.bank.maps import ALONE
+from analysis.mismatch.bank.motion import MotionSums
 from analysis.mismatch.bank.parts import Parts, parts
 from analysis.mismatch.bank.sawtooth import Samples
 from analysis.mismatch.bank.scalars import NAMES, UNKNOWN, Number, scalars
 from analysis.mismatch.bank.standing import NAME as FIXED_WAVE
 from analysis.mismatch.bank.standing import standing
+from analysis.mismatch.bank.surfaces import Leaning, leaning
 from analysis.mismatch.bank.together import together
 from analysis.mismatch.bank.waves import WaveSums
 from analysis.mismatch.layout import Layout, Place, Taken
@@ -95,6 +98,10 @@ class Observation:
         The same as `levels` of scenes: by exposure and channel, and in bins of signal.
     carried
         Kept on demand: samples and those read before, by axis, of each exposure.
+    lines
+        Kept on demand: rows and columns of uniform exposures.
+    surfaces
+        Kept on demand: how uniform exposures lean and bow, by exposure and channel.
     lattices
         Where the codes lie that occur, by exposure and channel, clipped ends left out.
     middles
@@ -110,6 +117,8 @@ class Observation:
     common: Mapping[str, Mapping[str, Number]] = field(default_factory=dict)
     local: Mapping[Place, Level] = field(default_factory=dict)
     carried: Mapping[str, tuple[Samples, ...]] = field(default_factory=dict)
+    lines: Mapping[tuple[str, Axis], LineMeans] = field(default_factory=dict)
+    surfaces: Mapping[Place, Leaning] = field(default_factory=dict)
     lattices: Mapping[Place, Lattice] = field(default_factory=dict)
     middles: Mapping[Place, Middle] = field(default_factory=dict)
 
@@ -190,6 +199,8 @@ def observing(
     middles: dict[Place, Middle] = {}
     sums: dict[str, ChannelSums] = {}
     whole = SensorSums(layout, samples=kept.images and kept.samples, made=kept.made)
+    lines: dict[tuple[str, Axis], LineMeans] = {}
+    surfaces: dict[Place, Leaning] = {}
 
     def look(exposure: Taken) -> tuple[Looked, Bulk | None]:
         many = Bulk.of(layout, exposure.name) if SPIKES in kept.made else None
@@ -202,6 +213,8 @@ def observing(
         measured, frames = one.measured, one.frames
         still = {name for name in layout.channels if (one.exposure, name) in layout.still}
         whole.add(one, still=bool(still))
+        if kept.images and not still:
+            lines |= {(one.exposure, axis): whole.lines(one, axis) for axis in AXES}
         lattices |= _lattices(one.exposure, measured)
         middles |= _middles(one.exposure, measured) if kept.images else {}
         if watch is not None:
@@ -220,6 +233,8 @@ def observing(
             found[place] = scalars(channel, frames)
             variance, signal = layout.variance_dn2[place], layout.signal_dn[place]
             sums[name].add(one.exposure, channel, frames, variance, signal)
+            if kept.images:
+                surfaces[place] = leaning(channel, frames)
         yield
     local = _scenes(layout, frames_of, watch, found, whole.common, kept.made)
     maps, images, fixed = _maps(layout, sums, whole.waves)
@@ -234,6 +249,8 @@ def observing(
         whole.common,
         local,
         whole.memory.samples,
+        lines,
+        surfaces,
         lattices,
         middles,
     )
@@ -284,7 +301,9 @@ def _scenes(
     local: dict[Place, Level] = {}
     for exposure in layout.pictures:
         scene = layout.scenes[exposure.name]
-        measured = measure(layout, map(scene.steadied, frames_of(exposure.name)), made=made)
+        motion = MotionSums(scene)
+        seen = motion.watching(map(scene.steadied, frames_of(exposure.name)))
+        measured = measure(layout, seen, made=made)
         if watch is not None:
             watch(exposure.name, measured)
         frames, parts = len(exposure.numbers), scene.channels
@@ -292,6 +311,7 @@ def _scenes(
             signals = {name: layout.signal_dn[exposure.name, name] for name in measured.channels}
             alike = common(measured.channels, signals, frames, layout.sites)
             shared[exposure.name] = widened(alike, measured.channels, parts)
+        shared[exposure.name] = {**shared.get(exposure.name, {}), **motion.numbers()}
         for name, channel in measured.channels.items():
             own = parts[name]
             found[exposure.name, name] = local_scalars(channel, frames, own)

@@ -131,6 +131,7 @@ def ranked(
         if state.setting.jobs > 1 and len(starts) > 1:
             asked.ready(stepped(asked, *fit) for fit in fits)
     found: list[Fit] = []
+    strange: set[str] = set()
     made = side_by_side(partial(_fitted, state), likely, state.setting.jobs)
     at_hand = {id(start): polished for start, polished in zip(likely, made, strict=True)}
     for value, kind, proposal in tried:
@@ -141,9 +142,13 @@ def ranked(
         polished = at_hand[id(proposal)] if known else _fitted(state, proposal)
         step()
         if polished is None or not CANDIDATES[kind].sane(state.setting.layout, polished.effects[0]):
+            strange.add(kind)
             continue
         if not any(alike(state, polished.mean, one) for one in apart):
             found.append((kind, proposal, polished))
+    if strange and not found:  # nothing that they were likelier than was fitted
+        left = frozenset(kinds) - strange
+        return ranked(state, left, memory, step, settled, apart, possible, shown)
     fitted = _in_order(state, found, shown)
     best = max((one.gain for one in fitted), default=SURE_GAIN)
     if best >= SURE_GAIN or state.setting.large:

@@ -6,6 +6,7 @@ from functools import partial
 from math import isfinite
 
 from analysis.mismatch.contradicted import Denial, rival
+from analysis.mismatch.fewpatches import of_few_patches
 from analysis.mismatch.jumptold import PIXELS, as_pixels_show, unlike_pixels
 from analysis.mismatch.mapped import as_maps_show
 from analysis.mismatch.paired import STEADY
@@ -49,14 +50,17 @@ def as_shown(state: State, frames: WholeFrames | None, fitted: Sequence[Ranked])
 def unlike_frames(
     state: State, frames: WholeFrames | None, best: Ranked, others: Sequence[Ranked]
 ) -> Denial | None:
-    """Return how whole frames, or single pixels, deny the best of ranked effects; None: not.
+    """Return how whole frames, pixels, or the gain's map deny the best of ranked effects.
 
-    Frames do where the other of both, which was not fitted or has no word, is as likely.
+    None: they do not. Frames do where the other of both, which was not fitted or has no word, is as
+    likely.
     """
     if best.kind in STEADY and frames is not None and (paired := frames.pairs.denial(best.kind)):
         return paired
     if best.kind in PIXELS:
         return unlike_pixels(state.camera, frames, best, others, partial(_explained, state))
+    if (few := of_few_patches(state, best.polished.effects[0])) is not None:
+        return few
     odds = _odds(state, frames, best.kind)
     if odds is None or odds > TOLD_APART or _any(others, _OTHER[best.kind]):
         return None

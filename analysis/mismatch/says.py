@@ -33,6 +33,7 @@ _WORDS = {
     "row_correlation": "the means of rows that lie near each other are alike",
     "column_spectrum_peak": "column means have a periodic component",
     "frame_correlation": "the noise of a frame is correlated with that of the next",
+    "scene_motion": "the scene moves between frames by less than a pixel",
     "code_spacing": "not every code occurs: codes come in steps",
     "code_imbalance": "codes are not equally frequent",
     "fixed_pixel_variance": "every pixel has a fixed deviation of its own",

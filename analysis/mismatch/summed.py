@@ -10,6 +10,7 @@ from analysis.mismatch.bank.bands import Bands
 from analysis.mismatch.bank.carryover import CarryOver, CarryOverSums
 from analysis.mismatch.bank.coherent import Peak, SpectrumSums
 from analysis.mismatch.bank.common import common
+from analysis.mismatch.bank.linemeans import Axis, LineMeans, line_means
 from analysis.mismatch.bank.maps import PatternSums, Regressors
 from analysis.mismatch.bank.persistent import VarianceSums
 from analysis.mismatch.bank.scalars import Number
@@ -134,6 +135,10 @@ class SensorSums:
             sites = self.layout.sites
             self.common[one.exposure] = common(found, signals, one.frames, sites)
             self.bands.add(found, expected, signals, one.frames)
+
+    def lines(self, one: "Looked", axis: Axis) -> LineMeans:
+        """Return the rows or columns of what was looked at."""
+        return line_means(one.measured.channels, self.layout.sites, self.shape, one.frames, axis)
 
     def numbers(self) -> dict[str, Number]:
         """Return spectra and memories of the whole sensor."""

@@ -42,6 +42,7 @@ _FOLLOWS = {
     "row_spectrum_peak": frozenset({"row_spectrum_peak", "row_variance"}),
     "slow_row_variance": frozenset({"row_spectrum_peak", "row_variance"}),
     "row_correlation": frozenset({"row_spectrum_peak", "row_variance"}) | _CORRELATIONS,
+    "scene_motion": _CORRELATIONS | _LINES | {"row_spectrum_peak", "spectral_peak"},
     "half_seam": _FIXED | _LINES,
     "fixed_edge": _FIXED | _LINES,
     "fixed_smooth_tilt": _FIXED | _LINES,

@@ -32,6 +32,7 @@ STATISTICS = {
     "column_spectrum_peak": "strongest line of the spectrum of column means",
     "phase": "phase of the pattern from frame to frame",
     "frame_correlation": "correlation with the next frame",
+    "scene_motion": "movement of the scene",
     "variance_spread": "spread of the noise over pixels",
     "variance_persistence": "pixels noisy at every exposure",
     "noisy_pixels": "few pixels far noisier",

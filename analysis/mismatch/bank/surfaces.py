@@ -1,15 +1,18 @@
 """Smooth surfaces of a map: how strong they are, and which way they lean."""
 
+from dataclasses import dataclass
 from math import sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.bank.scalars import Number, ratio_root
+from dsis.measures import Channel
 from dsis.measures.fixed_pattern import Smooth
 
 Array = NDArray[np.float64]
 LOW = "low order"
+_BOWED = 2  # degree of surfaces that bow
 
 
 def surfaces(
@@ -63,3 +66,28 @@ def slopes(
         "fixed_smooth_tilt of columns": (float(signed[0, 1]) / sqrt(across), 1.0),
         "fixed_smooth_falloff": (float(fall) / sqrt(n**2 * down + m**2 * across), 1.0),
     }
+
+
+@dataclass(frozen=True, eq=False)
+class Leaning:
+    """How one channel of one exposure leans and bows.
+
+    Attributes
+    ----------
+    coefficients
+        Of orthonormal polynomials of the mean frame, of first and second degree: (shape,), DN.
+    noise_dn2
+        Variance of each, by the temporal noise of the pixels.
+    """
+
+    coefficients: Array
+    noise_dn2: float
+
+
+def leaning(channel: Channel, frames: int) -> Leaning:
+    """Return how a channel's mean of so many frames leans and bows."""
+    mean = channel.mean_frame
+    found = Smooth.of(*mean.shape).coefficients(mean)
+    order = np.arange(len(found))[:, None] + np.arange(len(found))
+    own = found[(order > 0) & (order <= _BOWED)]
+    return Leaning(own, channel.estimates["pixel_variance"].value / frames)

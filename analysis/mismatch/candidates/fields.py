@@ -81,7 +81,7 @@ class Field(NamedTuple):
 
 def fields(clues: Clues) -> list[Field]:
     """Return the field of each length that fits the gain's spectrum best; none without a map."""
-    image = _gains(clues)
+    image = gains(clues)
     if image is None:
         return []
     seen = _spectrum(clues, image)
@@ -111,7 +111,7 @@ def _fitted(seen: _Spectrum, unit: Array) -> tuple[float, float]:
     return float(2 * (seen.count * (np.log(expected) + seen.power / expected)).sum()), variance
 
 
-def _gains(clues: Clues) -> Array | None:
+def gains(clues: Clues) -> Array | None:
     """Return what lines and surfaces leave of the gain, %, of all channels; None: no map of it.
 
     What all colours share shows best in the whole mosaic.

@@ -1,0 +1,153 @@
+"""A scene that moves between frames by far less than a pixel, as a whole or in slow waves.
+
+A picture that shifts by d changes by d times its gradient. Each row of a frame is projected on the
+gradient, over the variance of its pixels; what rows, columns, and light that changes from row to
+row put into a frame is orthogonal to that. White noise gives each row a shift by chance: its slow
+waves have the power of all others. A camera that shakes has more in the mean over rows, one that
+vibrates while rows are read one after the other in waves of some cycles.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import f as ratios
+
+from analysis.mismatch.bank.lines import any_of
+from analysis.mismatch.bank.scalars import UNKNOWN, Number, score_of_log
+from analysis.mismatch.scenes import Scene
+
+Array = NDArray[np.float64]
+STATISTIC = "scene_motion"
+AXES = ("rows", "columns")  # that the scene moves along
+_UP_TO = (0, 1, 2, 4, 8)  # cycles a frame: slow waves
+_SLOWEST = _UP_TO[-1]
+_LEAST_ROWS = 48  # of fewer no wave is the measure of others
+_RAREST = -690.0  # logarithm of a chance that is told from none
+
+
+@dataclass(frozen=True, eq=False)
+class _Design:
+    """What the frames of a scene are projected on, and what white noise makes of it.
+
+    Attributes
+    ----------
+    templates
+        By channel: (axis, row, column).
+    noise
+        Variance of the projection of each row: (axis, row).
+    slow
+        Of slow waves of them: variances of cosine and sine, and covariance: (axis, cycles, 3).
+    """
+
+    templates: Mapping[str, Array]
+    noise: Array
+    slow: Array
+
+
+class MotionSums:
+    """Projections of the frames of one scene, which are looked at on their way."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene, self.design = scene, _design(scene)
+        self.series: list[Array] = []
+
+    def watching(self, frames: Iterable[NDArray[np.generic]]) -> Iterator[NDArray[np.generic]]:
+        """Yield frames (row, column) whose contrast is the picture's, and project them."""
+        for frame in frames:
+            own = np.zeros_like(self.design.noise)
+            for name, plane in self.scene.planes.items():
+                image = frame[plane] - frame[plane].mean(0)
+                own[:, plane[0]] += np.einsum("ayx,yx->ay", self.design.templates[name], image)
+            self.series.append(own)
+            yield frame
+
+    def numbers(self) -> dict[str, Number]:
+        """Return the normal score of the strongest slow wave, of movements along each axis."""
+        rows, frames = len(self.scene.signal_dn), len(self.series)
+        if rows < _LEAST_ROWS or frames < 2:
+            return {f"{STATISTIC} along {axis}": UNKNOWN for axis in AXES}
+        apart = np.stack(self.series) - np.mean(self.series, 0)
+        return {
+            f"{STATISTIC} along {axis}": _strongest(
+                apart[:, k], self.design.noise[k], self.design.slow[k]
+            )
+            for k, axis in enumerate(AXES)
+        }
+
+
+def _strongest(apart: Array, noise: Array, slow: Array) -> Number:
+    """Return the normal score of the largest ratio of slow waves' power to that of others.
+
+    `apart` are projections (frame, row), `noise` and `slow` as a `_Design` has them.
+    """
+    if not noise.any():
+        return UNKNOWN
+    frames, rows = apart.shape
+    cos, sin = _waves(rows)
+    a, b = apart @ cos.T, apart @ sin.T  # (frame, cycles)
+    known = np.stack([(cos**2) @ noise, (sin**2) @ noise, (cos * sin) @ noise], 1)
+    known[: len(slow)] = slow
+    aa, bb, ab = known.T
+    # Noise that is uneven over rows makes both alike: chi-squared by their covariance.
+    power = (a**2 * bb - 2 * a * b * ab + b**2 * aa).sum(0) / np.maximum(aa * bb - ab**2, 1e-30)
+    power[0] = (a[:, 0] ** 2).sum() / aa[0]
+    degrees = np.where(np.arange(len(cos)) > 0, 2, 1) * (frames - 1)
+    others = int(degrees[len(slow) :].sum())
+    ground = float(power[len(slow) :].sum()) / others
+    if not ground > 0:
+        return UNKNOWN
+    # A slow wave is in several, where its cycles are no whole number: they are asked together.
+    upto = [k for k in _UP_TO if k < len(slow)]
+    power, degrees = power.cumsum()[upto], degrees.cumsum()[upto]
+    chances = np.asarray(ratios.logsf(power / degrees / ground, degrees, others))
+    least = max(float(chances.min()), _RAREST)
+    return score_of_log(any_of(least, len(upto))), 1.0
+
+
+@lru_cache(maxsize=4)
+def _design(scene: Scene) -> _Design:
+    """Return what frames of a scene are projected on; the same in every simulation of it."""
+    rows = len(scene.signal_dn)
+    cos, sin = _waves(rows)
+    count = min(_SLOWEST + 1, len(cos))
+    templates = {name: _templates(scene, name) for name in scene.planes}
+    noise, slow = np.zeros((len(AXES), rows)), np.zeros((len(AXES), count, 3))
+    for name, plane in scene.planes.items():
+        local = scene.channels[name]
+        variance = np.maximum(local.variance_dn2, 1e-9)[local.labels]
+        for k, template in enumerate(templates[name]):
+            noise[k, plane[0]] += (template**2 * variance).sum(1)
+            for cycles in range(count):
+                one, other = (template * wave[cycles, plane[0], np.newaxis] for wave in (cos, sin))
+                one, other = one - one.mean(0), other - other.mean(0)  # as columns' means are
+                pairs = ((one, one), (other, other), (one, other))
+                slow[k, cycles] += [float((p * q * variance).sum()) for p, q in pairs]
+    return _Design(templates, noise, slow)
+
+
+def _waves(rows: int) -> tuple[Array, Array]:
+    """Return cosines and sines over the rows: (cycles, row)."""
+    turn = 2 * np.pi * np.outer(np.arange((rows - 1) // 2), np.arange(rows)) / rows
+    return np.cos(turn), np.sin(turn)
+
+
+def _templates(scene: Scene, channel: str) -> Array:
+    """Return the gradient over the variance, without what else changes a frame.
+
+    The mean of each row, and in it what is in proportion to the picture: (axis, row, column).
+    """
+    picture = scene.signal_dn[scene.planes[channel]].astype(np.float64)
+    local = scene.channels[channel]
+    if min(picture.shape) < 2:
+        return np.zeros((len(AXES), *picture.shape))
+    variance = np.maximum(local.variance_dn2, 1e-9)[local.labels]
+    down, right = np.gradient(picture)
+    found = np.stack([right, down]) / variance
+    inner = picture - picture.mean(1, keepdims=True)
+    inner /= np.maximum(np.sqrt((inner**2).sum(1, keepdims=True)), 1e-30)
+    found -= found.mean(2, keepdims=True)
+    found -= (found * inner).sum(2, keepdims=True) * inner
+    return np.asarray(found)

@@ -1,0 +1,101 @@
+"""Shadows of dust are no field of gains, and no gains of columns."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from analysis.mismatch.fewpatches import of_few_patches
+from analysis.mismatch.wholelines import of_parts
+from dsis.cfa import Cfa
+from dsis.effects import registry
+
+ROWS, COLUMNS = 120, 160
+NOISE = 4.0  # DN, at 1000 DN: 0.4 %
+FIELD = registry()["smooth_prnu"](sigma_percent=0.2, length_pixels=6.0)
+Array = NDArray[np.float64]
+
+
+def _state(gain: Array, cfa: Cfa, seed: int) -> Any:
+    """Return a state with a map of the gain, DN at 1000."""
+    image = 1000 * gain + np.random.default_rng(seed).normal(0, NOISE, gain.shape)
+    sites = {"MONO": (0, 0)} if cfa is Cfa.MONO else {
+        "R": (0, 0), "Gr": (0, 1), "Gb": (1, 0), "B": (1, 1)
+    }  # fmt: skip
+    step = 1 + (len(sites) > 1)
+    images = {(c, "gain"): (image[y::step, x::step], NOISE) for c, (y, x) in sites.items()}
+    clues = SimpleNamespace(
+        layout=SimpleNamespace(sites=sites, rows=ROWS, columns=COLUMNS),
+        image=lambda name: {c: one for (c, kind), one in images.items() if kind == name},
+        scale=lambda *_: 1000.0,
+    )
+    return SimpleNamespace(
+        clues=lambda: clues, setting=SimpleNamespace(seen=SimpleNamespace(images=images))
+    )
+
+
+def _dust(seed: int) -> Array:
+    rng, found = np.random.default_rng(seed), np.zeros((ROWS, COLUMNS))
+    y, x = np.arange(ROWS)[:, None], np.arange(COLUMNS)
+    for _ in range(7):
+        apart = np.hypot(y - rng.integers(ROWS), x - rng.integers(COLUMNS))
+        found -= 0.012 / (1 + np.exp((apart - rng.uniform(4, 8)) / 1.5))
+    return found
+
+
+def _smooth(seed: int, length: float) -> Array:
+    """Return a normal field; blurred noise, no field of the effect's own law."""
+    white = np.random.default_rng(seed).normal(size=(ROWS, COLUMNS))
+    field = ndimage.gaussian_filter(white, length, mode="wrap")
+    return np.asarray(0.004 * field / field.std())
+
+
+@pytest.mark.parametrize("cfa", [Cfa.MONO, Cfa.RGGB])
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_dust_is_no_field(cfa: Cfa, seed: int) -> None:
+    said = of_few_patches(_state(_dust(seed), cfa, seed), FIELD)
+    assert said is not None
+    assert said.share < 0.5
+    assert "few patches" in said.why
+
+
+@pytest.mark.parametrize("cfa", [Cfa.MONO, Cfa.RGGB])
+@pytest.mark.parametrize("length", [1.0, 3.0, 8.0])
+def test_a_normal_field_is_believed_whatever_its_spectrum(cfa: Cfa, length: float) -> None:
+    for seed in range(4):
+        assert of_few_patches(_state(_smooth(seed, length), cfa, seed), FIELD) is None
+
+
+def test_other_effects_are_not_asked() -> None:
+    state = _state(_dust(1), Cfa.MONO, 1)
+    assert of_few_patches(state, registry()["prnu"](sigma_percent=0.4)) is None
+
+
+@pytest.mark.parametrize("cfa", [Cfa.MONO, Cfa.RGGB])
+@pytest.mark.parametrize("kind", ["column_prnu", "row_prnu"])
+def test_columns_whose_parts_differ_do_not_differ(kind: str, cfa: Cfa) -> None:
+    for seed in (1, 2, 3):
+        said = of_parts(_state(3 * _dust(seed), cfa, seed), kind)
+        assert said is not None
+        assert said.share < 0.5
+
+
+@pytest.mark.parametrize("cfa", [Cfa.MONO, Cfa.RGGB])
+@pytest.mark.parametrize("spread", [5e-4, 2e-3])
+def test_whole_columns_that_differ_are_believed(cfa: Cfa, spread: float) -> None:
+    for seed in range(10):
+        lines = np.random.default_rng(seed).normal(0, spread, COLUMNS)
+        gain = np.tile(lines, (ROWS, 1)) + 0.3 * _dust(seed)
+        assert of_parts(_state(gain, cfa, seed), "column_prnu") is None
+
+
+@pytest.mark.parametrize("cfa", [Cfa.MONO, Cfa.RGGB])
+def test_columns_that_differ_as_their_neighbours_do_are_none_by_themselves(cfa: Cfa) -> None:
+    for seed in (1, 2, 3):
+        lines = ndimage.gaussian_filter1d(np.random.default_rng(seed).normal(size=COLUMNS), 3.0)
+        said = of_parts(_state(np.tile(0.005 * lines, (ROWS, 1)), cfa, seed), "column_prnu")
+        assert said is not None
+        assert "neighbours" in said.why

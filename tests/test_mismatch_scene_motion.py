@@ -1,0 +1,92 @@
+"""A scene that shakes by hundredths of a pixel, beside noise that only seems to move it."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from analysis.mismatch.bank.motion import MotionSums
+from analysis.mismatch.scenes import scene_of
+
+ROWS, COLUMNS, FRAMES = 96, 130, 8
+Y, X = np.mgrid[:ROWS, :COLUMNS].astype(np.float64)
+COLOURS = {"R": (0, 0), "Gr": (0, 1), "Gb": (1, 0), "B": (1, 1)}
+Array = NDArray[np.float64]
+
+
+def _picture(down: Any = 0.0, right: Any = 0.0) -> Array:
+    y, x = Y + down, X + right
+    edge = 500 * np.tanh((x - 60 + 0.3 * y) / 2)
+    return np.asarray(2400 + 700 * np.sin(x / 5 + y / 9) + edge + 300 * np.cos(y / 4))
+
+
+def _found(cfa: str, seed: int, change: Any, frames: int = FRAMES) -> tuple[float, float]:
+    """Return what a scene's frames show along rows and columns; `change(rng)` gives each, DN."""
+    rng = np.random.default_rng(seed)
+    cells = {"MONO": (slice(None), slice(None))}
+    if cfa != "MONO":
+        cells = {c: (slice(y, None, 2), slice(x, None, 2)) for c, (y, x) in COLOURS.items()}
+    made = []
+    for _ in range(frames):
+        clean = change(rng)
+        noisy = clean + rng.normal(0, 1, clean.shape) * np.sqrt(10 + 0.5 * clean)
+        made.append(np.floor(noisy + 64.5).astype(np.uint16))
+    scene = scene_of(made, cells, dict.fromkeys(cells, 64.0))
+    assert scene is not None  # it does not move by so much that pixels show it
+    sums = MotionSums(scene)
+    assert len(list(sums.watching(map(scene.steadied, made)))) == frames
+    (rows, _), (columns, _) = sums.numbers().values()
+    return rows, columns
+
+
+@pytest.mark.parametrize("cfa", ["MONO", "RGGB"])
+@pytest.mark.parametrize("frames", [2, 5, 10])
+def test_a_static_scene_scores_no_higher_than_a_normal_variate(cfa: str, frames: int) -> None:
+    """Lower in the mean: sums of waves are counted as if chance made each by itself."""
+    still = np.array([_found(cfa, seed, lambda _: _picture(), frames) for seed in range(40)])
+    assert -1.0 < still.mean() < 0.2
+    assert 0.8 < still.std() < 1.4  # its lower tail is longer
+    assert still.max() < 4
+
+
+@pytest.mark.parametrize("cfa", ["MONO", "RGGB"])
+def test_a_scene_that_shakes_is_seen(cfa: str) -> None:
+    """Along which axis it shakes is seen where gradients point to all sides."""
+    for seed in (1, 2, 3):
+        assert max(_found(cfa, seed, lambda rng: _picture(right=rng.normal(0, 0.02)))) > 6
+        assert max(_found(cfa, seed, lambda rng: _picture(down=rng.normal(0, 0.04)))) > 6
+
+
+@pytest.mark.parametrize("cfa", ["MONO", "RGGB"])
+def test_a_scene_that_vibrates_is_seen(cfa: str) -> None:
+    def vibrating(rng: np.random.Generator) -> Array:
+        turn = 2 * np.pi * 1.6 * Y / ROWS + rng.uniform(0, 2 * np.pi)
+        return _picture(right=0.05 * np.sin(turn))
+
+    assert max(_found(cfa, 2, vibrating)) > 6
+
+
+@pytest.mark.parametrize("cfa", ["MONO", "RGGB"])
+def test_lines_and_light_that_change_are_no_motion(cfa: str) -> None:
+    def light(rng: np.random.Generator) -> Array:
+        waves = 0.01 * np.sin(2 * np.pi * 3.3 * Y / ROWS + rng.uniform(0, 2 * np.pi))
+        return np.asarray(_picture() * (1 + 0.01 * rng.normal() + waves))
+
+    changes = (
+        lambda rng: _picture() + rng.normal(0, 8.0, (ROWS, 1)),
+        lambda rng: _picture() + rng.normal(0, 8.0, (1, COLUMNS)),
+        light,
+    )
+    for change in changes:
+        found = np.array([_found(cfa, seed, change) for seed in range(8)])
+        assert -1.5 < found.mean() < 1
+        assert found.max() < 4
+
+
+def test_few_rows_say_nothing() -> None:
+    scene = scene_of([np.full((20, 30), 500 + k, np.uint16) for k in range(3)],
+                     {"MONO": (slice(None), slice(None))}, {"MONO": 64.0})  # fmt: skip
+    assert scene is not None
+    sums = MotionSums(scene)
+    assert not any(np.isfinite(value) for value, _ in sums.numbers().values())

@@ -15,6 +15,7 @@ Array = NDArray[np.float64]
 _MOST_PIXELS = 512  # a side: of a larger sensor its middle
 _DRAWS, _CLEAR = 64, 4.0  # fields of chance; standard deviations among them
 _MOST = 0.5  # of the field's variance, that few patches may make
+_NORMAL = 0.75  # of it, from which no drawn field need be asked: theirs is near 1
 
 
 def of_few_patches(state: State, effect: Effect) -> Denial | None:
@@ -30,6 +31,8 @@ def of_few_patches(state: State, effect: Effect) -> Denial | None:
     image = _middle(image)
     field = effect.sigma_percent**2 * _spectrum(image.shape, effect.length_pixels)
     share = _of_quartiles(image, field)
+    if share > _NORMAL:
+        return None
     rng, chance = np.random.default_rng(0), []
     root = np.sqrt(field + _white(image))
     for _ in range(_DRAWS):

@@ -194,7 +194,7 @@ def test_what_is_weak_is_told_wrongly_no_more_often_than_is_said(cause: Rows, si
 def _ranked(kind: str, gain: float, *mean: float) -> Ranked:
     effect = Stub(kind=kind)
     proposal: Any = Stub(effect=effect)
-    polished: Any = Stub(mean=np.array(mean))
+    polished: Any = Stub(mean=np.array(mean), effects=(effect,))
     return Ranked(gain, kind, proposal, polished)
 
 

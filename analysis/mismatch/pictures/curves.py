@@ -134,7 +134,9 @@ def _place(state: State, name: str, key: Key) -> float:
         return np.nan if light is None else light
     signals = {**state.setting.layout.signal_dn, **state.fit.signal_dn}
     place = key.place
-    return signals[place if place in signals else (key.exposure, "Gr")]
+    channels = state.setting.layout.channels
+    usual = "Gr" if "Gr" in channels else channels[0]
+    return signals[place if place in signals else (key.exposure, usual)]
 
 
 def _exposure(state: State, key: Key) -> Taken:

@@ -6,7 +6,6 @@ Recordings are numpy's noise; nothing of them is made by the effects.
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
 from analysis.mismatch import find_mismatch
 from mismatch_recordings import InMemory, camera, recorded
@@ -34,11 +33,10 @@ def speckled(contrast: float) -> InMemory:
     return replace(like, stacks=stacks)
 
 
-@pytest.mark.parametrize("contrast", [0.004, 0.008])
-def test_grains_are_no_second_path(contrast: float) -> None:
-    """At 2600 DN they add 8 or 33 % to the variance."""
+def test_grains_are_no_second_path() -> None:
+    """At 2600 DN they add a third to the variance."""
     words = frozenset({"dual_gain", "dual_gain_mismatch", "nonlinearity"})
-    found = find_mismatch(BASE, speckled(contrast), seed=1, vocabulary=words)
+    found = find_mismatch(BASE, speckled(0.008), seed=1, vocabulary=words)
     assert found.omitted_physics == ()
     left = {one.statistic for one in found.unexplained}
     assert {"correlation_0_1", "pixel_variance"} <= left

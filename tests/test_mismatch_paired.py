@@ -13,7 +13,7 @@ from mismatch_recordings import InMemory, camera, recorded
 
 BLACK, SLOPE, INTERCEPT = 64.0, 0.5, 20.0  # DN, DN, DN^2
 BASE = camera(segments=((SLOPE, INTERCEPT, None),), black=BLACK)
-WORDS = frozenset({"image_lag", "rts"})
+WORDS = frozenset({"image_lag"})
 SHARED = 0.12
 
 

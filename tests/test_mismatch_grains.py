@@ -33,9 +33,9 @@ def speckled(contrast: float) -> InMemory:
     return replace(like, stacks=stacks)
 
 
-def test_grains_are_no_second_path() -> None:
+def test_grains_are_no_second_path_and_no_crosstalk() -> None:
     """At 2600 DN they add a third to the variance."""
-    words = frozenset({"dual_gain", "dual_gain_mismatch", "nonlinearity"})
+    words = frozenset({"crosstalk", "dual_gain", "dual_gain_mismatch", "nonlinearity"})
     found = find_mismatch(BASE, speckled(0.008), seed=1, vocabulary=words)
     assert found.omitted_physics == ()
     left = {one.statistic for one in found.unexplained}

@@ -13,12 +13,13 @@ from analysis.mismatch.layout import Place
 from analysis.mismatch.rank import TOLD_APART
 from analysis.mismatch.recalibrate import code_step
 from analysis.mismatch.state import State
-from analysis.mismatch.straight import bent, misfits
+from analysis.mismatch.straight import bent, misfits, upwards
 
 Array = NDArray[np.float64]
 Left = dict[tuple[str, str], list[tuple[Place, float, float]]]
 _BESIDE = frozenset({"correlation_0_1", "correlation_1_0"})
 _PAIRS = _BESIDE | {"correlation_0_2", "correlation_2_0"}
+_GRAINS = "noise that is added as the square of the signal"
 _ROUNDING = 1 / 12  # of a step between codes, squared: noise that comes after any filter
 
 
@@ -41,8 +42,8 @@ def shared_otherwise(state: State, kind: str, without: Array) -> Denial | None:
 
     Where another law is likelier at odds of 20, whatever follows it, word or none, is there
     instead. What charge takes from variances counts, for or against it, where these are left
-    unexplained and the model's lie on a line. `without` are the numbers predicted without the
-    effect.
+    unexplained and the model's lie on a line; noise in grains is asked of where they bend upwards.
+    `without` are the numbers predicted without the effect.
     """
     own = _LAWS.get(kind)
     if own is None:
@@ -51,14 +52,20 @@ def shared_otherwise(state: State, kind: str, without: Array) -> Denial | None:
     if not left:
         return None
     found = _gains(state.clues(), left)
-    if any(m.statistic == "pixel_variance" for m in state.mismatches) and not bent(state):
-        before, after = misfits(state, _factor(state.clues(), left))
-        found[Law.CHARGE] += (before - after) / 2
-    best = max(found, key=lambda law: found[law])
-    behind = found[best] - found[own]
+    said: dict[str, float] = {}
+    if any(m.statistic == "pixel_variance" for m in state.mismatches):
+        if not bent(state):
+            before, after = misfits(state, _factor(state.clues(), left))
+            found[Law.CHARGE] += (before - after) / 2
+        if upwards(state):
+            grains = _grains(state.clues())
+            said[_GRAINS] = sum(_fitted(one, grains)[1] for one in left.values())
+    said |= {law.value: gain for law, gain in found.items()}
+    best = max(said, key=lambda law: said[law])
+    behind = said[best] - found[own]
     if behind <= TOLD_APART:
         return None
-    return rival(behind, f"neighbours share {best.value}, by how alike they are at each level")
+    return rival(behind, f"neighbours share {best}, by how alike they are at each level")
 
 
 def of_charge(state: State) -> Callable[[Place, float], float] | None:
@@ -113,6 +120,12 @@ def _shapes(clues: Clues) -> dict[Law, Callable[[Place], float]]:
         Law.LIGHT: clues.shot_share,
         Law.CHARGE: lambda place: clues.signal(place) * clues.shot_share(place),
     }
+
+
+def _grains(clues: Clues) -> Callable[[Place], float]:
+    """Return how large correlations are where part of the variance is the signal's square."""
+    levels = clues.seen.levels
+    return lambda at: clues.signal(at) ** 2 / max(levels[at].variance_dn2, 1e-9)
 
 
 def _fitted(

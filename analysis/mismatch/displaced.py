@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.stats import chi2, norm
 
+from analysis.mismatch.alikesamples import of_alike_samples
 from analysis.mismatch.brighter import no_brighter_alike
 from analysis.mismatch.candidates.response import skewness_below
 from analysis.mismatch.contradicted import Denial
@@ -19,7 +20,6 @@ from analysis.mismatch.gathered import gathered
 from analysis.mismatch.latelight import of_late_light
 from analysis.mismatch.layout import Place
 from analysis.mismatch.leftout import left_out
-from analysis.mismatch.linemeans import of_alike_samples
 from analysis.mismatch.recalibrate import code_step
 from analysis.mismatch.resolved import FAR_OFF
 from analysis.mismatch.sharing import of_charge, shared_otherwise

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Generator, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from math import nan
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,21 +15,16 @@ from analysis.mismatch.bank.coherent import Peak, SpectrumSums
 from analysis.mismatch.bank.common import common
 from analysis.mismatch.bank.linemeans import AXES, Axis, LineMeans
 from analysis.mismatch.bank.local import local_scalars, variances, widened
-from analysis.mismatch.bank.maps import ALONE
 from analysis.mismatch.bank.motion import MotionSums
-from analysis.mismatch.bank.parts import Parts, parts
 from analysis.mismatch.bank.sawtooth import Samples
 from analysis.mismatch.bank.scalars import NAMES, UNKNOWN, Number, scalars
-from analysis.mismatch.bank.standing import NAME as FIXED_WAVE
-from analysis.mismatch.bank.standing import standing
 from analysis.mismatch.bank.surfaces import Leaning, leaning
-from analysis.mismatch.bank.together import together
-from analysis.mismatch.bank.waves import WaveSums
 from analysis.mismatch.layout import Layout, Place, Taken
+from analysis.mismatch.overall import maps_of
 from analysis.mismatch.scenes import Local
 from analysis.mismatch.summed import ChannelSums, Looked, SensorSums, measure
 from analysis.mismatch.touches import RECORDED, SPECTRA, SPIKES
-from dsis.measures import Channel, Lattice, Measured, Middle
+from dsis.measures import Channel, Codes, Lattice, Measured, Middle
 from dsis.recording.ahead import in_order
 
 Array = NDArray[np.float64]
@@ -36,6 +32,7 @@ Array = NDArray[np.float64]
 Frames = Callable[[str], Iterable[NDArray[np.generic]]]
 Observing = Generator[None, None, "Observation"]
 Watcher = Callable[[str, Measured], None]
+_Told = TypeVar("_Told")
 
 
 @dataclass(frozen=True)
@@ -213,10 +210,11 @@ def observing(
         measured, frames = one.measured, one.frames
         still = {name for name in layout.channels if (one.exposure, name) in layout.still}
         whole.add(one, still=bool(still))
+        lattices |= _of_codes(one.exposure, measured, lambda codes: codes.lattice)
+        if kept.images:
+            middles |= _of_codes(one.exposure, measured, lambda codes: codes.middle)
         if kept.images and not still:
             lines |= {(one.exposure, axis): whole.lines(one, axis) for axis in AXES}
-        lattices |= _lattices(one.exposure, measured)
-        middles |= _middles(one.exposure, measured) if kept.images else {}
         if watch is not None:
             watch(one.exposure, measured)
         for name, channel in measured.channels.items():
@@ -237,7 +235,7 @@ def observing(
                 surfaces[place] = leaning(channel, frames)
         yield
     local = _scenes(layout, frames_of, watch, found, whole.common, kept.made)
-    maps, images, fixed = _maps(layout, sums, whole.waves)
+    maps, images, fixed = maps_of(layout, sums, whole.waves)
     pooled, peaks = _pooled(sums, whole, places=kept.places)
     return Observation(
         levels,
@@ -256,18 +254,13 @@ def observing(
     )
 
 
-def _middles(exposure: str, measured: Measured) -> dict[Place, Middle]:
-    """Return the middle of each channel's histogram, where it holds enough samples."""
+def _of_codes(
+    exposure: str, measured: Measured, tell: Callable[[Codes], _Told | None]
+) -> dict[Place, _Told]:
+    """Return what the codes of each channel tell, where they do."""
     codes = {name: channel.codes for name, channel in measured.channels.items()}
-    own = {(exposure, name): one.middle for name, one in codes.items() if one is not None}
-    return {place: middle for place, middle in own.items() if middle is not None}
-
-
-def _lattices(exposure: str, measured: Measured) -> dict[Place, Lattice]:
-    """Return where the codes of each channel lie, if there are any."""
-    codes = {name: channel.codes for name, channel in measured.channels.items()}
-    own = {(exposure, name): one.lattice for name, one in codes.items() if one is not None}
-    return {place: lattice for place, lattice in own.items() if lattice is not None}
+    own = {(exposure, name): tell(one) for name, one in codes.items() if one is not None}
+    return {place: told for place, told in own.items() if told is not None}
 
 
 def _pooled(
@@ -335,48 +328,6 @@ def _by_signal(channel: Channel, frames: int, own: Local) -> dict[str, Level]:
         error = (max(mean, 0.0) / frames / pixels) ** 0.5
         found[label] = Level(at, error, mean, share * pixels / uneven, 0.0, 0.0, pixels)
     return found
-
-
-def _maps(
-    layout: Layout, sums: Mapping[str, ChannelSums], waves: WaveSums
-) -> tuple[
-    dict[tuple[str, str], Mapping[str, Number]],
-    dict[tuple[str, str], tuple[Array, float]],
-    dict[tuple[str, str], Peak],
-]:
-    """Return the statistics of all maps, the maps with their noise, and waves that stand in them.
-
-    `waves` are those of the whole sensor that move.
-    """
-    numbers: dict[tuple[str, str], Mapping[str, Number]] = {}
-    images: dict[tuple[str, str], tuple[Array, float]] = {}
-    split: dict[str, dict[str, Parts]] = {}
-    sharp: dict[str, dict[str, float]] = {}
-    for name, own in sums.items():
-        for kind, (image, noise) in own.patterns.maps().items():
-            images[name, kind] = (image, noise)
-            part = parts(image, noise)
-            numbers[name, kind] = part.numbers
-            split.setdefault(kind, {})[name] = part
-            # What is common: a relative gain, or DN (alike, or per second).
-            scale = own.patterns.regressors.scales["gain"] if "gain" in kind else 1.0
-            sharp.setdefault(kind, {})[name] = scale / noise
-        images[name, "variance"] = (own.variances.total, own.variances.squares**0.5)
-    for kind, by_channel in split.items():
-        if len(by_channel) == len(layout.sites) > 1:
-            numbers["", kind] = together(by_channel, sharp[kind], layout.sites)
-    fixed: dict[tuple[str, str], Peak] = {}
-    for one in ALONE:
-        kind = one if f"{one} alone" not in split else f"{one} alone"
-        planes = {name: part.pixels for name, part in split.get(kind, {}).items()}
-        if len(planes) != len(layout.sites):
-            continue
-        where = "" if len(planes) > 1 else layout.channels[0]
-        number, peak = standing(planes, sharp[kind], layout.sites, waves)
-        numbers[where, kind] = {**numbers[where, kind], FIXED_WAVE: number}
-        if peak is not None:
-            fixed[where, f"{FIXED_WAVE}, {kind}"] = peak
-    return numbers, images, fixed
 
 
 def _with_bulk(level: Level, channel: str, many: Bulk | None) -> Level:

@@ -192,8 +192,8 @@ class Codes:
         if self.lattice is None or self.lattice.step < 1:
             return None
         step = self.lattice.step
-        counts = self.counts[(self.lattice.code - self.lowest) % step :: step]
-        start = self.lowest + (self.lattice.code - self.lowest) % step
+        skipped = (self.lattice.code - self.lowest) % step
+        counts, start = self.counts[skipped::step], self.lowest + skipped
         first, last = np.searchsorted(np.cumsum(counts), np.array(_MIDDLE) * counts.sum())
         inside = counts[first : last + 1]
         if inside.size < _LEAST_CODES or inside.mean() < _EXPECTED:

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from analysis.mismatch.alikesamples import of_alike_samples
 from analysis.mismatch.displaced import displaced
-from analysis.mismatch.linemeans import of_alike_samples
 from analysis.mismatch.state import State
 from mismatch_recordings import FEW_LEVELS, camera, recorded, state_of
 

@@ -23,6 +23,11 @@ def _picture(down: Any = 0.0, right: Any = 0.0) -> Array:
 
 def _found(cfa: str, seed: int, change: Any, frames: int = FRAMES) -> tuple[float, float]:
     """Return what a scene's frames show along rows and columns; `change(rng)` gives each, DN."""
+    (rows, _), (columns, _) = _sums(cfa, seed, change, frames).numbers().values()
+    return rows, columns
+
+
+def _sums(cfa: str, seed: int, change: Any, frames: int) -> MotionSums:
     rng = np.random.default_rng(seed)
     cells = {"MONO": (slice(None), slice(None))}
     if cfa != "MONO":
@@ -36,8 +41,7 @@ def _found(cfa: str, seed: int, change: Any, frames: int = FRAMES) -> tuple[floa
     assert scene is not None  # it does not move by so much that pixels show it
     sums = MotionSums(scene)
     assert len(list(sums.watching(map(scene.steadied, made)))) == frames
-    (rows, _), (columns, _) = sums.numbers().values()
-    return rows, columns
+    return sums
 
 
 @pytest.mark.parametrize("cfa", ["MONO", "RGGB"])
@@ -56,6 +60,25 @@ def test_a_scene_that_shakes_is_seen(cfa: str) -> None:
     for seed in (1, 2, 3):
         assert max(_found(cfa, seed, lambda rng: _picture(right=rng.normal(0, 0.02)))) > 6
         assert max(_found(cfa, seed, lambda rng: _picture(down=rng.normal(0, 0.04)))) > 6
+
+
+@pytest.mark.parametrize("cfa", ["MONO", "RGGB"])
+def test_shifts_are_those_of_the_frames(cfa: str) -> None:
+    """They scatter about the true ones by their errors."""
+    off = []
+    for seed in range(8):
+        moved = np.random.default_rng(seed).normal(0, 0.04, (FRAMES, 2))
+        each = iter(moved)
+
+        def moving(_: np.random.Generator, each: Any = each) -> Array:
+            right, down = next(each)
+            return _picture(right=-right, down=-down)
+
+        found = _sums(cfa, seed, moving, FRAMES).shifts()
+        for axis, true in zip(("rows", "columns"), (moved - moved.mean(0)).T, strict=True):
+            assert found.errors[axis] < 0.05
+            off.append((found.along[axis] - true) / found.errors[axis])
+    assert 0.85 < float(np.std(off)) < 1.15  # of 128
 
 
 @pytest.mark.parametrize("cfa", ["MONO", "RGGB"])
@@ -89,4 +112,6 @@ def test_few_rows_say_nothing() -> None:
                      {"MONO": (slice(None), slice(None))}, {"MONO": 64.0})  # fmt: skip
     assert scene is not None
     sums = MotionSums(scene)
+    list(sums.watching(np.full((20, 30), 500.0 + k) for k in range(3)))
     assert not any(np.isfinite(value) for value, _ in sums.numbers().values())
+    assert sums.shifts().errors == {"rows": np.inf, "columns": np.inf}  # nothing has a gradient

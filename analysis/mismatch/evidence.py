@@ -142,6 +142,24 @@ class Series:
 
 
 @dataclass(frozen=True, eq=False)
+class Shift:
+    """How far the frames of a scene lie from their mean, as a whole.
+
+    Attributes
+    ----------
+    right_px, down_px
+        By number of the frame; nan: not looked at.
+    right_error_px, down_error_px
+        Standard errors by the noise of the pixels.
+    """
+
+    right_px: Array
+    down_px: Array
+    right_error_px: float
+    down_error_px: float
+
+
+@dataclass(frozen=True, eq=False)
 class Histogram:
     """How often each code occurs, from `lowest` on; `before`, `after`: as each model has it.
 
@@ -168,7 +186,7 @@ class Evidence:
         `gain_alone_map`: as if there were no other.
     shown_in
         Which of them shows a statistic best; absent: none, single exposures do.
-    spectra, row_spectra, column_spectra, series, codes
+    spectra, row_spectra, column_spectra, series, shifts, codes
         By exposure, or `pooled` over all; row spectra: of row means along columns.
     signal_dn
         Mean signal by exposure, DN above black.
@@ -189,6 +207,7 @@ class Evidence:
     row_spectra: Mapping[str, tuple[LineSpectrum, ...]] = field(default_factory=dict)
     column_spectra: Mapping[str, tuple[LineSpectrum, ...]] = field(default_factory=dict)
     series: Mapping[str, tuple[Series, ...]] = field(default_factory=dict)
+    shifts: Mapping[str, Shift] = field(default_factory=dict)
     codes: Mapping[str, tuple[Histogram, ...]] = field(default_factory=dict)
     signal_dn: Mapping[str, float] = field(default_factory=dict)
     tests: int | None = None

@@ -15,7 +15,7 @@ from analysis.mismatch.bank.coherent import Peak, SpectrumSums
 from analysis.mismatch.bank.common import common
 from analysis.mismatch.bank.linemeans import AXES, Axis, LineMeans
 from analysis.mismatch.bank.local import local_scalars, variances, widened
-from analysis.mismatch.bank.motion import MotionSums
+from analysis.mismatch.bank.motion import MotionSums, Shifts
 from analysis.mismatch.bank.sawtooth import Samples
 from analysis.mismatch.bank.scalars import NAMES, UNKNOWN, Number, scalars
 from analysis.mismatch.bank.surfaces import Leaning, leaning
@@ -99,6 +99,8 @@ class Observation:
         Kept on demand: rows and columns of uniform exposures.
     surfaces
         Kept on demand: how uniform exposures lean and bow, by exposure and channel.
+    shifts
+        Kept on demand: how far the frames of each scene lie from their mean.
     lattices
         Where the codes lie that occur, by exposure and channel, clipped ends left out.
     middles
@@ -116,6 +118,7 @@ class Observation:
     carried: Mapping[str, tuple[Samples, ...]] = field(default_factory=dict)
     lines: Mapping[tuple[str, Axis], LineMeans] = field(default_factory=dict)
     surfaces: Mapping[Place, Leaning] = field(default_factory=dict)
+    shifts: Mapping[str, Shifts] = field(default_factory=dict)
     lattices: Mapping[Place, Lattice] = field(default_factory=dict)
     middles: Mapping[Place, Middle] = field(default_factory=dict)
 
@@ -234,7 +237,7 @@ def observing(
             if kept.images:
                 surfaces[place] = leaning(channel, frames)
         yield
-    local = _scenes(layout, frames_of, watch, found, whole.common, kept.made)
+    local, shifts = _scenes(layout, frames_of, watch, found, whole.common, kept.made)
     maps, images, fixed = maps_of(layout, sums, whole.waves)
     pooled, peaks = _pooled(sums, whole, places=kept.places)
     return Observation(
@@ -249,6 +252,7 @@ def observing(
         whole.memory.samples,
         lines,
         surfaces,
+        shifts if kept.images else {},
         lattices,
         middles,
     )
@@ -289,9 +293,10 @@ def _scenes(
     found: dict[Place, Mapping[str, Number]],
     shared: dict[str, Mapping[str, Number]],
     made: frozenset[str],
-) -> dict[Place, Level]:
-    """Add what scenes show to what was found; return their variances by signal."""
+) -> tuple[dict[Place, Level], dict[str, Shifts]]:
+    """Add what scenes show to what was found; return their variances by signal, and movements."""
     local: dict[Place, Level] = {}
+    shifts: dict[str, Shifts] = {}
     for exposure in layout.pictures:
         scene = layout.scenes[exposure.name]
         motion = MotionSums(scene)
@@ -305,13 +310,14 @@ def _scenes(
             alike = common(measured.channels, signals, frames, layout.sites)
             shared[exposure.name] = widened(alike, measured.channels, parts)
         shared[exposure.name] = {**shared.get(exposure.name, {}), **motion.numbers()}
+        shifts[exposure.name] = motion.shifts()
         for name, channel in measured.channels.items():
             own = parts[name]
             found[exposure.name, name] = local_scalars(channel, frames, own)
             local[exposure.name, name] = _level(channel, frames)
             for label, level in _by_signal(channel, frames, own).items():
                 local[exposure.name, f"{name} {label}"] = level
-    return local
+    return local, shifts
 
 
 def _by_signal(channel: Channel, frames: int, own: Local) -> dict[str, Level]:

@@ -40,11 +40,32 @@ class _Design:
         Variance of the projection of each row: (axis, row).
     slow
         Of slow waves of them: variances of cosine and sine, and covariance: (axis, cycles, 3).
+    per_pixel, spread
+        Of the sums over all rows: what a shift by a pixel along the second axis makes of each, and
+        covariances: (axis, axis).
     """
 
     templates: Mapping[str, Array]
     noise: Array
     slow: Array
+    per_pixel: Array
+    spread: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Shifts:
+    """How far the frames of a scene lie from their mean.
+
+    Attributes
+    ----------
+    along
+        By axis, see `AXES`: (frame,), pixels to the right, or down.
+    errors
+        Standard error of each, by axis: pixels; infinite where the picture has no gradient.
+    """
+
+    along: Mapping[str, Array]
+    errors: Mapping[str, float]
 
 
 class MotionSums:
@@ -76,6 +97,18 @@ class MotionSums:
             )
             for k, axis in enumerate(AXES)
         }
+
+    def shifts(self) -> Shifts:
+        """Return how far each frame lies from the mean of all, as a whole."""
+        sums = np.stack(self.series).sum(2)
+        inverse = np.linalg.pinv(self.design.per_pixel)
+        along = (sums - sums.mean(0)) @ inverse.T
+        known = np.linalg.matrix_rank(self.design.per_pixel) == len(AXES)
+        errors = np.sqrt(np.diag(inverse @ self.design.spread @ inverse.T) * (1 - 1 / len(sums)))
+        return Shifts(
+            {axis: along[:, k] for k, axis in enumerate(AXES)},
+            {axis: float(errors[k]) if known else np.inf for k, axis in enumerate(AXES)},
+        )
 
 
 def _strongest(apart: Array, noise: Array, slow: Array) -> Number:
@@ -115,6 +148,7 @@ def _design(scene: Scene) -> _Design:
     count = min(_SLOWEST + 1, len(cos))
     templates = {name: _templates(scene, name) for name in scene.planes}
     noise, slow = np.zeros((len(AXES), rows)), np.zeros((len(AXES), count, 3))
+    per_pixel, spread = np.zeros((2, len(AXES), len(AXES)))
     for name, plane in scene.planes.items():
         local = scene.channels[name]
         variance = np.maximum(local.variance_dn2, 1e-9)[local.labels]
@@ -125,7 +159,11 @@ def _design(scene: Scene) -> _Design:
                 one, other = one - one.mean(0), other - other.mean(0)  # as columns' means are
                 pairs = ((one, one), (other, other), (one, other))
                 slow[k, cycles] += [float((p * q * variance).sum()) for p, q in pairs]
-    return _Design(templates, noise, slow)
+        gradients = _gradients(scene, name)
+        whole = templates[name] - templates[name].mean(1, keepdims=True)
+        per_pixel -= np.einsum("ayx,byx->ab", whole, gradients)  # what moves on, moves off
+        spread += np.einsum("ayx,byx,yx->ab", whole, whole, variance)
+    return _Design(templates, noise, slow, per_pixel, spread)
 
 
 def _waves(rows: int) -> tuple[Array, Array]:
@@ -139,15 +177,25 @@ def _templates(scene: Scene, channel: str) -> Array:
 
     The mean of each row, and in it what is in proportion to the picture: (axis, row, column).
     """
-    picture = scene.signal_dn[scene.planes[channel]].astype(np.float64)
-    local = scene.channels[channel]
-    if min(picture.shape) < 2:
-        return np.zeros((len(AXES), *picture.shape))
+    picture, local = scene.signal_dn[scene.planes[channel]], scene.channels[channel]
     variance = np.maximum(local.variance_dn2, 1e-9)[local.labels]
-    down, right = np.gradient(picture)
-    found = np.stack([right, down]) / variance
-    inner = picture - picture.mean(1, keepdims=True)
+    found = _gradients(scene, channel) / variance
+    inner = picture.astype(np.float64) - picture.mean(1, keepdims=True, dtype=np.float64)
     inner /= np.maximum(np.sqrt((inner**2).sum(1, keepdims=True)), 1e-30)
     found -= found.mean(2, keepdims=True)
     found -= (found * inner).sum(2, keepdims=True) * inner
     return np.asarray(found)
+
+
+def _gradients(scene: Scene, channel: str) -> Array:
+    """Return by how much the picture grows to the right and down, DN a pixel: (axis, row, column).
+
+    None of a channel of a single row or column.
+    """
+    plane = scene.planes[channel]
+    picture = scene.signal_dn[plane].astype(np.float64)
+    if min(picture.shape) < 2:
+        return np.zeros((len(AXES), *picture.shape))
+    pitch = max(plane[0].step or 1, 1)
+    down, right = np.gradient(picture, pitch)
+    return np.stack([right, down])

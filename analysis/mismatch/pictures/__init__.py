@@ -15,7 +15,7 @@ from analysis.mismatch.observe import Observation, observe
 from analysis.mismatch.pictures.album import Album
 from analysis.mismatch.pictures.carried import carried
 from analysis.mismatch.pictures.curves import curves
-from analysis.mismatch.pictures.frames import codes, line_spectra, series, spectra
+from analysis.mismatch.pictures.frames import codes, line_spectra, series, shifts, spectra
 from analysis.mismatch.pictures.maps import NOISY, map_name, maps, shown_in
 from analysis.mismatch.split import Split
 from analysis.mismatch.state import State
@@ -62,6 +62,7 @@ def evidence_of(
         row_spectra=line_spectra(album, first, later, "rows"),
         column_spectra=line_spectra(album, first, later, "columns"),
         series=series(layout, split, album, first, later),
+        shifts=shifts(layout, seen),
         codes=codes(album, first, later),
         signal_dn={
             e.name: float(np.mean([base.fit.signal_dn[e.name, c] for c in layout.channels]))

@@ -6,8 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.bank.coherent import SpectrumSums
-from analysis.mismatch.evidence import Histogram, LineSpectrum, Series, Spectrum
+from analysis.mismatch.bank.motion import AXES
+from analysis.mismatch.evidence import Histogram, LineSpectrum, Series, Shift, Spectrum
 from analysis.mismatch.layout import Layout, Place
+from analysis.mismatch.observe import Observation
 from analysis.mismatch.pictures.album import Album, wander_dn
 from analysis.mismatch.split import Split
 
@@ -100,6 +102,22 @@ def series(
             spread = (wander_dn(before, place), wander_dn(after, place))
             some.append(Series(channel, means, *spread, locked=tuple(locked)))
         found[exposure.name] = tuple(some)
+    return found
+
+
+def shifts(layout: Layout, seen: Observation) -> dict[str, Shift]:
+    """Return how scenes move from frame to frame, by exposure."""
+    found = {}
+    for exposure in layout.pictures:
+        if exposure.name not in seen.shifts:
+            continue
+        own = seen.shifts[exposure.name]
+        along = {axis: np.full(1 + max(exposure.numbers), np.nan) for axis in AXES}
+        for axis, pixels in own.along.items():
+            along[axis][list(exposure.numbers)] = pixels
+        right, down = AXES
+        errors = own.errors[right], own.errors[down]
+        found[exposure.name] = Shift(along[right], along[down], *errors)
     return found
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from analysis.figures import STYLE
+from analysis.mismatch.bank.motion import STATISTIC as MOTION
 from analysis.mismatch.bank.standing import NAME as FIXED_WAVE
 from analysis.mismatch.evidence import Array, Evidence, Histogram, Map, Shown
 from analysis.mismatch.finding import Finding, Mismatch
@@ -23,6 +24,7 @@ from analysis.mismatch.report.figures import (
     pixels,
     profiles,
     series,
+    shifts,
     spectra,
 )
 from analysis.mismatch.report.sentences import strongest
@@ -164,6 +166,9 @@ def _of_frames(m: Mismatch, name: str, evidence: Evidence) -> Iterator[Picture]:
     if name == "frame_variance" and evidence.series:
         draw = partial(series.draw, shown=_some(m, evidence.series))
         yield Picture("frame-means", words, (m,), series.SIZE_INCHES, draw)
+    if name == MOTION and evidence.shifts:
+        own = partial(shifts.draw, shown=_some(m, evidence.shifts))
+        yield Picture("scene-motion", words, (m,), shifts.SIZE_INCHES, own)
     if name in OF_CODES and evidence.codes:
         key = _oddest(m, evidence.codes)
         draw = partial(codes.draw, histograms=evidence.codes[key])
@@ -263,7 +268,7 @@ def _distance(one: Histogram) -> float:
     return float(apart.sum() / max(int((total > 0).sum()), 1))
 
 
-def _some(m: Mismatch, stored: Mapping[str, Sequence[Part]]) -> dict[str, Sequence[Part]]:
+def _some(m: Mismatch, stored: Mapping[str, Part]) -> dict[str, Part]:
     """Return the evidence of the first, middle and last exposure that a mismatch names."""
     names = [name for name in m.where.exposures if name in stored] or list(stored)
     last = len(names) - 1

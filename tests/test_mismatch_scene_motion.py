@@ -67,7 +67,7 @@ def test_shifts_are_those_of_the_frames(cfa: str) -> None:
     """They scatter about the true ones by their errors."""
     off = []
     for seed in range(8):
-        moved = np.random.default_rng(seed).normal(0, 0.04, (FRAMES, 2))
+        moved = np.random.default_rng(seed).normal(0, 0.03, (FRAMES, 2))
         each = iter(moved)
 
         def moving(_: np.random.Generator, each: Any = each) -> Array:

@@ -63,6 +63,7 @@ class Sawtooth:
 
 
 @lru_cache(maxsize=8)
+@lru_cache(maxsize=4)  # of the recorded ones, which are asked again whatever the model
 def sawteeth(samples: tuple[Samples, ...], *, whole: bool = False) -> tuple[Sawtooth, ...]:
     """Return for each of `PERIODS` the sawtooth that explains most, by least squares.
 

@@ -47,8 +47,8 @@ def seam_shapes(size: int) -> tuple[Array, Array]:
 
 
 def centred(values: Array) -> Array:
-    """Return means of lines about theirs."""
-    return np.asarray(values - values.mean())
+    """Return means of lines (line, ...) about theirs."""
+    return np.asarray(values - values.mean(0))
 
 
 def beyond_smooth(values: Array) -> Array:

@@ -80,8 +80,25 @@ class _Fit:
 
 def _decays(clues: Clues, edge: str, name: str, rest: Rest) -> list[_Fit]:
     """Return the decay of each length that fits a map best; none where there is no such map."""
-    made = [_fitted(clues, edge, name, length, rest) for length in _lengths(clues, edge)]
-    return [fit for fit in made if fit is not None]
+    lengths = _lengths(clues, edge)
+    axis = _EDGES[edge]
+    top, bottom = np.zeros((2, len(lengths)))
+    for channel, (image, noise) in clues.image(name).items():
+        scale = clues.scale(name, channel) / (100 if name == "gain" else 1)
+        distance = clues.layout.from_edge(channel, edge)
+        own = rest(image.mean(0 if axis == "columns" else 1))
+        own -= rest(_had(clues, axis, name, channel)) * scale
+        shapes = rest(np.exp(-distance[:, np.newaxis] / lengths))
+        # Lines scatter beyond the noise of their pixels: a decay must stand out of that.
+        across = image.size // own.size
+        squares = np.array([line_square_beside(own, shape, noise, across) for shape in shapes.T])
+        top += scale * (own @ shapes) / squares
+        bottom += scale**2 * (shapes**2).sum(0) / squares
+    return [
+        _Fit(length, float(t / b), float(t / b**0.5))
+        for length, t, b in zip(lengths, top, bottom, strict=True)
+        if b > 0
+    ]
 
 
 def _lengths(clues: Clues, edge: str) -> list[float]:
@@ -98,23 +115,6 @@ def _longest(lines: int) -> float:
 def _clear(fit: _Fit) -> float:
     """Return how much of a map a decay explains: chi-squared."""
     return fit.z**2
-
-
-def _fitted(clues: Clues, edge: str, name: str, length: float, rest: Rest) -> _Fit | None:
-    """Return the decay of a length that fits a map best; None where there is no such map."""
-    axis = _EDGES[edge]
-    top = bottom = 0.0
-    for channel, (image, noise) in clues.image(name).items():
-        scale = clues.scale(name, channel) / (100 if name == "gain" else 1)
-        distance = clues.layout.from_edge(channel, edge)
-        own = rest(image.mean(0 if axis == "columns" else 1))
-        own -= rest(_had(clues, axis, name, channel)) * scale
-        shape = rest(np.exp(-distance / length))
-        # Lines scatter beyond the noise of their pixels: a decay must stand out of that.
-        square = line_square_beside(own, shape, noise, image.size // own.size)
-        top += scale * float(shape @ own) / square
-        bottom += scale**2 * float(shape @ shape) / square
-    return _Fit(length, top / bottom, top / bottom**0.5) if bottom > 0 else None
 
 
 def _had(clues: Clues, axis: str, name: str, channel: str) -> Array:

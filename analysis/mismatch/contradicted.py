@@ -1,5 +1,6 @@
 """Effects that the very statistics which call for them deny."""
 
+from collections.abc import Container
 from dataclasses import dataclass, replace
 from math import exp
 
@@ -8,6 +9,7 @@ from numpy.typing import NDArray
 
 from analysis.mismatch.candidates import CANDIDATES
 from analysis.mismatch.credited import joined
+from analysis.mismatch.masked import with_path
 from analysis.mismatch.polish import Polished
 from analysis.mismatch.predict import Predictor
 from analysis.mismatch.rank import TOLD_APART
@@ -65,11 +67,19 @@ def contradicted(
     return _denied(state, predictor, kind, mean + shift, own + shift, state.null.sd)
 
 
-def refuted(state: State, predictor: Predictor, kind: str, fitted: Polished) -> Denial | None:
+def refuted(
+    state: State,
+    predictor: Predictor,
+    kind: str,
+    fitted: Polished,
+    left: Container[str] = frozenset(),
+) -> Denial | None:
     """Return the same of an effect that a state's camera has not, as it was fitted.
 
     What the effect itself draws makes numbers scatter too: of a few spikes in a recording most
     exposures have none, and that denies none elsewhere. Codes deny it too, see `_of_codes`.
+    `left` are kinds that may be there as well: a second read-out path may mask it in the variances,
+    see `with_path`.
     """
     camera, mean = joined(state.camera, fitted.effects, state.setting.given), fitted.mean
     _, sd, known = predictor.weights(mean)
@@ -77,6 +87,9 @@ def refuted(state: State, predictor: Predictor, kind: str, fitted: Polished) -> 
     drawn = 0.0 * sd if camera is None else np.where(known, predictor.spread(camera), 0.0)
     scatter = np.sqrt(np.maximum(sd**2 - change**2, state.null.sd**2) + drawn**2)
     denial = _denied(state, predictor, kind, state.null.mean, mean, scatter)
+    if denial is not None and "dual_gain" in left and (both := with_path(state, mean)) is not None:
+        alone = state.null.mean + both - mean
+        denial = _denied(state, predictor, kind, alone, both, scatter)
     return denial or _of_codes(state, kind, mean)
 
 

@@ -23,6 +23,7 @@ from analysis.mismatch.leftout import left_out
 from analysis.mismatch.recalibrate import code_step
 from analysis.mismatch.resolved import FAR_OFF
 from analysis.mismatch.sharing import of_charge, shared_otherwise
+from analysis.mismatch.smooth import at_no_switch
 from analysis.mismatch.state import State
 from analysis.mismatch.straight import curves, misfit, misfits, upwards
 from analysis.mismatch.wholelines import of_parts
@@ -50,10 +51,11 @@ def displaced(state: State, kind: str, mean: Array, without: Array | None = None
     what they would be without: by covariances that neighbours have instead, or by what is cut off
     of noise that leans. Where that leaves half of the misfit or less, there may be no bend; nor
     where variances scatter no more than codes that are not equally wide make them. Of a bend that
-    levels show nothing is asked. Of filters, crosstalk and charge that repels charge, how alike
-    neighbours are at each level; of noise of whole lines, how alike samples along them are; of
-    greens that differ, what other colours share with them. Of widths of codes, whether it is
-    codes that never occur which make them differ; of pixels, whether those side by side do alike.
+    levels show is asked, where gains of read-out paths would disagree, whether it is smooth. Of
+    filters, crosstalk and charge that repels charge, how alike neighbours are at each level; of
+    noise of whole lines, how alike samples along them are; of greens that differ, what other
+    colours share with them. Of widths of codes, whether it is codes that never occur which make
+    them differ; of pixels, whether those side by side do alike.
 
     Parameters
     ----------
@@ -67,7 +69,8 @@ def displaced(state: State, kind: str, mean: Array, without: Array | None = None
     without = state.null.mean if without is None else without
     if kind in _BENDS:
         if _seen_in_levels(state, without, mean):
-            return None
+            why = "levels bend smoothly, not where a read-out path begins"
+            return Denial(0.0, why) if at_no_switch(state, kind, mean) else None
         return _of_neighbours(state) or _of_limits(state) or _of_codes(state)
     if kind in _LINES:
         denial = of_few_lines(state, kind, without) or of_parts(state, kind)

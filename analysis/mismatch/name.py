@@ -226,8 +226,7 @@ class Search(Fitted):
         if (fitted and silent) or any(pair[1] is path for pair in self.ties):
             path = None
         most = fitted[0].gain if fitted else 0.0
-        undecided = [one for pair in self.ties for one in pair]
-        fits = [one for one in undecided if one.kind in CANDIDATES]
+        fits = [one for pair in self.ties for one in pair if one.kind in CANDIDATES]
         bent = [one.gain for one in fits if "pixel_variance" in CANDIDATES[one.kind].calls]
         tied = max(bent, default=0.0)
         if path is not None and path.gain > max(self.least, most, tied):
@@ -327,7 +326,7 @@ class Search(Fitted):
         while fitted and fitted[0].gain >= LEAST_GAIN and fitted[0].kind not in LINES:
             best, *others = fitted
             predictor = state.predictor(replicates_for(self.setting, [best.proposal.effect]))
-            denial = refuted(state, predictor, best.kind, best.polished)
+            denial = refuted(state, predictor, best.kind, best.polished, self._left())
             denial = denial or unlike_frames(state, self.lines, best, others)
             if (denial := denial or displaced(state, best.kind, best.polished.mean)) is None:
                 break

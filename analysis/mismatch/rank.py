@@ -22,6 +22,7 @@ from analysis.mismatch.memory import Memory, words
 from analysis.mismatch.model import side_by_side
 from analysis.mismatch.polish import Polished, needed, polish, stepped, with_effects
 from analysis.mismatch.segments import Path
+from analysis.mismatch.smooth import smooth_as_well
 from analysis.mismatch.state import Setting, State
 from dsis.effects import Effect
 
@@ -350,6 +351,7 @@ def ties(state: State, best: Ranked, other: Ranked) -> bool:
     What is seen in them, and no more, ties with nothing that says the same and more.
     """
     near = other.gain > best.gain - TOLD_APART and other.kind != best.kind
+    near |= smooth_as_well(state, best.mean, best.kind, other.kind)
     if not near or _SAYS_LESS.get(best.kind) == other.kind or _other_line(state, best, other):
         return False
     return alike(state, best.polished.mean, other.polished.mean)

@@ -2,16 +2,20 @@
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from math import sqrt
+from math import log, nan, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.mismatch.basefit import fit_base
+from analysis.mismatch.basefit import BaseFit, fit_base
+from analysis.mismatch.layout import Layout, Place
 from analysis.mismatch.recalibrate import with_numbers
+from analysis.mismatch.scenes import SCENE
 from analysis.mismatch.state import State
+from analysis.mismatch.vector import expected_dn2, tells_segment
 from dsis.camera import Camera
 
+Array = NDArray[np.float64]
 _NU = 6.0
 _SHAPES = frozenset({"skewness", "kurtosis", "kurtosis_within_pixels"})
 _OFF, _CLEAR = 4.0, 10.0  # standard errors of a variance that departs, and of a shape
@@ -28,7 +32,7 @@ class Path:
     switch_dn: float
     error_dn: float
     gain: float
-    mean: NDArray[np.float64]
+    mean: Array
     kind: str = "dual_gain"
 
     @property
@@ -37,12 +41,14 @@ class Path:
         return self.kind
 
 
-def second_path(state: State) -> Path | None:
+def second_path(state: State, beside: Array | None = None) -> Path | None:
     """Return the second segment that explains the variances best; None where levels are too few.
 
     Its switch lies anywhere in a gap between levels, and in other gaps as likely as those explain
-    the variances: its error is the root mean square distance.
+    the variances: its error is the root mean square distance. `beside` are the numbers predicted
+    with an effect that is there as well; None: none is.
     """
+    mean = state.null.mean if beside is None else beside
     calibrated, layout = state.calibrated, state.setting.layout
     if len(calibrated.switches) > 0 or _misshapen(state):
         return None
@@ -53,7 +59,9 @@ def second_path(state: State) -> Path | None:
         }
     )
     paths = [
-        path for low, high in pairwise(means[1:-1]) if (path := _path(state, low, high)) is not None
+        path
+        for low, high in pairwise(means[1:-1])
+        if (path := _path(state, low, high, mean)) is not None
     ]
     if not paths:
         return None
@@ -61,6 +69,21 @@ def second_path(state: State) -> Path | None:
     chances = np.exp([path.gain - best.gain for path in paths])
     squares = [path.error_dn**2 + (path.switch_dn - best.switch_dn) ** 2 for path in paths]
     return replace(best, error_dn=sqrt(float(np.average(squares, weights=chances))))
+
+
+def explained(state: State, mean: Array) -> float:
+    """Return the log-likelihood of the variances of exposures under predicted numbers."""
+    own = _variances(state)
+    return _loglik((state.vector.values[own] - mean[own]) / state.null.sd[own])
+
+
+def _variances(state: State) -> list[int]:
+    """Return which numbers are the known variances of exposures."""
+    return [
+        i
+        for i, key in enumerate(state.vector.keys)
+        if key.statistic == "pixel_variance" and key.scope == "exposure" and state.null.known[i]
+    ]
 
 
 def spiky(state: State) -> bool:
@@ -84,44 +107,60 @@ def _misshapen(state: State) -> bool:
     return any(z > _OFF and shape.get(at, 0.0) > max(_CLEAR, z) for at, z in variance.items())
 
 
-def _path(state: State, low: float, high: float) -> Path | None:
-    """Return the second segment that begins between two levels; None: no camera has it."""
+def _path(state: State, low: float, high: float, beside: Array) -> Path | None:
+    """Return the second segment that begins between two levels; None: no camera has it.
+
+    What an effect leaves of variances is known but for a line, which two segments contain.
+    """
     setting, calibrated = state.setting, state.calibrated
     layout, seen = setting.layout, setting.seen
-    which = [
-        i
-        for i, key in enumerate(state.vector.keys)
-        if key.statistic == "pixel_variance" and key.scope == "exposure" and state.null.known[i]
-    ]
+    which = [i for i in _variances(state) if np.isfinite(beside[i])]
+    added = beside - state.null.mean
+    levels = dict(seen.levels)
+    for i in which if added.any() else ():
+        own = levels[state.vector.keys[i].place]
+        without = own.variance_dn2 * float(np.exp(-added[i]))
+        levels[state.vector.keys[i].place] = replace(own, variance_dn2=without)
     switch = sqrt(max(low, high / 50) * high)
     try:
         fit = fit_base(
-            layout, seen.levels, (switch,), calibrated.offsets,
+            layout, levels, (switch,), calibrated.offsets,
             black_dn=calibrated.model.camera.black_level - layout.black_dn,
             left_out=calibrated.left_out,
         )  # fmt: skip
     except (ValueError, np.linalg.LinAlgError):
         return None
-    places = [(state.vector.keys[i].exposure, state.vector.keys[i].channel) for i in which]
+    places = [state.vector.keys[i].place for i in which]
     expected = np.array([fit.expected_dn2[place] for place in places])
     if any(p.slope < 0 for p in fit.pieces) or (expected <= 0).any():
         return None
-    own = np.log(np.array([seen.levels[place].variance_dn2 for place in places]) / expected)
-    before = _loglik((state.vector.values[which] - state.null.mean[which]) / state.null.sd[which])
-    gain = _loglik(own / state.null.sd[which]) - before - _PENALTY
+    left = np.log(np.array([levels[place].variance_dn2 for place in places]) / expected)
+    before = _loglik((state.vector.values[which] - beside[which]) / state.null.sd[which])
+    gain = _loglik(left / state.null.sd[which]) - before - _PENALTY
     camera = with_numbers(state.camera, fit, (switch,), layout.black_dn)
     # Anywhere between the levels: about the place that is taken, their geometric middle.
     error = sqrt((high - low) ** 2 / 12 + ((low + high) / 2 - switch) ** 2)
-    mean = state.null.mean.copy()
-    mean[which] += state.vector.values[which] - own
+    mean = beside.copy()
+    mean[which] = state.null.mean[which] + state.vector.values[which] - left
+    for i, key in enumerate(state.vector.keys):
+        if key.statistic == "pixel_variance" and key.scope == SCENE and state.null.known[i]:
+            mean[i] += _grown(layout, key.place, calibrated.residual, fit)
     return Path(camera, switch, error, gain, mean)
+
+
+def _grown(layout: Layout, place: Place, before: BaseFit, after: BaseFit) -> float:
+    """Return the logarithm by which a scene's variance grows at a place; nan: nobody knows."""
+    if not tells_segment(layout.range_dn(place), after):
+        return nan
+    variances = [expected_dn2(layout, place, fit) for fit in (before, after)]
+    return log(variances[1] / variances[0]) if min(variances) > 0 else nan
 
 
 def _loglik(z: np.ndarray) -> float:
     return float(-((_NU + 1) / 2 * np.log1p(z**2 / _NU)).sum())
 
 
-def bent(base: State, final: State) -> NDArray[np.float64]:
+def bent(base: State, final: State) -> Array:
     """Return what a second read-out path changes: the residuals of the variances."""
     own = np.array([key.statistic == "pixel_variance" for key in base.vector.keys])
     return np.where(own, base.vector.values - final.vector.values, 0.0)

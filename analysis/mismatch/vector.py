@@ -102,7 +102,7 @@ def _of_scene(
         for label in local.bins:
             key = _key("pixel_variance", SCENE, name, channel, label)
             level, expected = seen.local[key.place], expected_dn2(layout, key.place, fit)
-            told = _told(layout.range_dn(key.place), fit)
+            told = tells_segment(layout.range_dn(key.place), fit)
             known = told and level.variance_dn2 > 0 and expected > 0
             yield (
                 key,
@@ -110,7 +110,7 @@ def _of_scene(
             )
 
 
-def _told(range_dn: tuple[float, float], fit: BaseFit) -> bool:
+def tells_segment(range_dn: tuple[float, float], fit: BaseFit) -> bool:
     """Return whether uniform exposures tell which segment a range of signal is read out in.
 
     They only say between which two of their levels a segment begins.

@@ -19,14 +19,14 @@ FIELD = registry()["smooth_prnu"](sigma_percent=0.2, length_pixels=6.0)
 Array = NDArray[np.float64]
 
 
-def _state(gain: Array, cfa: Cfa, seed: int) -> Any:
+def _state(gain: Array, cfa: Cfa, seed: int, noise: float = NOISE) -> Any:
     """Return a state with a map of the gain, DN at 1000."""
-    image = 1000 * gain + np.random.default_rng(seed).normal(0, NOISE, gain.shape)
+    image = 1000 * gain + np.random.default_rng(seed).normal(0, noise, gain.shape)
     sites = {"MONO": (0, 0)} if cfa is Cfa.MONO else {
         "R": (0, 0), "Gr": (0, 1), "Gb": (1, 0), "B": (1, 1)
     }  # fmt: skip
     step = 1 + (len(sites) > 1)
-    images = {(c, "gain"): (image[y::step, x::step], NOISE) for c, (y, x) in sites.items()}
+    images = {(c, "gain"): (image[y::step, x::step], noise) for c, (y, x) in sites.items()}
     clues = SimpleNamespace(
         layout=SimpleNamespace(sites=sites, rows=ROWS, columns=COLUMNS),
         image=lambda name: {c: one for (c, kind), one in images.items() if kind == name},
@@ -46,6 +46,16 @@ def _dust(seed: int) -> Array:
     return found
 
 
+def _faint(seed: int) -> Array:
+    """Return soft shadows far below the noise of a pixel, on a seventh of the sensor."""
+    rng, found = np.random.default_rng(seed), np.zeros((ROWS, COLUMNS))
+    y, x = np.arange(ROWS)[:, None], np.arange(COLUMNS)
+    for _ in range(8):
+        apart = np.hypot(y - rng.integers(ROWS), x - rng.integers(COLUMNS))
+        found -= rng.uniform(1e-3, 2e-3) / (1 + np.exp((apart - rng.uniform(4, 12)) / 1.5))
+    return found
+
+
 def _smooth(seed: int, length: float) -> Array:
     """Return a normal field; blurred noise, no field of the effect's own law."""
     white = np.random.default_rng(seed).normal(size=(ROWS, COLUMNS))
@@ -60,6 +70,23 @@ def test_dust_is_no_field(cfa: Cfa, seed: int) -> None:
     assert said is not None
     assert said.share < 0.5
     assert "few patches" in said.why
+
+
+@pytest.mark.parametrize("sign", [-1, 1])
+def test_faint_patches_are_no_field_though_noise_hides_the_sensor_around(sign: int) -> None:
+    field = registry()["smooth_prnu"](sigma_percent=0.035, length_pixels=8.0)
+    for seed in range(4):
+        said = of_few_patches(_state(sign * _faint(seed), Cfa.RGGB, seed, 1.0), field)
+        assert said is not None
+        assert said.share < 0.5
+
+
+@pytest.mark.parametrize("noise", [0.2, 1.0, 2.0])
+def test_a_faint_normal_field_is_believed(noise: float) -> None:
+    field = registry()["smooth_prnu"](sigma_percent=0.06, length_pixels=8.0)
+    for seed in range(8):
+        state = _state(0.15 * _smooth(seed, 4.0), Cfa.RGGB, seed, noise)
+        assert of_few_patches(state, field) is None
 
 
 @pytest.mark.parametrize("cfa", [Cfa.MONO, Cfa.RGGB])

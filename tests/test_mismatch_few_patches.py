@@ -126,3 +126,39 @@ def test_columns_that_differ_as_their_neighbours_do_are_none_by_themselves(cfa: 
         said = of_parts(_state(np.tile(0.005 * lines, (ROWS, 1)), cfa, seed), "column_prnu")
         assert said is not None
         assert "neighbours" in said.why
+
+
+def _offsets(pattern: Array, seed: int, *noises: float) -> Any:
+    """Return a state with maps of offsets of these noises: beside gains, and alone."""
+    names = ("offset", "offset alone")
+    rng, images = np.random.default_rng(seed), {}
+    for name, noise in zip(names, noises, strict=True):
+        images["MONO", name] = (pattern + rng.normal(0, noise, pattern.shape), noise)
+    return SimpleNamespace(setting=SimpleNamespace(seen=SimpleNamespace(images=images)))
+
+
+def _trails(seed: int) -> Array:
+    """Return trails below few pixels, which decay over some rows."""
+    rng, found = np.random.default_rng(seed), np.zeros((ROWS, COLUMNS))
+    for _ in range(8):
+        y, x = rng.integers(ROWS - 20), rng.integers(COLUMNS)
+        found[y:, x] += rng.uniform(3, 6) * np.exp(-np.arange(ROWS - y) / 6)
+    return found
+
+
+def test_trails_are_no_columns_though_a_map_is_too_noisy_to_show_them() -> None:
+    for seed in range(4):
+        said = of_parts(_offsets(_trails(seed), seed, 2.0, 0.4), "column_fpn")
+        assert said is not None
+        assert "few parts" in said.why
+        assert of_parts(_offsets(_trails(seed), seed, 0.4, 0.4), "column_fpn") is not None
+
+
+def test_columns_that_one_map_shows_whole_are_believed() -> None:
+    for seed in range(10):
+        lines = np.tile(np.random.default_rng(seed).normal(0, 0.1, COLUMNS), (ROWS, 1))
+        assert of_parts(_offsets(lines, seed, 2.0, 0.4), "column_fpn") is None
+        state = _offsets(lines, seed, 0.6, 0.4)
+        image, noise = state.setting.seen.images["MONO", "offset alone"]
+        state.setting.seen.images["MONO", "offset alone"] = (image + _trails(seed), noise)
+        assert of_parts(state, "column_fpn") is None

@@ -25,6 +25,7 @@ from analysis.mismatch.resolved import FAR_OFF
 from analysis.mismatch.sharing import of_charge, shared_otherwise
 from analysis.mismatch.state import State
 from analysis.mismatch.straight import curves, misfit, misfits, upwards
+from analysis.mismatch.wholeframes import of_moving_parts
 from analysis.mismatch.wholelines import of_parts
 
 Array = NDArray[np.float64]
@@ -52,8 +53,9 @@ def displaced(state: State, kind: str, mean: Array, without: Array | None = None
     where variances scatter no more than codes that are not equally wide make them. Of a bend that
     levels show nothing is asked. Of filters, crosstalk and charge that repels charge, how alike
     neighbours are at each level; of noise of whole lines, how alike samples along them are; of
-    greens that differ, what other colours share with them. Of widths of codes, whether it is
-    codes that never occur which make them differ; of pixels, whether those side by side do alike.
+    greens that differ, what other colours share with them; of frames that move as a whole, whether
+    their parts do so alike. Of widths of codes, whether it is codes that never occur which make
+    them differ; of pixels, whether those side by side do alike.
 
     Parameters
     ----------
@@ -76,6 +78,7 @@ def displaced(state: State, kind: str, mean: Array, without: Array | None = None
         denial = of_few_lines(state, kind, without) or _SAID[kind](state)
         return denial or of_alike_samples(state, kind, mean, without)
     denial = _of_colours(state, mean - without) if kind in _GREENS else None
+    denial = denial or of_moving_parts(state, kind, without)
     denial = denial or of_late_light(state, kind) or shared_otherwise(state, kind, without)
     return denial or no_brighter_alike(state, kind, without)
 

@@ -19,14 +19,14 @@ FIELD = registry()["smooth_prnu"](sigma_percent=0.2, length_pixels=6.0)
 Array = NDArray[np.float64]
 
 
-def _state(gain: Array, cfa: Cfa, seed: int) -> Any:
+def _state(gain: Array, cfa: Cfa, seed: int, noise: float = NOISE) -> Any:
     """Return a state with a map of the gain, DN at 1000."""
-    image = 1000 * gain + np.random.default_rng(seed).normal(0, NOISE, gain.shape)
+    image = 1000 * gain + np.random.default_rng(seed).normal(0, noise, gain.shape)
     sites = {"MONO": (0, 0)} if cfa is Cfa.MONO else {
         "R": (0, 0), "Gr": (0, 1), "Gb": (1, 0), "B": (1, 1)
     }  # fmt: skip
     step = 1 + (len(sites) > 1)
-    images = {(c, "gain"): (image[y::step, x::step], NOISE) for c, (y, x) in sites.items()}
+    images = {(c, "gain"): (image[y::step, x::step], noise) for c, (y, x) in sites.items()}
     clues = SimpleNamespace(
         layout=SimpleNamespace(sites=sites, rows=ROWS, columns=COLUMNS),
         image=lambda name: {c: one for (c, kind), one in images.items() if kind == name},
@@ -46,6 +46,16 @@ def _dust(seed: int) -> Array:
     return found
 
 
+def _faint(seed: int) -> Array:
+    """Return soft shadows far below the noise of a pixel, on a seventh of the sensor."""
+    rng, found = np.random.default_rng(seed), np.zeros((ROWS, COLUMNS))
+    y, x = np.arange(ROWS)[:, None], np.arange(COLUMNS)
+    for _ in range(8):
+        apart = np.hypot(y - rng.integers(ROWS), x - rng.integers(COLUMNS))
+        found -= rng.uniform(1e-3, 2e-3) / (1 + np.exp((apart - rng.uniform(4, 12)) / 1.5))
+    return found
+
+
 def _smooth(seed: int, length: float) -> Array:
     """Return a normal field; blurred noise, no field of the effect's own law."""
     white = np.random.default_rng(seed).normal(size=(ROWS, COLUMNS))
@@ -60,6 +70,23 @@ def test_dust_is_no_field(cfa: Cfa, seed: int) -> None:
     assert said is not None
     assert said.share < 0.5
     assert "few patches" in said.why
+
+
+@pytest.mark.parametrize("sign", [-1, 1])
+def test_faint_patches_are_no_field_though_noise_hides_the_sensor_around(sign: int) -> None:
+    field = registry()["smooth_prnu"](sigma_percent=0.035, length_pixels=8.0)
+    for seed in range(4):
+        said = of_few_patches(_state(sign * _faint(seed), Cfa.RGGB, seed, 1.0), field)
+        assert said is not None
+        assert said.share < 0.5
+
+
+@pytest.mark.parametrize("noise", [0.2, 1.0, 2.0])
+def test_a_faint_normal_field_is_believed(noise: float) -> None:
+    field = registry()["smooth_prnu"](sigma_percent=0.06, length_pixels=8.0)
+    for seed in range(8):
+        state = _state(0.15 * _smooth(seed, 4.0), Cfa.RGGB, seed, noise)
+        assert of_few_patches(state, field) is None
 
 
 @pytest.mark.parametrize("cfa", [Cfa.MONO, Cfa.RGGB])
@@ -99,3 +126,39 @@ def test_columns_that_differ_as_their_neighbours_do_are_none_by_themselves(cfa: 
         said = of_parts(_state(np.tile(0.005 * lines, (ROWS, 1)), cfa, seed), "column_prnu")
         assert said is not None
         assert "neighbours" in said.why
+
+
+def _offsets(pattern: Array, seed: int, *noises: float) -> Any:
+    """Return a state with maps of offsets of these noises: beside gains, and alone."""
+    names = ("offset", "offset alone")
+    rng, images = np.random.default_rng(seed), {}
+    for name, noise in zip(names, noises, strict=True):
+        images["MONO", name] = (pattern + rng.normal(0, noise, pattern.shape), noise)
+    return SimpleNamespace(setting=SimpleNamespace(seen=SimpleNamespace(images=images)))
+
+
+def _trails(seed: int) -> Array:
+    """Return trails below few pixels, which decay over some rows."""
+    rng, found = np.random.default_rng(seed), np.zeros((ROWS, COLUMNS))
+    for _ in range(8):
+        y, x = rng.integers(ROWS - 20), rng.integers(COLUMNS)
+        found[y:, x] += rng.uniform(3, 6) * np.exp(-np.arange(ROWS - y) / 6)
+    return found
+
+
+def test_trails_are_no_columns_though_a_map_is_too_noisy_to_show_them() -> None:
+    for seed in range(4):
+        said = of_parts(_offsets(_trails(seed), seed, 2.0, 0.4), "column_fpn")
+        assert said is not None
+        assert "few parts" in said.why
+        assert of_parts(_offsets(_trails(seed), seed, 0.4, 0.4), "column_fpn") is not None
+
+
+def test_columns_that_one_map_shows_whole_are_believed() -> None:
+    for seed in range(10):
+        lines = np.tile(np.random.default_rng(seed).normal(0, 0.1, COLUMNS), (ROWS, 1))
+        assert of_parts(_offsets(lines, seed, 2.0, 0.4), "column_fpn") is None
+        state = _offsets(lines, seed, 0.6, 0.4)
+        image, noise = state.setting.seen.images["MONO", "offset alone"]
+        state.setting.seen.images["MONO", "offset alone"] = (image + _trails(seed), noise)
+        assert of_parts(state, "column_fpn") is None

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from analysis.mismatch.bank.motion import MotionSums
+from analysis.mismatch.bank.motion import MotionSums, _strongest
 from analysis.mismatch.scenes import scene_of
 
 ROWS, COLUMNS, FRAMES = 96, 130, 8
@@ -88,6 +88,32 @@ def test_a_scene_that_vibrates_is_seen(cfa: str) -> None:
         return _picture(right=0.05 * np.sin(turn))
 
     assert max(_found(cfa, 2, vibrating)) > 6
+
+
+@pytest.mark.parametrize("cycles", [3.0, 5.1, 6.5])
+def test_one_fast_wave_is_seen_among_all_that_are_slow(cycles: float) -> None:
+    def vibrating(rng: np.random.Generator) -> Array:
+        turn = 2 * np.pi * cycles * Y / ROWS + rng.uniform(0, 2 * np.pi)
+        return _picture(right=0.02 * np.sin(turn))
+
+    for seed in range(3):
+        assert max(_found("RGGB", seed, vibrating)) > 5
+
+
+@pytest.mark.parametrize("frames", [3, 9])
+def test_scores_of_white_noise_are_those_of_a_normal_variate(frames: int) -> None:
+    rng, rows = np.random.default_rng(frames), 90
+    turn = 2 * np.pi * np.outer(np.arange(9), np.arange(rows)) / rows
+    cos, sin = np.cos(turn), np.sin(turn)
+    slow = np.stack([(cos**2).sum(1), (sin**2).sum(1), (cos * sin).sum(1)], 1)
+    noise = np.ones(rows)
+    scores = np.empty(2000)
+    for k in range(scores.size):
+        white = rng.normal(size=(frames, rows))
+        scores[k] = _strongest(white - white.mean(0), noise, slow)[0]
+    assert -0.5 < scores.mean() < 0.1
+    assert (scores > 2.326).sum() <= 36  # 20 are expected: 4 standard deviations
+    assert (scores > 1.282).sum() <= 254  # 200
 
 
 @pytest.mark.parametrize("cfa", ["MONO", "RGGB"])

@@ -26,6 +26,7 @@ from analysis.mismatch.sharing import of_charge, shared_otherwise
 from analysis.mismatch.smooth import at_no_switch
 from analysis.mismatch.state import State
 from analysis.mismatch.straight import curves, misfit, misfits, upwards
+from analysis.mismatch.wholeframes import of_moving_parts
 from analysis.mismatch.wholelines import of_parts
 
 Array = NDArray[np.float64]
@@ -54,8 +55,9 @@ def displaced(state: State, kind: str, mean: Array, without: Array | None = None
     levels show is asked, where gains of read-out paths would disagree, whether it is smooth. Of
     filters, crosstalk and charge that repels charge, how alike neighbours are at each level; of
     noise of whole lines, how alike samples along them are; of greens that differ, what other
-    colours share with them. Of widths of codes, whether it is codes that never occur which make
-    them differ; of pixels, whether those side by side do alike.
+    colours share with them; of frames that move as a whole, whether their parts do so alike. Of
+    widths of codes, whether it is codes that never occur which make them differ; of pixels,
+    whether those side by side do alike.
 
     Parameters
     ----------
@@ -79,6 +81,7 @@ def displaced(state: State, kind: str, mean: Array, without: Array | None = None
         denial = of_few_lines(state, kind, without) or _SAID[kind](state)
         return denial or of_alike_samples(state, kind, mean, without)
     denial = _of_colours(state, mean - without) if kind in _GREENS else None
+    denial = denial or of_moving_parts(state, kind, without)
     denial = denial or of_late_light(state, kind) or shared_otherwise(state, kind, without)
     return denial or no_brighter_alike(state, kind, without)
 

@@ -4,52 +4,92 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
+from analysis.mismatch.bank.parts import parts
 from analysis.mismatch.candidates.fields import gains
 from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.state import State
 from dsis.effects import Effect
 from dsis.effects.smooth_prnu import SmoothPrnu
-from dsis.measures.spikes import variance_of_quartiles
+from dsis.measures.fixed_pattern import Smooth
 
 Array = NDArray[np.float64]
 _MOST_PIXELS = 512  # a side: of a larger sensor its middle
+_PIXELS, _ROUNDS, _NEAR = 4096, 8, 0.3  # of a surface; of the median deviation: no nearer one
 _DRAWS, _CLEAR = 64, 4.0  # fields of chance; standard deviations among them
 _MOST = 0.5  # of the field's variance, that few patches may make
 _NORMAL = 0.75  # of it, from which no drawn field need be asked: theirs is near 1
+_SIDE = 0.15865525393145707  # of normal values lie beyond one standard deviation, on a side
 
 
 def of_few_patches(state: State, effect: Effect) -> Denial | None:
     """Return how a field of gains is denied by few patches that make most of it; None: not.
 
     A normal field, seen through the filter that lifts it best out of white noise (Wiener, 1949), is
-    normal: its quartiles tell its variance. Where they tell half of it or less, far fewer than
-    fields of this spectrum ever do, most of the sensor has no such gain.
+    normal: what as many lie beyond as beyond one standard deviation tells its variance, on either
+    side of the middle. Patches make one side; on the other lies the rest of the sensor. Where that
+    tells half or less of what is no white noise, far less than fields of this spectrum ever do,
+    most of the sensor has no such gain.
     """
     image = gains(state.clues()) if isinstance(effect, SmoothPrnu) else None
     if image is None or not isinstance(effect, SmoothPrnu):
         return None
     image = _middle(image)
     field = effect.sigma_percent**2 * _spectrum(image.shape, effect.length_pixels)
-    share = _of_quartiles(image, field)
+    share = _of_nearer_side(image, field)
     if share > _NORMAL:
         return None
     rng, chance = np.random.default_rng(0), []
     root = np.sqrt(field + _white(image))
     for _ in range(_DRAWS):
         drawn = fft.rfft2(rng.standard_normal(image.shape)) * root
-        chance.append(_of_quartiles(fft.irfft2(drawn, image.shape), field))
+        seen = parts(fft.irfft2(drawn, image.shape), 1.0).pixels  # as the map's are
+        chance.append(_of_nearer_side(seen, field))
     expected = float(np.mean(chance))
     if share > _MOST * expected or expected - share < _CLEAR * float(np.std(chance)):
         return None
-    return Denial(share / expected, "few patches make most of it, as no field of gains is made")
+    why = "few patches make most of it, as no field of gains is made"
+    return Denial(max(share / expected, 0.0), why)
 
 
-def _of_quartiles(image: Array, field: Array) -> float:
-    """Return the share of the filtered image's variance that its quartiles tell."""
-    lifted = fft.irfft2(fft.rfft2(image) * (field / (field + _white(image))), image.shape)
-    low, high = np.percentile(lifted, [25, 75])
-    square = float(lifted.var())
-    return variance_of_quartiles(float(low), float(high)) / square if square > 0 else 1.0
+def _of_nearer_side(image: Array, field: Array) -> float:
+    """Return the share of the field's variance that the nearer side of the filtered image tells.
+
+    White noise, of which the filter leaves a known part, is not counted. A smooth surface that
+    patches pull with them was taken off the image: it is put back.
+    """
+    white = _white(image)
+    gain = field / (field + white)
+    lifted = fft.irfft2(fft.rfft2(image) * gain, image.shape)
+    noise = white * float((fft.irfft2(gain, image.shape) ** 2).sum())
+    level = lifted - _surface(lifted)
+    low, middle, high = np.quantile(level, [_SIDE, 0.5, 1 - _SIDE])
+    square = float(lifted.var()) - noise
+    nearer = float(min(middle - low, high - middle)) ** 2 - noise
+    return nearer / square if square > 0 else 1.0
+
+
+def _surface(image: Array) -> Array:
+    """Return the smooth surface of least absolute deviations: (row, column).
+
+    By reweighted least squares (Schlossmacher, 1973), from as many pixels as it needs.
+    """
+    smooth = Smooth.of(*image.shape)
+    degree = np.arange(smooth.degree + 1)
+    y, x = np.nonzero(degree[:, np.newaxis] + degree <= smooth.degree)
+    step = max(int((image.size / _PIXELS) ** 0.5), 1)
+    few = image[::step, ::step]
+    bases = smooth.along_rows[::step, y], smooth.along_columns[::step, x]
+    design = (bases[0][:, np.newaxis] * bases[1]).reshape(few.size, y.size)
+    weight: Array = np.ones(few.size, np.float64)
+    found: Array = np.zeros(y.size)
+    for _ in range(_ROUNDS):
+        weighted = design * weight[:, np.newaxis]
+        found = np.asarray(np.linalg.solve(weighted.T @ design, weighted.T @ few.ravel()))
+        apart = np.abs(few.ravel() - design @ found)
+        weight = 1 / np.maximum(apart, max(_NEAR * float(np.median(apart)), 1e-12))
+    coefficients = np.zeros((degree.size, degree.size))
+    coefficients[y, x] = found
+    return smooth.surface(coefficients)
 
 
 def _white(image: Array) -> float:

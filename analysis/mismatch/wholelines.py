@@ -11,6 +11,7 @@ from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.state import State
 
 Array = NDArray[np.float64]
+Images = Mapping[str, tuple[Array, float]]
 _MAPS = {"row_fpn": "offset", "column_fpn": "offset", "row_prnu": "gain", "column_prnu": "gain"}
 _PARTS = 12  # of a line: of each half of them the middle ones are asked
 _LEAST_PIXELS = 4  # of a part
@@ -26,12 +27,20 @@ def of_parts(state: State, kind: str) -> Denial | None:
     of the rest covary by the variance of lines, whatever their noise, and by none of what is in
     less than half of the parts. Where that is less than half of what means of lines have, for sure,
     something else makes these differ. So it does where lines that lie beside one another in a
-    channel are alike: those of lines are drawn for each by itself.
+    channel are alike: those of lines are drawn for each by itself. Asked is a map of offsets beside
+    gains, say; where it says nothing for sure, that as if there were no gain, which is less noisy.
     """
     if kind not in _MAPS:
         return None
-    axis = int(kind.startswith("column"))
-    images = _images(state, _MAPS[kind])
+    for images in _images(state, _MAPS[kind]):
+        said = _told(images, int(kind.startswith("column")))
+        if said is not None:
+            return said if isinstance(said, Denial) else None
+    return None
+
+
+def _told(images: Images, axis: int) -> Denial | bool | None:
+    """Return how maps of channels deny lines; True: all parts have them for sure; None: neither."""
     products, beside, whole, lines = [], [], 0.0, 0
     for image, noise in images.values():
         across = image if axis else image.T  # (along the line, line)
@@ -45,24 +54,26 @@ def of_parts(state: State, kind: str) -> Denial | None:
         single = typical_square(np.diff(across, axis=0)) / 2 / noise**2  # of pixels by themselves
         whole += float((means**2).sum()) - single * means.size / len(across)
         lines += means.size
-    if not products or whole <= 0:
+    if whole <= 0:
         return None
     own, near = np.concatenate(products), np.concatenate(beside)
     name = "columns" if axis else "rows"
     alike = float(near.sum()) - _SURE * float(near.std()) * near.size**0.5
     if alike > _MOST * whole:
-        return Denial(
-            max(1 - float(near.sum()) / whole, 0.0), f"{name} differ as their neighbours do"
-        )
-    seen = float(own.sum()) + _SURE * float(own.std()) * lines**0.5
-    if seen >= _MOST * whole:
-        return None
+        why = f"{name} differ as their neighbours do"
+        return Denial(max(1 - float(near.sum()) / whole, 0.0), why)
+    seen, error = float(own.sum()), _SURE * float(own.std()) * lines**0.5
+    if seen + error >= _MOST * whole:
+        return seen > error or None
     why = f"most of what {name} differ by lies in few parts of them"
-    return Denial(max(float(own.sum()) / whole, 0.0), why)
+    return Denial(max(seen / whole, 0.0), why)
 
 
-def _images(state: State, name: str) -> Mapping[str, tuple[Array, float]]:
-    """Return a map by channel, with its noise: the one that knows of no other, if it is there."""
+def _images(state: State, name: str) -> tuple[Images, Images]:
+    """Return two maps by channel, with their noise: one beside the other kind's, one alone."""
     images = state.setting.seen.images
-    found = {c: one for (c, kind), one in images.items() if kind == name}
-    return found or {c: one for (c, kind), one in images.items() if kind == f"{name} alone"}
+    beside, alone = (
+        {c: one for (c, kind), one in images.items() if kind == own}
+        for own in (name, f"{name} alone")
+    )
+    return beside, alone

@@ -13,6 +13,7 @@ from dsis.measures import Channel
 Array = NDArray[np.float64]
 Axis = Literal["row", "column"]
 AXES: tuple[Axis, ...] = ("row", "column")
+PARTS = 4  # of a frame along an axis: a wave has two phases, beside what all have
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,12 +31,15 @@ class LineMeans:
         (line,), DN^2, of `frames` - 1 degrees of freedom.
     noise_dn2
         What the noise of single pixels makes of that variance.
+    parts
+        Means of parts of each frame, lines side by side: (frame, part), DN.
     """
 
     frames: int
     fixed: Array
     moving: Array
     noise_dn2: float
+    parts: Array
 
 
 def line_means(
@@ -52,6 +56,7 @@ def line_means(
     along = AXES.index(axis)
     step = 1 if len(sites) == 1 else 2
     fixed, moving, noise = np.zeros(shape[along]), np.zeros(shape[along]), []
+    lines = np.zeros((frames, shape[along]))
     for first in range(step):
         own = [channels[c] for c, site in sites.items() if site[along] == first or step == 1]
         pixels = [one.mean_frame.shape[1 - along] for one in own]
@@ -59,10 +64,12 @@ def line_means(
             (one.row_means if along == 0 else one.column_means) * n
             for one, n in zip(own, pixels, strict=True)
         ) / sum(pixels)
+        lines[:, first::step] = series
         series = series - series.mean(1, keepdims=True)
         mean = series.mean(0)
         fixed[first::step] = beyond_smooth(mean)
         moving[first::step] = ((series - mean) ** 2).sum(0) / (frames - 1)
         variances = [one.estimates["pixel_variance"].value for one in own]
         noise.append(sum(v * n for v, n in zip(variances, pixels, strict=True)) / sum(pixels) ** 2)
-    return LineMeans(frames, fixed, moving, float(np.mean(noise)))
+    parts = np.stack([part.mean(1) for part in np.array_split(lines, PARTS, 1)], 1)
+    return LineMeans(frames, fixed, moving, float(np.mean(noise)), parts)

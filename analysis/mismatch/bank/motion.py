@@ -22,8 +22,16 @@ from analysis.mismatch.scenes import Scene
 Array = NDArray[np.float64]
 STATISTIC = "scene_motion"
 AXES = ("rows", "columns")  # that the scene moves along
-_UP_TO = (0, 1, 2, 4, 8)  # cycles a frame: slow waves
-_SLOWEST = _UP_TO[-1]
+_SLOWEST = 8  # cycles a frame: slow waves
+# One wave; two, where its cycles are no whole number; many, where it is none. First, behind last.
+_TOGETHER = (
+    *((k, k + 1) for k in range(_SLOWEST + 1)),
+    *((k, k + 2) for k in range(_SLOWEST)),
+    *((0, k + 1) for k in (2, 4, _SLOWEST)),
+)
+_INDEPENDENT = (
+    13  # chances whose least is one in a hundred as often as that of these, which overlap
+)
 _LEAST_ROWS = 48  # of fewer no wave is the measure of others
 _RAREST = -690.0  # logarithm of a chance that is told from none
 
@@ -86,7 +94,7 @@ class MotionSums:
             yield frame
 
     def numbers(self) -> dict[str, Number]:
-        """Return the normal score of the strongest slow wave, of movements along each axis."""
+        """Return the normal score of the strongest slow waves, of movements along each axis."""
         rows, frames = len(self.scene.signal_dn), len(self.series)
         if rows < _LEAST_ROWS or frames < 2:
             return {f"{STATISTIC} along {axis}": UNKNOWN for axis in AXES}
@@ -132,12 +140,12 @@ def _strongest(apart: Array, noise: Array, slow: Array) -> Number:
     ground = float(power[len(slow) :].sum()) / others
     if not ground > 0:
         return UNKNOWN
-    # A slow wave is in several, where its cycles are no whole number: they are asked together.
-    upto = [k for k in _UP_TO if k < len(slow)]
-    power, degrees = power.cumsum()[upto], degrees.cumsum()[upto]
+    some = np.array(_TOGETHER)
+    power, degrees = (np.append(0.0, own).cumsum() for own in (power, degrees))
+    power, degrees = (own[some[:, 1]] - own[some[:, 0]] for own in (power, degrees))
     chances = np.asarray(ratios.logsf(power / degrees / ground, degrees, others))
     least = max(float(chances.min()), _RAREST)
-    return score_of_log(any_of(least, len(upto))), 1.0
+    return score_of_log(any_of(least, _INDEPENDENT)), 1.0
 
 
 @lru_cache(maxsize=4)

@@ -1,0 +1,115 @@
+"""Frames that move as a whole, and frames whose mean moves because a part of them does."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import beta
+
+from analysis.mismatch.bank.linemeans import AXES, PARTS, Axis
+from analysis.mismatch.contradicted import Denial
+from analysis.mismatch.state import State
+
+Array = NDArray[np.float64]
+_OF_LIGHT = {"flicker": True, "black_level_drift": False}
+_NAMES = {"row": "upper and lower parts", "column": "left and right parts"}
+_UNLIKE = 0.3  # of what moves a frame, by which a part may depart from it
+_CHANCE = 1e-3  # that parts tell so much of what the whole moves by
+_MOST = 0.5  # of what moves the mean of a frame, that parts may make
+
+
+def of_moving_parts(state: State, kind: str, without: Array) -> Denial | None:
+    """Return how drift or flicker is denied by parts of frames that move; None: it is not.
+
+    What moves a whole frame, by as much everywhere or in proportion to the light, does not depend
+    on how its parts move against each other: rows that move, bands of light, a half that is read by
+    an amplifier of its own. So of the variance of frames' means is left, once it was regressed on
+    the differences of a few parts, what the whole has: 1 / (1' C^-1 1), C their covariance; by
+    chance the share has a beta distribution. Where that is half of what the effect would explain or
+    less, and hardly ever by chance, the frame does not move as a whole.
+
+    Parameters
+    ----------
+    state
+        With the effect, or before it is taken in.
+    kind
+        The effect.
+    without
+        The numbers predicted without it.
+    """
+    if kind not in _OF_LIGHT:
+        return None
+    said = (_denied(state, axis, without, of_light=_OF_LIGHT[kind]) for axis in AXES)
+    return next((denial for denial in said if denial is not None), None)
+
+
+@dataclass(frozen=True)
+class _Parts:
+    """How parts of frames move: covariance (part, part), noise of one, and degrees of freedom."""
+
+    covariance: Array
+    noise: float
+    free: int
+
+    @property
+    def whole(self) -> float:
+        """Variance of the mean of all parts, beyond noise."""
+        return float(self.covariance.mean()) - self.noise / PARTS
+
+
+def _denied(state: State, axis: Axis, without: Array, *, of_light: bool) -> Denial | None:
+    total, inverse = np.zeros((PARTS, PARTS)), 0.0
+    noise = claimed = size = 0.0
+    for exposure in state.setting.layout.uniform:
+        own = _parts(state, exposure.name, axis, of_light=of_light)
+        if own is None or own.whole <= 0:
+            continue
+        scale = float(np.trace(own.covariance))
+        weight = own.free * own.whole / scale**2  # as far as the mean moves
+        total += weight * own.covariance
+        noise += weight * own.noise
+        claimed += weight * own.whole * _unexplained(state, exposure.name, without)
+        size += weight * scale
+        inverse += (weight * scale) ** 2 / own.free
+    free = size**2 / inverse if inverse else 0.0  # Satterthwaite (1946)
+    if claimed <= 0 or free < PARTS:
+        return None
+    unlike = _UNLIKE**2 * max(float(total.mean()) - noise / PARTS, 0.0)
+    one, apart = np.ones(PARTS), total + unlike * np.eye(PARTS)
+    left = 1 / float(one @ np.linalg.solve(apart, one))
+    usual = left * free / (free - PARTS + 1) - (noise + unlike) / PARTS
+    chance = beta.cdf(left / float(apart.mean()), (free - PARTS + 1) / 2, (PARTS - 1) / 2)
+    if usual > _MOST * claimed or chance > _CHANCE:
+        return None
+    why = f"{_NAMES[axis]} move against each other, and take the mean of the frame along"
+    return Denial(max(usual / claimed, 0.0), why)
+
+
+def _parts(state: State, exposure: str, axis: Axis, *, of_light: bool) -> _Parts | None:
+    """Return how parts of the frames of an exposure move; as shares of their light, or in DN."""
+    own = state.setting.seen.lines.get((exposure, axis))
+    channels, signals = state.setting.layout.channels, state.calibrated.fit.signal_dn
+    light = float(np.mean([signals[exposure, c] for c in channels])) if of_light else 1.0
+    if own is None or own.frames < 2 or own.fixed.size < PARTS or light <= 0:
+        return None
+    mean = own.parts.mean(0)
+    unit = light + (mean - mean.mean()) if of_light else np.ones(PARTS)
+    moved = (own.parts - mean) / np.maximum(unit, _UNLIKE * light)
+    covariance = moved.T @ moved / (own.frames - 1)
+    noise = own.noise_dn2 * PARTS / own.fixed.size / light**2
+    return _Parts(covariance, noise, own.frames - 1) if covariance.any() else None
+
+
+def _unexplained(state: State, exposure: str, without: Array) -> float:
+    """Return which share of how far frames' means move is not explained without the effect."""
+    seen: list[float] = []
+    made: list[float] = []
+    for key, value, mean, known in zip(
+        state.vector.keys, state.vector.values, without, state.null.known, strict=True
+    ):
+        of_frames = key.statistic == "frame_variance" and key.exposure == exposure
+        if of_frames and known and not key.detail and np.isfinite(mean):
+            seen.append(float(value) ** 3 - 1)
+            made.append(float(mean) ** 3 - 1)
+    whole = float(np.mean(seen)) if seen else 0.0
+    return float(np.clip(1 - np.mean(made) / whole, 0.0, 1.0)) if whole > 0 else 1.0

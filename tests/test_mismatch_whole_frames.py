@@ -1,0 +1,123 @@
+"""Frames that move as a whole, and frames of which parts move."""
+
+from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from analysis.mismatch.bank.key import Key
+from analysis.mismatch.bank.linemeans import AXES, line_means
+from analysis.mismatch.wholeframes import of_moving_parts
+from dsis.cfa import Cfa
+from dsis.measures import Accumulator
+
+ROWS, COLUMNS = 40, 48
+FRAMES = (14, 5, 5, 4)
+NOISE_DN = (4.0, 6.0, 9.0, 12.0)
+SIGNAL_DN = (0.0, 500.0, 1000.0, 2000.0)
+HEIGHT = np.linspace(-0.5, 0.5, ROWS)
+Array = NDArray[np.float64]
+Moves = Callable[[Any, int, float], Array]
+"""(rng, frames, signal) -> (frame, row), DN."""
+
+
+def _state(seed: int, cfa: Cfa, *moves: Moves, known: float = 0.0) -> Any:
+    """Return a state whose frames are moved; `known`: the share that is explained already."""
+    sites = {"MONO": (0, 0)} if cfa is Cfa.MONO else {
+        "R": (0, 0), "Gr": (0, 1), "Gb": (1, 0), "B": (1, 1)
+    }  # fmt: skip
+    rng, lines, keys = np.random.default_rng(seed), {}, []
+    for k, (count, noise, signal) in enumerate(zip(FRAMES, NOISE_DN, SIGNAL_DN, strict=True)):
+        moved = sum(one(rng, count, signal) for one in moves)[..., np.newaxis]
+        frames = 1000 + signal + moved + rng.normal(0, noise, (count, ROWS, COLUMNS))
+        sums = Accumulator(ROWS, COLUMNS, cfa)
+        for frame in frames:
+            sums.add(np.floor(frame + 0.5).astype(np.uint16))
+        found = sums.result().channels
+        for axis in AXES:
+            lines[f"F{k}", axis] = line_means(found, sites, (ROWS, COLUMNS), count, axis)
+        keys.append(Key("frame_variance", "in all channels", f"F{k}", ""))
+    uniform = [SimpleNamespace(name=f"F{k}") for k in range(len(FRAMES))]
+    signals = {(f"F{k}", c): own for k, own in enumerate(SIGNAL_DN) for c in sites}
+    return SimpleNamespace(
+        setting=SimpleNamespace(
+            seen=SimpleNamespace(lines=lines),
+            layout=SimpleNamespace(uniform=uniform, channels=tuple(sites)),
+        ),
+        calibrated=SimpleNamespace(fit=SimpleNamespace(signal_dn=signals)),
+        vector=SimpleNamespace(keys=keys, values=np.full(len(keys), 3.0)),
+        null=SimpleNamespace(known=np.ones(len(keys), bool)),
+        expected=np.full(len(keys), np.cbrt(1 + 26 * known)),
+    )
+
+
+def _denied(state: Any, kind: str) -> bool:
+    return of_moving_parts(state, kind, state.expected) is not None
+
+
+def _drift(size: float) -> Moves:
+    return lambda rng, n, _: size * rng.normal(size=(n, 1)) * np.ones(ROWS)
+
+
+def _flicker(share: float) -> Moves:
+    """Return light that flickers, of which the lower rows have half more than the upper."""
+    return lambda rng, n, s: share * s * rng.normal(size=(n, 1)) * (1 + 0.4 * HEIGHT)
+
+
+def _half(step: float, share: float = 0.5) -> Moves:
+    """Return a step that alternates in a share of the rows."""
+    return lambda _, n, __: step * (-1.0) ** np.arange(n)[:, None] * (share > HEIGHT + 0.5)
+
+
+def _waves(size: float, cycles: float) -> Moves:
+    return lambda rng, n, _: size * np.cos(2 * np.pi * (cycles * HEIGHT + rng.random((n, 1))))
+
+
+@pytest.mark.parametrize("cfa", [Cfa.MONO, Cfa.RGGB])
+@pytest.mark.parametrize("share", [0.3, 0.5])
+def test_rows_that_move_by_themselves_are_no_drift(cfa: Cfa, share: float) -> None:
+    for seed in range(3):
+        assert _denied(_state(seed, cfa, _half(2.0, share)), "black_level_drift")
+
+
+def test_rows_that_move_by_themselves_are_no_flicker() -> None:
+    for seed in range(3):
+        assert _denied(_state(seed, Cfa.MONO, _half(6.0)), "flicker")
+
+
+@pytest.mark.parametrize("cfa", [Cfa.MONO, Cfa.RGGB])
+@pytest.mark.parametrize("size", [0.1, 0.5, 20.0])
+def test_drift_is_believed(cfa: Cfa, size: float) -> None:
+    for seed in range(4):
+        assert not _denied(_state(seed, cfa, _drift(size)), "black_level_drift")
+
+
+@pytest.mark.parametrize("share", [2e-4, 1e-3, 0.05])
+def test_flicker_of_uneven_light_is_believed(share: float) -> None:
+    for seed in range(4):
+        assert not _denied(_state(seed, Cfa.RGGB, _flicker(share)), "flicker")
+
+
+@pytest.mark.parametrize("cycles", [0.6, 1.7])
+def test_drift_is_believed_beside_waves(cycles: float) -> None:
+    for seed in range(4):
+        state = _state(seed, Cfa.MONO, _drift(1.0), _waves(1.0, cycles))
+        assert not _denied(state, "black_level_drift")
+
+
+def test_what_is_explained_already_need_not_be() -> None:
+    """Waves take the mean along; drift is a fifth of it, and all that is left to explain."""
+    moves = _waves(2.0, 0.6), _drift(0.5)
+    bare = [_denied(_state(seed, Cfa.MONO, *moves), "black_level_drift") for seed in range(6)]
+    known = [
+        _denied(_state(seed, Cfa.MONO, *moves, known=0.8), "black_level_drift") for seed in range(6)
+    ]
+    assert any(bare)
+    assert not any(known)
+
+
+def test_other_effects_are_not_asked() -> None:
+    assert not _denied(_state(1, Cfa.MONO, _half(2.0)), "row_noise")

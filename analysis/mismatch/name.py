@@ -13,6 +13,7 @@ from analysis.mismatch.credited import joined, kept_up
 from analysis.mismatch.displaced import displaced
 from analysis.mismatch.fitted import WEAK, Fitted
 from analysis.mismatch.instance import LINES, Frequency, frequency_of, instance
+from analysis.mismatch.instep import in_step
 from analysis.mismatch.judge import INSTEAD, LITTLE, NEEDLESS, NOTHING, Judge
 from analysis.mismatch.memory import Memory
 from analysis.mismatch.named import Named
@@ -344,7 +345,7 @@ class Search(Fitted):
             return False
         if self.lines is None or not self.lines.shown(effect):
             return self.lines is None
-        denial = self.lines.denial(effect)
+        denial = self.lines.denial(effect) or in_step(self.setting, effect)
         if denial == ABSENT:
             line = frequency_of(effect)
             self.settled += [(kind, line) for kind in sorted(LINES) if line is not None]

@@ -6,11 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import beta
 
-from analysis.mismatch.bank.linemeans import AXES, PARTS, Axis
+from analysis.mismatch.bank.linemeans import AXES, Axis, LineMeans
 from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.state import State
 
 Array = NDArray[np.float64]
+PARTS = 4  # of a frame: a wave has two phases, beside what all have
 _OF_LIGHT = {"flicker": True, "black_level_drift": False}
 _NAMES = {"row": "upper and lower parts", "column": "left and right parts"}
 _UNLIKE = 0.3  # of what moves a frame, by which a part may depart from it
@@ -90,14 +91,20 @@ def _parts(state: State, exposure: str, axis: Axis, *, of_light: bool) -> _Parts
     own = state.setting.seen.lines.get((exposure, axis))
     channels, signals = state.setting.layout.channels, state.calibrated.fit.signal_dn
     light = float(np.mean([signals[exposure, c] for c in channels])) if of_light else 1.0
-    if own is None or own.frames < 2 or own.fixed.size < PARTS or light <= 0:
+    if own is None or own.frames < 2 or own.fixed.size < own.parts.shape[1] or light <= 0:
         return None
-    mean = own.parts.mean(0)
+    parts = _merged(own)
+    mean = parts.mean(0)
     unit = light + (mean - mean.mean()) if of_light else np.ones(PARTS)
-    moved = (own.parts - mean) / np.maximum(unit, _UNLIKE * light)
+    moved = (parts - mean) / np.maximum(unit, _UNLIKE * light)
     covariance = moved.T @ moved / (own.frames - 1)
     noise = own.noise_dn2 * PARTS / own.fixed.size / light**2
     return _Parts(covariance, noise, own.frames - 1) if covariance.any() else None
+
+
+def _merged(own: LineMeans) -> Array:
+    """Return the means of few parts of each frame: (frame, part), DN."""
+    return np.asarray(own.parts.reshape(own.frames, PARTS, -1).mean(2))
 
 
 def _unexplained(state: State, exposure: str, without: Array) -> float:

@@ -13,7 +13,7 @@ from dsis.measures import Channel
 Array = NDArray[np.float64]
 Axis = Literal["row", "column"]
 AXES: tuple[Axis, ...] = ("row", "column")
-PARTS = 4  # of a frame along an axis: a wave has two phases, beside what all have
+PARTS = 12  # of a frame along an axis: they show waves of some cycles
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,5 +71,7 @@ def line_means(
         moving[first::step] = ((series - mean) ** 2).sum(0) / (frames - 1)
         variances = [one.estimates["pixel_variance"].value for one in own]
         noise.append(sum(v * n for v, n in zip(variances, pixels, strict=True)) / sum(pixels) ** 2)
-    parts = np.stack([part.mean(1) for part in np.array_split(lines, PARTS, 1)], 1)
+    ends = np.arange(PARTS + 1) * shape[along] // PARTS
+    each = zip(ends[:-1], np.maximum(ends[1:], ends[:-1] + 1), strict=True)  # of few lines one
+    parts = np.stack([lines[:, first:last].mean(1) for first, last in each], 1)
     return LineMeans(frames, fixed, moving, float(np.mean(noise)), parts)

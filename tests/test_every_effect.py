@@ -72,6 +72,7 @@ STRONG: dict[str, tuple[dict[str, object], ...]] = {
         {"gain_percent": 40.0, "edge": "bottom", "length_pixels": 4.0},
         {"offset_dn": 300.0, "edge": "right"},
     ),
+    "saturation": ({"softness_dn": 60.0},),
     "dual_gain_mismatch": ({"gain_error_percent": 5.0, "mean": "kinks"},),
     "tap_mismatch": (
         {"gain_percent": 40.0, "regions": "even_odd_columns"},

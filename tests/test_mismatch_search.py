@@ -19,6 +19,7 @@ from analysis.mismatch.rank import Ranked, alike, ties
 from analysis.mismatch.recalibrate import _moved
 from analysis.mismatch.resolved import explains
 from dsis.effects import registry
+from mismatch_recordings import camera
 
 NUMBERS = 12
 STATE: Any = SimpleNamespace(
@@ -337,6 +338,7 @@ def test_a_denied_decay_waits_as_others_do_and_leaves_other_edges(
 
 def test_an_optional_number_is_near_its_like_only() -> None:
     kind, own = registry()["line_settling"], {"gain_percent": 1.0, "length_pixels": 5.0}
-    assert _near(kind(**own), kind(**own))
-    assert not _near(kind(**own), kind(**own, gain_length_pixels=3.0))
-    assert not _near(kind(**own, gain_length_pixels=3.0), kind(**own))
+    plain = camera()
+    assert _near(kind(**own), kind(**own), plain)
+    assert not _near(kind(**own), kind(**own, gain_length_pixels=3.0), plain)
+    assert not _near(kind(**own, gain_length_pixels=3.0), kind(**own), plain)

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.state import State
+from dsis.camera import Camera
 from dsis.effects import Effect
 
 Array = NDArray[np.float64]
@@ -37,7 +38,7 @@ class Memory:
         """Return the numbers with an effect added, as remembered; None: it must be simulated."""
         null = state.null
         for known, means, change in self.changes:
-            if not _near(known, effect):
+            if not _near(known, effect, state.camera):
                 continue
             size = np.where(null.known, np.abs(change) / null.sd, 0.0)
             moved = np.where(null.known, np.abs(null.mean - means) / null.sd, 0.0) > 1.0
@@ -57,13 +58,22 @@ def words(effect: Effect) -> tuple[str, ...]:
     return tuple(value for value in values if isinstance(value, str))
 
 
-def _near(one: Effect, other: Effect) -> bool:
+def _near(one: Effect, other: Effect, camera: Camera) -> bool:
+    """Return whether two effects have the same words, and numbers that are nearly the same.
+
+    A full well matters by its distance from a level in standard deviations of the noise there.
+    """
     if type(one) is not type(other):
         return False
-    a, b = one.model_dump(), other.model_dump()
-    return all(
-        abs(a[name] - b[name]) <= _ALIKE * abs(a[name])
-        if isinstance(a[name], float) and isinstance(b[name], float)
-        else a[name] == b[name]
-        for name in a
-    )
+    a, b = dict(one), dict(other)  # all fields: some are written only where they say something
+    for name, value in a.items():
+        if not (isinstance(value, float) and isinstance(b[name], float)):
+            if value != b[name]:
+                return False
+            continue
+        size = abs(value)
+        if name == "full_well_dn":
+            size = float(camera.segments.variance_dn2(np.array([value], np.float32))[0]) ** 0.5
+        if abs(value - b[name]) > _ALIKE * size:
+            return False
+    return True

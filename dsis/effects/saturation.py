@@ -1,24 +1,37 @@
 """Saturation: a pixel holds so much charge and no more."""
 
 from collections.abc import Mapping
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, SerializerFunctionWrapHandler, model_serializer
 from scipy.special import ndtr
 
 from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, Stage
+
+_NODES, _WEIGHTS = np.polynomial.hermite_e.hermegauss(41)
+_WEIGHTS = _WEIGHTS / _WEIGHTS.sum()
 
 
 class Saturation(Effect):
     """Charge stops growing at the full well, below the white level.
 
     Q' = min(Q, full well), after shot noise: near the full well the variance falls to that of the
-    read noise and the skew turns negative.
+    read noise and the skew turns negative. Where a pixel that fills up collects less and less, the
+    limit is soft, of a softness k: Q' = full well - k ln(1 + exp((full well - Q) / k)).
     """
 
     kind: Literal["saturation"] = "saturation"
     full_well_dn: Annotated[float, Field(gt=0, examples=[5010.0])]
+    softness_dn: Annotated[float, Field(ge=0)] = 0.0
+
+    @model_serializer(mode="wrap")
+    def _without_default(self, values_of: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Return the fields; a limit that is not soft is written as ever."""
+        values = dict(values_of(self))
+        if not self.softness_dn:
+            values.pop("softness_dn", None)
+        return values
 
     stage: ClassVar[Stage] = Stage.CHARGE
     draws: ClassVar[bool] = False
@@ -40,11 +53,30 @@ class Saturation(Effect):
     def apply(self, image: Image, exposure: Exposure) -> Image:
         """Cut charge at the full well."""
         del exposure
-        return np.minimum(image, np.float32(self.full_well_dn))
+        return self._limited(image)
+
+    def _limited(self, image: Image) -> Image:
+        full = np.float32(self.full_well_dn)
+        if not self.softness_dn:
+            return np.minimum(image, full)
+        k = np.float32(self.softness_dn)
+        left: Image = full - k * np.logaddexp(np.float32(0), (full - image) / k)
+        return left
 
     def contributions(self, point: OperatingPoint) -> Mapping[str, float]:
-        """Return mean and variance of a censored normal law less those of the whole."""
+        """Return mean and variance of a censored normal law less those of the whole.
+
+        Of a soft limit, which has no closed form, by Gauss-Hermite quadrature.
+        """
         sigma = np.sqrt(point.shot_variance_dn2)
+        if self.softness_dn:
+            at = (point.signal_dn + sigma * _NODES).astype(np.float32)
+            made = self._limited(at).astype(np.float64) - point.signal_dn
+            mean = float(_WEIGHTS @ made)
+            return {
+                "level": mean,
+                "pixel_variance": float(_WEIGHTS @ (made - mean) ** 2 - sigma**2),
+            }
         if not sigma:
             return {"level": min(self.full_well_dn - point.signal_dn, 0.0), "pixel_variance": 0.0}
         z = (self.full_well_dn - point.signal_dn) / sigma

@@ -3,13 +3,21 @@
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import norm
 
 from analysis.mismatch.candidates.candidate import Candidate, Proposal, proposals
 from analysis.mismatch.clues import Clues
+from analysis.mismatch.layout import Place
 
 _UNTOLD_PERCENT = 1.0  # start where levels do not tell
 _LEAST_FLATS = 2  # on each side of a switch
+_SOFTNESS = np.geomspace(0.2, 8.0, 9)  # standard deviations of noise: a harder limit is hard
+_BEYOND = np.linspace(-1.0, 6.0, 22)
+_NU = 6.0  # of Student's t law, by which numbers depart
+_NODES, _WEIGHTS = np.polynomial.hermite_e.hermegauss(41)
+_WEIGHTS = _WEIGHTS / _WEIGHTS.sum()
+Array = NDArray[np.float64]
 
 
 def _dark_current(clues: Clues) -> Sequence[Proposal]:
@@ -64,7 +72,56 @@ def _saturation(clues: Clues) -> Sequence[Proposal]:
     found: list[Proposal] = []
     for z in (nearest, nearest + 0.5, nearest - 0.5, 0.3):
         found += proposals("saturation", ["full_well_dn"], full_well_dn=level + float(z) * sd)
-    return [*found, *proposals("saturation", ["full_well_dn"], full_well_dn=0.99 * level)]
+    found += proposals("saturation", ["full_well_dn"], full_well_dn=0.99 * level)
+    return [*found, *_soft_limits(clues, top)]
+
+
+def _soft_limits(clues: Clues, top: Place) -> list[Proposal]:
+    """Start where levels, variances and skewness put a soft limit, by a grid of well and softness.
+
+    What the limit makes of normal noise is found by Gauss-Hermite quadrature; beside it the scale
+    of the light and the slope of the variances are free, which were fitted without it.
+    """
+    off = {name: clues.excess(name) for name in ("level", "pixel_variance", "skewness")}
+    rows = [
+        (place, number, value, error)
+        for number, own in enumerate(off.values())
+        for place, (value, error) in own.items()
+        if clues.signal(place) > 0 and np.isfinite(error)
+    ]
+    if not rows:
+        return []
+    bent = off["level"]
+    signal = np.array([clues.signal(at) - bent.get(at, (0.0, 0.0))[0] for at, *_ in rows])
+    sd = np.array([float(clues.fit.line_dn2(np.array([own]))[0]) ** 0.5 for own in signal])
+    number, value, error = np.array([row[1:] for row in rows]).T
+    free = np.stack([np.where(number == 0, signal / signal.max(), 0.0), number == 1], 1)
+    free = free / error[:, np.newaxis]
+    level, unit = clues.signal(top), clues.seen.levels[top].variance_dn2 ** 0.5
+    best, found = np.inf, (0.0, 0.0)
+    for softness in unit * _SOFTNESS:
+        for full in level + np.sqrt(unit * max(softness, unit)) * _BEYOND:
+            made = soft_moments(signal, sd, float(full), float(softness))
+            own = (value - np.choose(number.astype(int), made)) / error
+            rest = own - free @ np.linalg.lstsq(free, own, rcond=None)[0]
+            misfit = float(np.log1p(rest**2 / _NU).sum())
+            if misfit < best:
+                best, found = misfit, (float(full), float(softness))
+    names = ["full_well_dn", "softness_dn"]
+    return proposals("saturation", names, full_well_dn=found[0], softness_dn=found[1])
+
+
+def soft_moments(signal: Array, sd: Array, full: float, softness: float) -> list[Array]:
+    """Return what a soft limit makes of normal noise: change of mean, log variance, skewness.
+
+    `signal` and `sd` (place,) are those without it, DN; the limit is that of `Saturation`.
+    """
+    q = signal[:, np.newaxis] + sd[:, np.newaxis] * _NODES
+    made = full - softness * np.logaddexp(0, (full - q) / softness) - signal[:, np.newaxis]
+    mean = made @ _WEIGHTS
+    away = made - mean[:, np.newaxis]
+    variance = np.maximum(away**2 @ _WEIGHTS, 1e-12)
+    return [mean, np.log(variance / sd**2), (away**3 @ _WEIGHTS) / variance**1.5]
 
 
 def skewness_below(limit: float) -> float:

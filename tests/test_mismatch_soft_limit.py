@@ -1,0 +1,77 @@
+"""A full well that is reached softly: where it starts from, and what a camera makes of it."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from analysis.mismatch.candidates import CANDIDATES
+from analysis.mismatch.candidates.response import soft_moments
+from analysis.mismatch.memory import Memory
+from dsis.effects.dual_gain_mismatch import DualGainMismatch
+from dsis.effects.saturation import Saturation
+from mismatch_recordings import InMemory, camera, recorded, state_of
+
+LEVELS = (500.0, 1500.0, 2400.0, 2850.0)
+FULL, SOFT = 3000.0, 60.0
+SLOPE, READ, BLACK = 0.5, 6.0, 64.0
+SIZE, FRAMES = 64, 8
+
+
+def _recording(seed: int, softness: float) -> InMemory:
+    """Return numpy's own shots, a limit of charge, and noise of read-out."""
+    rng = np.random.default_rng(seed)
+    made = recorded(camera(), seed, rows=SIZE, columns=SIZE, frames=FRAMES, levels=LEVELS)
+    stacks = {}
+    flats = {f"flat-{i}": level for i, level in enumerate(LEVELS)}
+    for name, level in ({"dark-0": 0.0, "dark-1": 0.0} | flats).items():
+        shape = (FRAMES, SIZE, SIZE)
+        charge = level + np.sqrt(SLOPE * level) * rng.standard_normal(shape)
+        if softness:
+            charge = FULL - softness * np.log1p(np.exp((FULL - charge) / softness))
+        noisy = BLACK + np.minimum(charge, FULL) + np.sqrt(READ) * rng.standard_normal(shape)
+        stacks[name] = np.clip(np.rint(noisy), 0, 4095).astype(np.uint16)
+    return InMemory(made.sensor, made.exposures, SIZE, SIZE, made.folder, stacks)
+
+
+def test_a_soft_limit_starts_near_what_made_it() -> None:
+    own = CANDIDATES["saturation"]
+    state = state_of(_recording(1, SOFT), camera(segments=((SLOPE, READ, None),)))
+    starts = [one.effect for one in own.propose(state.clues())]
+    soft = [one for one in starts if isinstance(one, Saturation) and one.softness_dn]
+    assert len(soft) == 1
+    assert soft[0].full_well_dn == pytest.approx(FULL, abs=2 * (SLOPE * FULL) ** 0.5)
+    assert soft[0].softness_dn == pytest.approx(SOFT, rel=0.6)
+
+
+@pytest.mark.parametrize("softness", [20.0, 80.0, 300.0])
+def test_moments_are_those_of_noise_that_is_limited(softness: float) -> None:
+    rng = np.random.default_rng(7)
+    signal, sd = np.array([2500.0, 2950.0]), np.array([36.0, 39.0])
+    mean, log_variance, skewness = soft_moments(signal, sd, FULL, softness)
+    for i in range(2):
+        q = rng.normal(signal[i], sd[i], 1_000_000)
+        made = FULL - softness * np.log1p(np.exp((FULL - q) / softness))
+        away = made - made.mean()
+        assert made.mean() - signal[i] == pytest.approx(mean[i], abs=0.15)
+        assert np.log(made.var() / sd[i] ** 2) == pytest.approx(log_variance[i], abs=0.01)
+        assert (away**3).mean() / made.std() ** 3 == pytest.approx(skewness[i], abs=0.02)
+
+
+def test_a_limit_that_is_not_soft_is_written_as_ever() -> None:
+    assert "softness_dn" not in Saturation(full_well_dn=FULL).model_dump()
+    assert Saturation(full_well_dn=FULL, softness_dn=2.0).model_dump()["softness_dn"] == 2.0
+
+
+def test_a_soft_limit_is_not_remembered_as_a_hard_one_nor_a_kink_as_a_step() -> None:
+    null = SimpleNamespace(mean=np.zeros(1), sd=np.ones(1), known=np.ones(1, bool))
+    state: Any = SimpleNamespace(null=null, camera=camera(segments=((SLOPE, READ, None),)))
+    memory = Memory()
+    memory.keep(Saturation(full_well_dn=FULL), state, np.ones(1))
+    memory.keep(DualGainMismatch(gain_error_percent=1.0), state, np.ones(1))
+    assert memory.recalled(Saturation(full_well_dn=FULL + 1), state) is not None
+    assert memory.recalled(Saturation(full_well_dn=FULL, softness_dn=9.0), state) is None
+    assert memory.recalled(Saturation(full_well_dn=FULL + 20), state) is None  # half a deviation
+    assert memory.recalled(DualGainMismatch(gain_error_percent=1.01), state) is not None
+    assert memory.recalled(DualGainMismatch(gain_error_percent=1.0, mean="kinks"), state) is None

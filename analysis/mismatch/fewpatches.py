@@ -1,5 +1,7 @@
 """A field of gains that few patches make: dust throws shadows, which are like no random field."""
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
@@ -30,24 +32,49 @@ def of_few_patches(state: State, effect: Effect) -> Denial | None:
     tells half or less of what is no white noise, far less than fields of this spectrum ever do,
     most of the sensor has no such gain.
     """
-    image = gains(state.clues()) if isinstance(effect, SmoothPrnu) else None
+    image = gains_for(state, effect)
     if image is None or not isinstance(effect, SmoothPrnu):
         return None
-    image = _middle(image)
+    why = "few patches make most of it, as no field of gains is made"
+    return unlike_drawn(image, effect, _of_nearer_side, why)
+
+
+def gains_for(state: State, effect: Effect) -> Array | None:
+    """Return the map of gains that tells a field, %; None: no field, or no map of it."""
+    image = gains(state.clues()) if isinstance(effect, SmoothPrnu) else None
+    return None if image is None else _middle(image)
+
+
+def unlike_drawn(
+    image: Array, effect: SmoothPrnu, share_of: Callable[[Array, Array], float], why: str
+) -> Denial | None:
+    """Return how a field is denied by a map that shows less of it than drawn fields do; None: not.
+
+    Parameters
+    ----------
+    image
+        The map of gains, %: (row, column).
+    effect
+        The field.
+    share_of
+        Gives the share of a field that a map shows, from the map and the field's power by
+        frequency.
+    why
+        In words.
+    """
     field = effect.sigma_percent**2 * _spectrum(image.shape, effect.length_pixels)
-    share = _of_nearer_side(image, field)
+    share = share_of(image, field)
     if share > _NORMAL:
         return None
     rng, chance = np.random.default_rng(0), []
-    root = np.sqrt(field + _white(image))
+    root = np.sqrt(field + white_of(image))
     for _ in range(_DRAWS):
         drawn = fft.rfft2(rng.standard_normal(image.shape)) * root
         seen = parts(fft.irfft2(drawn, image.shape), 1.0).pixels  # as the map's are
-        chance.append(_of_nearer_side(seen, field))
+        chance.append(share_of(seen, field))
     expected = float(np.mean(chance))
     if share > _MOST * expected or expected - share < _CLEAR * float(np.std(chance)):
         return None
-    why = "few patches make most of it, as no field of gains is made"
     return Denial(max(share / expected, 0.0), why)
 
 
@@ -57,7 +84,7 @@ def _of_nearer_side(image: Array, field: Array) -> float:
     White noise, of which the filter leaves a known part, is not counted. A smooth surface that
     patches pull with them was taken off the image: it is put back.
     """
-    white = _white(image)
+    white = white_of(image)
     gain = field / (field + white)
     lifted = fft.irfft2(fft.rfft2(image) * gain, image.shape)
     noise = white * float((fft.irfft2(gain, image.shape) ** 2).sum())
@@ -92,7 +119,7 @@ def _surface(image: Array) -> Array:
     return smooth.surface(coefficients)
 
 
-def _white(image: Array) -> float:
+def white_of(image: Array) -> float:
     """Return the variance of what neighbours do not share."""
     steps = np.diff(image, axis=1)
     return max(float((steps**2).mean()) / 2, 1e-12)

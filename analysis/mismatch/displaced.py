@@ -3,7 +3,7 @@
 Each law is of the statistics alone, whatever makes them: physics without a word, too.
 """
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 
 import numpy as np
@@ -19,6 +19,7 @@ from analysis.mismatch.fewlines import of_few_lines
 from analysis.mismatch.gathered import gathered
 from analysis.mismatch.latelight import of_late_light
 from analysis.mismatch.layout import Place
+from analysis.mismatch.leftopen import Left, left_open
 from analysis.mismatch.leftout import left_out
 from analysis.mismatch.recalibrate import code_step
 from analysis.mismatch.resolved import FAR_OFF
@@ -30,7 +31,6 @@ from analysis.mismatch.wholeframes import of_moving_parts
 from analysis.mismatch.wholelines import of_parts
 
 Array = NDArray[np.float64]
-Left = dict[tuple[Place, str], tuple[float, float]]
 _BENDS = frozenset({"nonlinearity", "dual_gain", "dual_gain_mismatch"})
 _PAIRS = {"correlation_0_1": 2, "correlation_1_0": 2, "correlation_1_1": 4}
 """How many neighbours of a pixel a correlation is that of."""
@@ -101,7 +101,7 @@ def _of_neighbours(state: State) -> Denial | None:
     Charge that is shared is not lost: the variance of sums over pixels, v (1 + sum of correlations
     with all neighbours), remains, whatever the law by which it is shared.
     """
-    left = _left(state, _PAIRS)
+    left = left_open(state, _PAIRS)
     if not left:
         return _of_charge(state)
     factors: dict[Place, float] = {}
@@ -151,7 +151,7 @@ def _of_limits(state: State) -> Denial | None:
     """
     cut = {
         place: 1 / _variance_below(brentq(lambda z, g=rest: skewness_below(z) + abs(g), *_LIMITS))
-        for (place, _), (rest, sd) in _left(state, ("skewness",)).items()
+        for (place, _), (rest, sd) in left_open(state, ("skewness",)).items()
         if abs(rest) > FAR_OFF * sd and -skewness_below(_LIMITS[1]) < abs(rest)
         if abs(rest) < -skewness_below(_LIMITS[0])
     }
@@ -202,7 +202,7 @@ def _left_of_codes(state: State) -> dict[Place, tuple[float, float]]:
         for key, mean in zip(state.vector.keys, state.null.mean, strict=True)
         if key.statistic == "code_imbalance" and key.scope == "exposure"
     }
-    left = _left(state, ("code_imbalance",))
+    left = left_open(state, ("code_imbalance",))
     return {place: (rest, expected[place]) for (place, _), (rest, _) in left.items()}
 
 
@@ -213,22 +213,6 @@ def _variance_below(limit: float) -> float:
     return below - limit * density + limit**2 * (1 - below) - mean**2
 
 
-def _left(state: State, statistics: Iterable[str]) -> Left:
-    """Return what is left of statistics that differ for certain, and its standard deviation."""
-    certain = {m.statistic for m in state.mismatches}.intersection(statistics)
-    return {
-        ((key.exposure, key.channel), key.statistic): (float(rest), float(sd))
-        for key, rest, sd, known in zip(
-            state.vector.keys,
-            state.vector.values - state.null.mean,
-            state.null.sd,
-            state.null.known,
-            strict=True,
-        )
-        if known and key.statistic in certain and key.scope == "exposure"
-    }
-
-
 def _of_colours(state: State, change: Array) -> Denial | None:
     """Return how greens that differ are denied by charge that colours share; None: they are not.
 
@@ -236,7 +220,7 @@ def _of_colours(state: State, change: Array) -> Denial | None:
     noise has a correlation r share about r / 2: along rows Gr / Gb departs by r (R - B) / G, along
     columns by as much the other way. `change` is what the effect makes of the numbers.
     """
-    left, keys = _left(state, ("correlation_0_1", "correlation_1_0")), state.vector.keys
+    left, keys = left_open(state, ("correlation_0_1", "correlation_1_0")), state.vector.keys
     if not left or set(_BESIDE) != set(state.setting.layout.channels):
         return None
     clear = np.where(state.null.known & np.isfinite(change), change, 0.0) / state.null.sd
@@ -267,7 +251,7 @@ def _of_new_lines(state: State, axis: str, without: Array) -> Denial | None:
     Of n frames the mean keeps 1 / n of their variance. Ratios of lines' variances to those of
     pixels, less one, are the same of frames and of their mean, but for the pixels' own pattern.
     """
-    left = _left(state, (f"{axis}_variance",))
+    left = left_open(state, (f"{axis}_variance",))
     if not left:
         return None
     numbers: dict[tuple[Place, str], int] = {

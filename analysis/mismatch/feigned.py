@@ -15,8 +15,7 @@ from analysis.mismatch.bank.standing import NAME as FIXED_WAVE
 from analysis.mismatch.contradicted import Denial, rival
 from analysis.mismatch.displaced import displaced
 from analysis.mismatch.edged import STATISTIC, edged, single
-from analysis.mismatch.fewpatches import of_few_patches
-from analysis.mismatch.fewwaves import of_few_waves
+from analysis.mismatch.nofield import no_field
 from analysis.mismatch.persisting import persisting
 from analysis.mismatch.recalibrate import code_step
 from analysis.mismatch.resolved import FAR_OFF
@@ -64,8 +63,7 @@ def of_another(state: State, effect: Effect, without: Array) -> Denial | None:
         or lopsided(state, kind)
         or persisting(state, kind, without)
         or carried(state, effect)
-        or of_few_patches(state, effect)
-        or of_few_waves(state, effect)
+        or no_field(state, effect)
         or displaced(state, kind, state.null.mean, without)
     )
 

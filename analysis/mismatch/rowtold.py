@@ -6,10 +6,9 @@ from functools import partial
 from math import isfinite
 
 from analysis.mismatch.contradicted import Denial, rival
-from analysis.mismatch.fewpatches import of_few_patches
-from analysis.mismatch.fewwaves import of_few_waves
 from analysis.mismatch.jumptold import PIXELS, as_pixels_show, unlike_pixels
 from analysis.mismatch.mapped import as_maps_show
+from analysis.mismatch.nofield import no_field
 from analysis.mismatch.paired import STEADY
 from analysis.mismatch.phase import WholeFrames
 from analysis.mismatch.polish import with_effects
@@ -60,9 +59,8 @@ def unlike_frames(
         return paired
     if best.kind in PIXELS:
         return unlike_pixels(state.camera, frames, best, others, partial(_explained, state))
-    fitted = best.polished.effects[0]
-    if (few := of_few_patches(state, fitted) or of_few_waves(state, fitted)) is not None:
-        return few
+    if (denial := no_field(state, best.polished.effects[0])) is not None:
+        return denial
     odds = _odds(state, frames, best.kind)
     if odds is None or odds > TOLD_APART or _any(others, _OTHER[best.kind]):
         return None

@@ -1,4 +1,4 @@
-"""A decay of the gain that is told from smooth light by the means of lines."""
+"""A decay that is told from smooth surfaces by the means of lines."""
 
 from types import SimpleNamespace as Stub
 from typing import Any
@@ -20,8 +20,10 @@ SITES = {
 }
 
 
-def _state(means: np.ndarray, rng: np.random.Generator, sites: str = "mono") -> Any:
-    """Return a recording whose map of gains has these row means beside white noise.
+def _state(
+    means: np.ndarray, rng: np.random.Generator, sites: str = "mono", seen: str = "gain"
+) -> Any:
+    """Return a recording whose map, `seen`, has these row means beside white noise.
 
     Channels of a mosaic have signals of different size.
     """
@@ -35,14 +37,15 @@ def _state(means: np.ndarray, rng: np.random.Generator, sites: str = "mono") -> 
         from_edge=plain.from_edge,
         regressors=lambda channel: Stub(scales={"gain": scales[channel]}),
     )
+    units = scales if seen == "gain" else dict.fromkeys(scales, 1.0)
     images = {
-        (channel, "gain"): (image[y::step, x::step] * scales[channel], NOISE * scales[channel])
+        (channel, seen): (image[y::step, x::step] * units[channel], NOISE * units[channel])
         for channel, (y, x) in SITES[sites].items()
     }
     return Stub(setting=Stub(layout=layout, seen=Stub(images=images)), image=image)
 
 
-def _best(state: Any) -> Any:
+def _best(state: Any, number: str = "gain_percent") -> Any:
     """Return the decay that fits the row means best, of both edges and all lengths."""
     means = state.image.mean(1) - state.image.mean()
     gains = {}
@@ -52,7 +55,7 @@ def _best(state: Any) -> Any:
             shape -= shape.mean()
             gains[float(shape @ means) ** 2 / float(shape @ shape)] = edge, length
     edge, length = gains[max(gains)]
-    return effect("line_settling", gain_percent=0.1, length_pixels=float(length), edge=edge)
+    return effect("line_settling", **{number: 0.1}, length_pixels=float(length), edge=edge)
 
 
 @pytest.mark.parametrize("degree", [2, 3, 4])
@@ -89,7 +92,23 @@ def test_a_decay_is_told(sites: str, length: float) -> None:
     assert found > 0.7 * draws
 
 
-def test_what_is_no_decay_of_the_gain_is_not_asked() -> None:
+@pytest.mark.parametrize("sites", SITES)
+def test_a_decay_of_offsets_is_told_and_a_smooth_surface_is_none(sites: str) -> None:
+    rng, draws = np.random.default_rng(6), 40
+    u, line = np.linspace(-1, 1, SHAPE[0]), np.arange(96.0)[::-1]
+    found = {"decay": 0, "surface": 0}
+    for _ in range(draws):
+        surface = np.polynomial.legendre.legval(u, [0.0, *rng.normal(size=4)])
+        for name, own in (("decay", np.exp(-line / 6)), ("surface", surface)):
+            means = own - own.mean()
+            means *= 15 * NOISE / np.sqrt(SHAPE[1]) / np.linalg.norm(means)
+            state = _state(means, rng, sites, "offset")
+            found[name] += outlined(state, _best(state, "offset_dn"))
+    assert found["decay"] > 0.7 * draws
+    assert found["surface"] <= 0.05 * draws + 5 * np.sqrt(0.05 * draws)
+
+
+def test_what_is_no_decay_is_not_asked() -> None:
     state = _state(np.zeros(96), np.random.default_rng(0))
     assert not outlined(state, effect("line_settling", offset_dn=1.0, length_pixels=5.0))
     assert not outlined(state, effect("prnu", sigma_percent=1.0))

@@ -69,29 +69,32 @@ def single(state: State, effect: Effect) -> Denial | None:
 
 
 def outlined(state: State, effect: Effect) -> bool:
-    """Return whether means of lines tell a decay of the gain from any smooth light.
+    """Return whether means of lines tell a decay, of gain or else offset, from any smooth surface.
 
     A decay over a tenth of the lines and more is nearly a polynomial of the fourth degree: of what
     is beyond that little is left to see. But it takes two numbers, the polynomial four. The
     likelihoods of both, less half of the logarithm of the lines' number for each number (Schwarz,
-    1978), decide, at odds of 20: against no light, and light of each degree along the axis.
+    1978), decide, at odds of 20: against nothing, and surfaces of each degree along the axis.
     """
-    if not isinstance(effect, LineSettling) or not effect.gain_percent:
+    if not isinstance(effect, LineSettling):
         return False
     layout, images = state.setting.layout, state.setting.seen.images
+    gain = bool(effect.gain_percent)
+    seen, length = ("gain", effect.gain_length) if gain else ("offset", effect.length_pixels)
     axis = int(effect.edge in ("left", "right"))
     size = (layout.rows, layout.columns)[axis]
-    parts: list[tuple[Array, Array]] = []  # means, and light of each degree and the decay
+    parts: list[tuple[Array, Array]] = []  # means, and surfaces of each degree and the decay
     for (channel, name), (image, noise) in images.items():
-        if name != "gain":
+        if name != seen:
             continue
         distance = layout.from_edge(channel, effect.edge)
         place = 2 * distance / (size - 1) - 1
-        light = np.polynomial.legendre.legvander(place, SMOOTH_DEGREE)[:, 1:]
-        shapes = np.column_stack([light, np.exp(-distance / effect.gain_length)])
-        means, scale = image.mean(1 - axis), layout.regressors(channel).scales["gain"]
+        smooth = np.polynomial.legendre.legvander(place, SMOOTH_DEGREE)[:, 1:]
+        shapes = np.column_stack([smooth, np.exp(-distance / length)])
+        means = image.mean(1 - axis)
+        scale = layout.regressors(channel).scales["gain"] if gain else 1.0
         # Lines scatter beyond the noise of their pixels, in what neither explains. All channels
-        # have one light and one decay, and each its own mean.
+        # have one surface and one decay, and each its own mean.
         error = line_square(beyond_smooth(means), noise, image.shape[1 - axis]) ** 0.5
         parts.append(((means - means.mean()) / error, (shapes - shapes.mean(0)) * scale / error))
     if not parts:

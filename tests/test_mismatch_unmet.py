@@ -61,6 +61,19 @@ def test_memory_along_rows_is_denied_by_as_much_along_columns(columns: float, de
     assert said is None or "the next pixel of the column" in said.why
 
 
+@pytest.mark.parametrize(("columns", "denied"), [(SHARE, True), (0.0, False)])
+def test_a_residue_is_denied_by_neighbours_that_are_as_much_alike_along_columns(
+    columns: float, denied: bool
+) -> None:
+    """Along rows a residue, whose codes a level hides; along columns what noise has in common."""
+    residue = registry()["adc_memory"](step_dn=-4.0, period_codes=64, at_code=0.0)
+    state = _state(residue, rows=SHARE, columns=columns)
+    without = state.camera.model_copy(update={"effect": ()})
+    said = mirrored(state, residue, state.predictor(8).mean(without))
+    assert (said is not None) == denied
+    assert said is None or "the next pixel of the column" in said.why
+
+
 @pytest.mark.parametrize(
     ("together", "denied"), [(0.0, False), (0.15, False), (0.8, True), (1.5, True)]
 )

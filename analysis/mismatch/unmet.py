@@ -10,6 +10,7 @@ from analysis.mismatch.resolved import CLEAR, LEAST_CHANGE, MINOR, changed, clea
 from analysis.mismatch.state import State
 from analysis.mismatch.words import statistic_words
 from dsis.effects import Effect, registry
+from dsis.effects.adc_memory import AdcMemory
 from dsis.effects.readout_memory import ReadoutMemory
 
 Array = NDArray[np.float64]
@@ -96,11 +97,12 @@ def mirrored(state: State, effect: Effect, without: Array) -> Denial | None:
     """Return how memory along one axis is denied by what is left along the other; None: it is not.
 
     What makes neighbours alike in both directions, a filter or charge that is shared, would explain
-    both in one word. `without` are the numbers predicted without the memory.
+    both in one word; a converter's residue is of the sample before. `without` are the numbers
+    predicted without the memory.
     """
-    if not isinstance(effect, ReadoutMemory):
+    if not isinstance(effect, (ReadoutMemory, AdcMemory)):
         return None
-    lag = effect.lag_pixels
+    lag = effect.lag_pixels if isinstance(effect, ReadoutMemory) else 1
     names = [f"correlation_0_{lag}", f"correlation_{lag}_0"]
     own, across = names if effect.along == "rows" else names[::-1]
     departures, _ = off_without(state, without)

@@ -11,7 +11,7 @@ from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.state import State
 
 Array = NDArray[np.float64]
-PARTS = 4  # of a frame: a wave has two phases, beside what all have
+_PARTS = 4  # of a frame: a wave has two phases, beside what all have
 _OF_LIGHT = {"flicker": True, "black_level_drift": False}
 _NAMES = {"row": "upper and lower parts", "column": "left and right parts"}
 _UNLIKE = 0.3  # of what moves a frame, by which a part may depart from it
@@ -55,11 +55,11 @@ class _Parts:
     @property
     def whole(self) -> float:
         """Variance of the mean of all parts, beyond noise."""
-        return float(self.covariance.mean()) - self.noise / PARTS
+        return float(self.covariance.mean()) - self.noise / _PARTS
 
 
 def _denied(state: State, axis: Axis, without: Array, *, of_light: bool) -> Denial | None:
-    total, inverse = np.zeros((PARTS, PARTS)), 0.0
+    total, inverse = np.zeros((_PARTS, _PARTS)), 0.0
     noise = claimed = size = 0.0
     for exposure in state.setting.layout.uniform:
         own = _parts(state, exposure.name, axis, of_light=of_light)
@@ -73,13 +73,13 @@ def _denied(state: State, axis: Axis, without: Array, *, of_light: bool) -> Deni
         size += weight * scale
         inverse += (weight * scale) ** 2 / own.free
     free = size**2 / inverse if inverse else 0.0  # Satterthwaite (1946)
-    if claimed <= 0 or free < PARTS:
+    if claimed <= 0 or free < _PARTS:
         return None
-    unlike = _UNLIKE**2 * max(float(total.mean()) - noise / PARTS, 0.0)
-    one, apart = np.ones(PARTS), total + unlike * np.eye(PARTS)
+    unlike = _UNLIKE**2 * max(float(total.mean()) - noise / _PARTS, 0.0)
+    one, apart = np.ones(_PARTS), total + unlike * np.eye(_PARTS)
     left = 1 / float(one @ np.linalg.solve(apart, one))
-    usual = left * free / (free - PARTS + 1) - (noise + unlike) / PARTS
-    chance = beta.cdf(left / float(apart.mean()), (free - PARTS + 1) / 2, (PARTS - 1) / 2)
+    usual = left * free / (free - _PARTS + 1) - (noise + unlike) / _PARTS
+    chance = beta.cdf(left / float(apart.mean()), (free - _PARTS + 1) / 2, (_PARTS - 1) / 2)
     if usual > _MOST * claimed or chance > _CHANCE:
         return None
     why = f"{_NAMES[axis]} move against each other, and take the mean of the frame along"
@@ -95,16 +95,16 @@ def _parts(state: State, exposure: str, axis: Axis, *, of_light: bool) -> _Parts
         return None
     parts = _merged(own)
     mean = parts.mean(0)
-    unit = light + (mean - mean.mean()) if of_light else np.ones(PARTS)
+    unit = light + (mean - mean.mean()) if of_light else np.ones(_PARTS)
     moved = (parts - mean) / np.maximum(unit, _UNLIKE * light)
     covariance = moved.T @ moved / (own.frames - 1)
-    noise = own.noise_dn2 * PARTS / own.fixed.size / light**2
+    noise = own.noise_dn2 * _PARTS / own.fixed.size / light**2
     return _Parts(covariance, noise, own.frames - 1) if covariance.any() else None
 
 
 def _merged(own: LineMeans) -> Array:
     """Return the means of few parts of each frame: (frame, part), DN."""
-    return np.asarray(own.parts.reshape(own.frames, PARTS, -1).mean(2))
+    return np.asarray(own.parts.reshape(own.frames, _PARTS, -1).mean(2))
 
 
 def _unexplained(state: State, exposure: str, without: Array) -> float:

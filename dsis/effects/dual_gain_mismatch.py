@@ -1,10 +1,10 @@
 """Dual-gain mismatch: the gains of two read-out paths disagree."""
 
 from collections.abc import Mapping
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
-from pydantic import Field, SerializerFunctionWrapHandler, model_serializer
+from pydantic import Field
 
 from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, ReadOut, Stage
 
@@ -19,15 +19,9 @@ class DualGainMismatch(Effect):
 
     kind: Literal["dual_gain_mismatch"] = "dual_gain_mismatch"
     gain_error_percent: Annotated[float, Field(gt=-50, lt=50, examples=[1.0])]
-    mean: Literal["steps", "kinks"] = "steps"
-
-    @model_serializer(mode="wrap")
-    def _without_default(self, values_of: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Return the fields; a mean that steps is written as ever."""
-        values = dict(values_of(self))
-        if self.mean == "steps":
-            values.pop("mean", None)
-        return values
+    mean: Annotated[Literal["steps", "kinks"], Field(exclude_if=lambda mean: mean == "steps")] = (
+        "steps"
+    )
 
     stage: ClassVar[Stage] = Stage.READ_OUT
     rank: ClassVar[int] = -50  # the path's amplifier scales its read noise; lines come later

@@ -1,10 +1,11 @@
 """Quantisation: codes coarser than one DN."""
 
 from collections.abc import Mapping
-from typing import Annotated, Any, ClassVar, Literal, Self
+from operator import not_
+from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
-from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
+from pydantic import Field, model_validator
 
 from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, ReadOut, Stage
 
@@ -22,7 +23,7 @@ class Quantisation(Effect):
 
     kind: Literal["quantisation"] = "quantisation"
     step_dn: Annotated[float, Field(ge=1, examples=[4.0])]
-    phase_dn: Annotated[int, Field(ge=0)] = 0
+    phase_dn: Annotated[int, Field(ge=0, exclude_if=not_)] = 0
 
     stage: ClassVar[Stage] = Stage.CODE
     rank: ClassVar[int] = 60
@@ -49,14 +50,6 @@ class Quantisation(Effect):
             message = f"phase_dn is {self.phase_dn}, must be below step_dn = {self.step_dn:g}"
             raise ValueError(message)
         return self
-
-    @model_serializer(mode="wrap")
-    def _without_no_phase(self, values_of: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Return the fields; multiples of the step are written as ever, without their phase."""
-        values = dict(values_of(self))
-        if not self.phase_dn:
-            values.pop("phase_dn", None)
-        return values
 
     def unfit_for(self, read_out: ReadOut) -> str:
         """Return why a camera cannot have this effect: no code is as large as its phase."""

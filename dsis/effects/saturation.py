@@ -1,10 +1,11 @@
 """Saturation: a pixel holds so much charge and no more."""
 
 from collections.abc import Mapping
-from typing import Annotated, Any, ClassVar, Literal
+from operator import not_
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
-from pydantic import Field, SerializerFunctionWrapHandler, model_serializer
+from pydantic import Field
 from scipy.special import ndtr
 
 from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, Stage
@@ -23,15 +24,7 @@ class Saturation(Effect):
 
     kind: Literal["saturation"] = "saturation"
     full_well_dn: Annotated[float, Field(gt=0, examples=[5010.0])]
-    softness_dn: Annotated[float, Field(ge=0)] = 0.0
-
-    @model_serializer(mode="wrap")
-    def _without_default(self, values_of: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Return the fields; a limit that is not soft is written as ever."""
-        values = dict(values_of(self))
-        if not self.softness_dn:
-            values.pop("softness_dn", None)
-        return values
+    softness_dn: Annotated[float, Field(ge=0, exclude_if=not_)] = 0.0
 
     stage: ClassVar[Stage] = Stage.CHARGE
     draws: ClassVar[bool] = False

@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from analysis.figures import ALARM, COLOURS, GREY, INK
 from analysis.figures_camera import CHANNEL_COLOURS
@@ -24,14 +25,19 @@ def draw(figure: Figure, shown: Mapping[str, Sequence[Series]]) -> None:
         for one in channels:
             _series(axes, one)
         _bands(axes, channels[0])
-        axes.set_title(name, loc="left")
-        axes.set_xlabel("frame")
-        axes.xaxis.get_major_locator().set_params(integer=True)
-        axes.grid(visible=True)
-        axes.set_axisbelow(True)
+        by_frame(axes, name)
     panels[0].set_ylabel("frame mean less its mean, DN")
     handles = panels[-1].get_legend_handles_labels()
     figure.legend(*handles, loc="outside lower center", ncols=min(len(handles[0]), 6))
+
+
+def by_frame(axes: Axes, title: str) -> None:
+    """Let a panel have a title, and frames along its axis."""
+    axes.set_title(title, loc="left")
+    axes.set_xlabel("frame")
+    axes.xaxis.set_major_locator(MaxNLocator("auto", steps=[1, 2, 2.5, 5, 10], integer=True))
+    axes.grid(visible=True)
+    axes.set_axisbelow(True)
 
 
 def _series(axes: Axes, one: Series) -> None:

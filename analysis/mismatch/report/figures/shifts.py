@@ -7,6 +7,7 @@ from matplotlib.figure import Figure
 
 from analysis.figures import ALARM, COLOURS, GREY
 from analysis.mismatch.evidence import Shift
+from analysis.mismatch.report.figures.series import by_frame
 
 SIZE_INCHES = (9.6, 2.9)
 _SPREAD = 2.0  # standard errors: the bars
@@ -34,10 +35,6 @@ def draw(figure: Figure, shown: Mapping[str, Shift]) -> None:
                 capsize=2,
                 label=f"{label}, \u00b1 2 se",
             )
-        axes.set_title(name, loc="left")
-        axes.set_xlabel("frame")
-        axes.xaxis.get_major_locator().set_params(integer=True)
-        axes.grid(visible=True)
-        axes.set_axisbelow(True)
+        by_frame(axes, name)
     panels[0].set_ylabel("shift from the mean, pixels")
     figure.legend(*panels[-1].get_legend_handles_labels(), loc="outside lower center", ncols=2)

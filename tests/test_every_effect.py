@@ -72,9 +72,14 @@ STRONG: dict[str, tuple[dict[str, object], ...]] = {
         {"gain_percent": 40.0, "edge": "bottom", "length_pixels": 4.0},
         {"offset_dn": 300.0, "edge": "right"},
     ),
+    "nonlinearity": (
+        {"percent_full_scale": 3.0, "exponent": 4.0},
+        {"percent_full_scale": -3.0, "exponent": -0.3},
+    ),
     "saturation": ({"softness_dn": 60.0},),
     "dual_gain_mismatch": ({"gain_error_percent": 5.0, "mean": "kinks"},),
     "tap_mismatch": (
+        {"gain_percent": 40.0, "regions": "top_bottom", "seam": 0.3},
         {"gain_percent": 40.0, "regions": "even_odd_columns"},
         {"gain_percent": 40.0, "regions": "even_odd_rows"},
     ),

@@ -45,7 +45,7 @@ def _state(rho: float, pattern: float, located: bool = True) -> Any:
 WITHOUT = np.array([0.0, 1.0])
 
 
-@pytest.mark.parametrize("kind", ["dsnu", "prnu"])
+@pytest.mark.parametrize("kind", ["dsnu", "prnu", "hot_pixels"])
 @pytest.mark.parametrize("rho", [0.03, 0.1])
 def test_frames_that_are_alike_are_no_pattern(kind: str, rho: float) -> None:
     """Their mean varies by 1 + 2 rho 4 / 6: four of six frames follow another one."""

@@ -21,6 +21,7 @@ from analysis.mismatch.recalibrate import code_step
 from analysis.mismatch.resolved import FAR_OFF
 from analysis.mismatch.rivalled import rivalled
 from analysis.mismatch.state import State
+from analysis.mismatch.unequal import unequal
 from analysis.mismatch.uneven import uneven
 from dsis.effects import Effect
 from dsis.effects.black_level_drift import BlackLevelDrift
@@ -28,7 +29,11 @@ from dsis.effects.readout_memory import ReadoutMemory
 from dsis.measures.spikes import variance_of_quartiles
 
 Array = NDArray[np.float64]
-_MAPS = {"dsnu": ("offset", "offset alone"), "prnu": ("gain", "gain alone")}
+_MAPS = {
+    "dsnu": ("offset", "offset alone"),
+    "prnu": ("gain", "gain alone"),
+    "hot_pixels": ("time", "time alone"),
+}
 _AXES = {"row_fpn": "rows", "column_fpn": "columns", "row_prnu": "rows", "column_prnu": "columns"}
 _GROWING = frozenset({"row_prnu", "column_prnu"})
 _CLEAR = 5.0  # standard errors of what stands out
@@ -58,6 +63,7 @@ def of_another(state: State, effect: Effect, without: Array) -> Denial | None:
         or rivalled(state, effect)
         or heated(state, kind)
         or wandering(state, effect)
+        or unequal(state, effect, without)
         or uneven(state, effect)
         or coded(state, kind, without)
         or lopsided(state, kind)
@@ -134,19 +140,28 @@ def _in_maps(
     kind: str,
     channel: str,
 ) -> float:
-    """Return the same of a map over all exposures, of offsets or of gains.
+    """Return the same of a map over all exposures, of offsets, of gains or of what grows with time.
 
-    Mean frames count by their inverse variances, for gains times the signal, too.
+    Mean frames count by their inverse variances, and by the square of the signal or the time.
     """
     whole = more = 0.0
     for (name, own), level in state.setting.seen.levels.items():
         if own != channel or name not in numbers or not level.variance_dn2 > 0:
             continue
-        row = 1.0 if kind == "dsnu" else max(state.calibrated.fit.signal_dn[name, own], 0.0)
+        row = _counted_by(state, kind, name, own)
         weight = row**2 * len(numbers[name]) / level.variance_dn2
         whole += weight
         more += weight * _in_means(left.get((name, own), 0.0), len(numbers[name]))
     return more / whole if whole > 0 else 0.0
+
+
+def _counted_by(state: State, kind: str, name: str, channel: str) -> float:
+    """Return what an exposure's offsets are multiplied by in a pattern's map."""
+    if kind == "dsnu":
+        return 1.0
+    if kind == "prnu":
+        return max(state.calibrated.fit.signal_dn[name, channel], 0.0)
+    return next(e.exposure_time_s for e in state.setting.layout.exposures if e.name == name)
 
 
 def stepped(state: State, kind: str) -> Denial | None:

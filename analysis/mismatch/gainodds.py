@@ -30,6 +30,7 @@ _SHORTEST = 2.5  # pixels: fields that are shorter are white there
 _DECAYS = 10  # lengths
 _REACH = 1 / 8  # of the sensor: what is longer, of decays and fields, is a smooth surface
 _MOST_LINES = 128  # of the shorter side
+_PARTS = 12  # of the lines: halves, and where else amplifiers' parts may meet
 _LEAST = 4  # lines, fewer of which hold no frequency of a field
 
 
@@ -37,8 +38,8 @@ class Cause(StrEnum):
     """What makes a gain uneven."""
 
     LIGHT = "light that falls off or leans"
-    HALVES_OF_ROWS = "upper and lower halves"
-    HALVES_OF_COLUMNS = "left and right halves"
+    HALVES_OF_ROWS = "an upper and a lower part"
+    HALVES_OF_COLUMNS = "a left and a right part"
     LEFT = "a decay from the left"
     RIGHT = "a decay from the right"
     TOP = "a decay from the top"
@@ -237,8 +238,8 @@ def _shapes(rows: int, columns: int) -> Mapping[Cause, tuple[Array, ...]]:
     light += [lean, [fall, lean[0]], [fall, lean[1]], [fall, *lean], [*lean, *bow]]
     made: dict[Cause, list[list[Array]]] = {
         Cause.LIGHT: light,
-        Cause.HALVES_OF_ROWS: [[of_rows(down.halves)]],
-        Cause.HALVES_OF_COLUMNS: [[of_columns(along.halves)]],
+        Cause.HALVES_OF_ROWS: [[of_rows(own)] for own in down.parts],
+        Cause.HALVES_OF_COLUMNS: [[of_columns(own)] for own in along.parts],
         Cause.TOP: [[of_rows(own)] for own in down.decays],
         Cause.BOTTOM: [[of_rows(own[::-1])] for own in down.decays],
         Cause.LEFT: [[of_columns(own)] for own in along.decays],
@@ -256,5 +257,6 @@ class _Lines:
     def __init__(self, size: int) -> None:
         lengths: Array = np.geomspace(1.0, max(size * _REACH, 2.0), _DECAYS)
         self.place = (np.arange(size) - (size - 1) / 2) / (size / 2)
-        self.halves = np.where(np.arange(size) < size / 2, -1.0, 1.0)
+        seams = sorted({round(size * share / _PARTS) for share in range(1, _PARTS)} - {0, size})
+        self.parts = [np.where(np.arange(size) < seam, -1.0, 1.0) for seam in seams]
         self.decays = np.exp(np.arange(size, dtype=np.float64) / -lengths[:, None])

@@ -150,10 +150,11 @@ def _shapes(
 
 
 def _halves(clues: Clues, effect: TapMismatch, channel: str, shape: tuple[int, ...]) -> Array:
-    """Return the second half of the sensor beside the first, as a channel's pixels see it."""
+    """Return the second part of the sensor beside the first, as a channel's pixels see it."""
     axis = 1 - _AXIS[effect.regions]
     size = (clues.layout.rows, clues.layout.columns)[axis]
     step = 1 if len(clues.layout.sites) == 1 else 2
-    second = 2 * (clues.layout.sites[channel][axis] + step * np.arange(shape[axis])) >= size
+    lines = clues.layout.sites[channel][axis] + step * np.arange(shape[axis])
+    second = lines >= effect.seam * size
     whole = np.broadcast_to(second if axis == 1 else second[:, np.newaxis], shape)
     return np.asarray(whole - whole.mean())

@@ -8,17 +8,21 @@ from pydantic import Field
 
 from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, Stage
 
+_MIDDLE = 0.5
+
 
 class TapMismatch(Effect):
     """Two amplifiers of unequal gain read two regions of the sensor.
 
     v = Q (1 - g / 2) in the first region and Q (1 + g / 2) in the second: the left and right or
     upper and lower halves, or the even and odd columns or rows. Charge and its noise are scaled.
+    Parts that are no halves meet at the seam, a share of all columns or rows.
     """
 
     kind: Literal["tap_mismatch"] = "tap_mismatch"
     gain_percent: Annotated[float, Field(gt=-100, lt=100, examples=[1.0])]
     regions: Literal["left_right", "top_bottom", "even_odd_columns", "even_odd_rows"] = "left_right"
+    seam: Annotated[float, Field(gt=0, lt=1, exclude_if=_MIDDLE.__eq__)] = _MIDDLE
 
     stage: ClassVar[Stage] = Stage.READ_OUT
     rank: ClassVar[int] = -200  # before the read noise of the amplifier
@@ -45,9 +49,9 @@ class TapMismatch(Effect):
         (rows, columns), y, x = grid.sensor_shape, grid.row_numbers(), grid.column_numbers()
         match self.regions:
             case "left_right":
-                second = 2 * x >= columns
+                second = x >= self.seam * columns
             case "top_bottom":
-                second = 2 * y >= rows
+                second = y >= self.seam * rows
             case "even_odd_columns":
                 second = x % 2 == 1
             case "even_odd_rows":

@@ -1,6 +1,7 @@
 """What mean frames show: fixed patterns, shading, taps, glow."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from math import exp, log, sqrt
 
 import numpy as np
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 from analysis.mismatch.bank.seams import WHOLE
 from analysis.mismatch.bank.together import TOGETHER
 from analysis.mismatch.candidates.candidate import Candidate, Proposal, proposals
+from analysis.mismatch.candidates.parts import unequal_parts
 from analysis.mismatch.clues import Clues, alike
 from analysis.mismatch.gainmap import mean_frame
 from analysis.mismatch.layout import Layout, Place
@@ -161,6 +163,13 @@ def _taps(clues: Clues) -> Sequence[Proposal]:
                 "tap_mismatch", ["gain_percent"], ["gain_percent"], gain_percent=gain,
                 regions=regions,
             )  # fmt: skip
+    for regions, axis in (("top_bottom", 0), ("left_right", 1)):
+        parts = unequal_parts(clues, axis)
+        if parts is not None:
+            name = "gain_percent"
+            start = {name: 100 * parts.step, "regions": regions, "seam": parts.seam}
+            own = proposals("tap_mismatch", [name], [name], **start)
+            found += [replace(one, best_of=parts.tried) for one in own]
     return found
 
 

@@ -9,8 +9,11 @@ from scipy.stats import norm
 from analysis.mismatch.candidates.candidate import Candidate, Proposal, proposals
 from analysis.mismatch.clues import Clues
 from analysis.mismatch.layout import Place
+from dsis.effects.nonlinearity import bend_peak, bend_shape
 
 _UNTOLD_PERCENT = 1.0  # start where levels do not tell
+_LEAST_LEVELS = 3  # two of them are told by the light's scale and a parabola
+_EXPONENTS = np.geomspace(0.2, 16.0, 20) - 1  # of a bend: from a power law to a knee
 _LEAST_FLATS = 2  # on each side of a switch
 _SOFTNESS = np.geomspace(0.2, 8.0, 9)  # standard deviations of noise: a harder limit is hard
 _BEYOND = np.linspace(-1.0, 6.0, 22)
@@ -34,23 +37,36 @@ def _dark_current(clues: Clues) -> Sequence[Proposal]:
 
 
 def _nonlinearity(clues: Clues) -> Sequence[Proposal]:
-    """Solve level residual = a S (0.85 F - S) beside a change of the light's scale.
+    """Solve level residual = c u (1 - u^k) / k beside the light's scale, u = S / (0.85 F).
 
-    Where light is unknown only variances bend: it is tried both ways.
+    Once with k = 1 and, where levels are enough, once with the k that fits best. Where light is
+    unknown only variances bend: it is tried both ways.
     """
-    full = clues.layout.white_dn - clues.layout.black_dn
+    end = 0.85 * (clues.layout.white_dn - clues.layout.black_dn)
     rows = [
         (clues.signal(place), value, sd)
         for place, (value, sd) in clues.excess("level").items()
         if clues.signal(place) > 0
     ]
-    if len({round(s, 1) for s, _, _ in rows}) < 3:
+    signals = len({round(s, 1) for s, _, _ in rows})
+    if signals < _LEAST_LEVELS:
         return _bends(_UNTOLD_PERCENT) + _bends(-_UNTOLD_PERCENT)
-    s, value, sd = np.array(rows).T
-    design = np.stack([s * (0.85 * full - s), s], 1) / sd[:, None]
-    bend = float(np.linalg.lstsq(design, value / sd, rcond=None)[0][0])
-    percent = 100 * bend * (0.85 * full / 2) ** 2 / full
-    return _bends(float(np.clip(percent, -12, 12)))
+    u, value, sd = np.array(rows).T
+    u, value = u / end, value / sd
+    fits = []
+    for exponent in (1.0, *_EXPONENTS.tolist()):
+        shape = bend_shape(u, exponent) / bend_peak(exponent)
+        design = np.stack([shape, u], 1) / sd[:, None]
+        found = np.linalg.lstsq(design, value, rcond=None)[0]
+        misfit = float(((value - design @ found) ** 2).sum())
+        fits.append((misfit, exponent, 85 / end * float(found[0])))
+    parabola = _bends(float(np.clip(fits[0][2], -12, 12)))
+    if signals == _LEAST_LEVELS:
+        return parabola
+    _, exponent, percent = min(fits[1:])
+    names = ["percent_full_scale", "exponent"]
+    start = dict(zip(names, (float(np.clip(percent, -12, 12)), exponent), strict=True))
+    return parabola + proposals("nonlinearity", names, names, **start)
 
 
 def _bends(percent: float) -> list[Proposal]:

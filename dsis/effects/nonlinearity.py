@@ -13,6 +13,7 @@ from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, Stage
 _END = 0.85  # of full scale: where the straight line ends
 _LOW = 1e-4  # of the line's length: what falls below only may be a law's steep beginning
 _PARABOLA = 1.0
+_LOGARITHM = 1e-6  # exponents as small are that of -u ln u, to float32
 _NODES, _WEIGHTS = np.polynomial.hermite_e.hermegauss(41)
 _WEIGHTS = _WEIGHTS / _WEIGHTS.sum()
 
@@ -100,18 +101,18 @@ class Nonlinearity(Effect):
 def bend_shape(u: NDArray[np.float64], exponent: float) -> NDArray[np.float64]:
     """Return u (1 - u^k) / k for u > 0; -u ln u where k is 0."""
     logs = np.log(u)
-    return -u * (np.expm1(exponent * logs) / exponent if exponent else logs)
+    return -u * (np.expm1(exponent * logs) / exponent if abs(exponent) > _LOGARITHM else logs)
 
 
 def bend_peak(exponent: float) -> float:
     """Return the largest u (1 - u^k) / k of u from 0 to 1: at u^k = 1 / (1 + k)."""
-    at = np.exp(-np.log1p(exponent) / exponent) if exponent else np.exp(-1)
+    at = np.exp(-np.log1p(exponent) / exponent if abs(exponent) > _LOGARITHM else -1.0)
     return float(at / (1 + exponent))
 
 
 def _slope(u: float, exponent: float) -> float:
     """Return the slope of u (1 - u^k) / k."""
-    if not exponent:
+    if abs(exponent) <= _LOGARITHM:
         return float(-np.log(u) - 1)
     power = np.expm1(exponent * np.log(u))
     return float(-power / exponent - power - 1)
@@ -136,6 +137,8 @@ def _powers(signal: Image, size: float, exponent: float, end: float, full_scale:
         bend = 0.0
         if u > 0:
             logs = np.log(u)
-            bend = -u * (np.expm1(exponent * logs) / exponent if exponent != 0 else logs)
+            bend = -u * (
+                np.expm1(exponent * logs) / exponent if abs(exponent) > _LOGARITHM else logs
+            )
         out[i] = signal[i] + np.float32(size * bend)
     return out

@@ -84,3 +84,23 @@ def test_noise_of_lines_stays_beside_samples_that_explain_little_of_it(kind: str
 def test_other_effects_are_not_asked(kind: str) -> None:
     state = _state("MONO", 2, 2, 0.15, 0.0)
     assert of_alike_samples(state, kind, state.vector.values, state.null.mean) is None
+
+
+def test_blocks_of_read_out_are_no_noise_of_columns() -> None:
+    """Offsets of blocks, new in each frame, are a smaller share of the noise of bright flats."""
+    true, side = camera(), 8
+    recording = recorded(true, 6, rows=96, columns=128, levels=FEW_LEVELS)
+    assert recording.stacks is not None
+    for i, (name, frames) in enumerate(recording.stacks.items()):
+        rng = np.random.default_rng([11, i])
+        sd = (SLOPE * SIGNALS[name] + READ) ** 0.5
+        blocks = rng.normal(0, 0.8, (len(frames), 96 // side, 128 // side))
+        made = rng.normal(0, sd, frames.shape) + blocks.repeat(side, 1).repeat(side, 2)
+        codes = np.rint(BLACK + SIGNALS[name] + made)
+        recording.stacks[name] = np.clip(codes, 0, 4095).astype(np.uint16)
+    state = state_of(recording, true)
+    for kind in KINDS:
+        mean = _explained(state, kind)
+        found = of_alike_samples(state, kind, mean, state.null.mean)
+        assert found is not None
+        assert found.share < 0.5

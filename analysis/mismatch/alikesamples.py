@@ -70,6 +70,8 @@ class _Alike:
         By place: at one and at two pixels of the sensor.
     far
         Of a channel's pixels at farther distances, or of the next colour's, all exposures together.
+    whole
+        Of a channel's pixels at the distances of `near`, all exposures together.
     noise
         Variance of a pixel by place.
     """
@@ -78,6 +80,7 @@ class _Alike:
     line: str
     near: dict[Place, dict[float, float]]
     far: dict[str, dict[float, float]]
+    whole: dict[str, dict[float, float]]
     noise: dict[Place, float]
 
     @classmethod
@@ -87,6 +90,7 @@ class _Alike:
         step = 1 if state.setting.layout.channels == ("MONO",) else 2
         near: dict[Place, dict[float, float]] = {}
         far: dict[str, dict[float, float]] = {}
+        whole: dict[str, dict[float, float]] = {}
         left = state.vector.values - state.null.mean
         for key, rest, known in zip(state.vector.keys, left, state.null.known, strict=True):
             if not known or key.statistic not in called:
@@ -96,10 +100,10 @@ class _Alike:
                 near.setdefault((key.exposure, key.channel), {})[distance] = float(rest)
             elif key.statistic == _FARTHER and key.detail.startswith(f"{line}s "):
                 distance = float(key.detail.split()[1])
-                if distance * step > len(_NEXT[line]):
-                    far.setdefault(key.channel, {})[distance] = float(rest)
+                own = far if distance * step > len(_NEXT[line]) else whole
+                own.setdefault(key.channel, {})[distance] = float(rest)
         noise = {at: level.variance_dn2 for at, level in state.setting.seen.levels.items()}
-        return cls(state.setting.layout, line, near, far, noise)
+        return cls(state.setting.layout, line, near, far, whole, noise)
 
     def feigned(self, key: Key) -> float | None:
         """Return by which share of itself the variance of lines' means is larger; None: unknown."""
@@ -133,7 +137,20 @@ class _Alike:
     def _sum(self, place: Place, farther: str, between: float) -> float:
         samples = self.layout.columns if self.line == "row" else self.layout.rows
         samples //= 1 if self.layout.channels == ("MONO",) else 2
-        every = {**self.far.get(farther, {}), **self.near.get(place, {})}
+        scale = 1.0 if between else self._strength(place)
+        far = {k: scale * rho for k, rho in self.far.get(farther, {}).items()}
+        every = {**far, **self.near.get(place, {})}
         return 2 * sum(
             (1 - k / samples) * rho for k, rho in every.items() if k % 1 == between and k < samples
         )
+
+    def _strength(self, place: Place) -> float:
+        """Return how much more alike an exposure's near samples are than those of all exposures.
+
+        What is alike in darks is a smaller share of the noise of flats: farther samples, which only
+        all exposures together tell, are taken to be more alike in darks by as much.
+        """
+        near, whole = self.near.get(place, {}), self.whole.get(place[1], {})
+        both = near.keys() & whole.keys()
+        mean = sum(whole[k] for k in both)
+        return max(sum(near[k] for k in both) / mean, 0.0) if both and mean > 0 else 1.0

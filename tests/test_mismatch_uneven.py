@@ -68,6 +68,30 @@ def test_dark_current_is_believed_alone_and_beside_a_glow(growth: Any) -> None:
     assert uneven(state, registry()["dark_current"](dn_per_s=RATE)) is None
 
 
+def _few(share: float, rate: float, seed: int) -> Any:
+    """Return the growth of few pixels, DN, that is `rate` on average."""
+    own = np.random.default_rng(seed).exponential(1.0, (64, 96))
+    own *= np.random.default_rng([seed, 1]).random((64, 96)) < share
+    return own / own.mean() * rate * TIME_S
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_few_pixels_that_grow_are_no_dark_current(seed: int) -> None:
+    growth = _few(0.02, RATE, seed)
+    for others in ((), (registry()["hot_pixels"](pixel_fraction=0.002, mean_dn_per_s=30.0),)):
+        said = uneven(_state(growth, "time", *others, left=(0.0, 0.0), seed=seed), DARK_CURRENT)
+        assert said is not None
+        assert "most pixels grow" in said.why
+        assert said.share < 0.2
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_dark_current_is_believed_beside_hot_pixels(seed: int) -> None:
+    hot = registry()["hot_pixels"](pixel_fraction=0.02, mean_dn_per_s=2 * RATE / 0.02)
+    growth = RATE * TIME_S + _few(0.02, 2 * RATE, seed)
+    assert uneven(_state(growth, "time", hot, left=(0.0, 0.0), seed=seed), DARK_CURRENT) is None
+
+
 def test_another_effect_or_one_that_has_its_mean_denies_nothing() -> None:
     assert uneven(_state(_glow(0.1)), registry()["row_noise"](sigma_dn=1.0)) is None
     assert uneven(_state(_glow(0.1)), None) is None

@@ -34,10 +34,16 @@ def uneven(state: State, effect: Effect | None) -> Denial | None:
     the surface's. Where none is certain by itself, a glow of the same mean must be denied by the
     map, at odds of 20. Beside a glow or hot pixels that are named nothing is said, for the map has
     their mean too - but that a glow may fall off more slowly than exponentially: as 1 / r it has a
-    third of its height left at twice its length, all over the sensor.
+    third of its height left at twice its length, all over the sensor. In any case most pixels must
+    grow: see `_of_few`.
     """
     if not isinstance(effect, DarkCurrent) or not effect.dn_per_s:
         return None
+    return _of_parts(state, effect) or _of_few(state, effect)
+
+
+def _of_parts(state: State, effect: DarkCurrent) -> Denial | None:
+    """Return how a dark current is denied by parts of the sensor or a glow; None: it is not."""
     if any(isinstance(other, AmpGlow | HotPixels) for other in state.camera.effect):
         return _tail(state, effect)
     left = state.null.departures(state.vector)
@@ -62,6 +68,36 @@ def uneven(state: State, effect: Effect | None) -> Denial | None:
         return None
     least = f"{max(share, 0):.0%} +- {error:.0%}"
     return Denial(share, f"a part of the sensor grows with exposure time by {least} of it")
+
+
+def _of_few(state: State, effect: DarkCurrent) -> Denial | None:
+    """Return how a dark current is denied by pixels most of which do not grow; None: they do.
+
+    Beside their mean, which levels tell, the median of all pixels' growth is that of the dark
+    current alone, whatever few of them add: the mean is, too, that of the hot ones. A glow, which
+    most pixels have some of, says nothing of it.
+    """
+    if any(isinstance(other, AmpGlow) for other in state.camera.effect):
+        return None
+    hot = (e for e in state.camera.effect if isinstance(e, HotPixels))
+    others = sum(e.pixel_fraction * e.mean_dn_per_s for e in hot)
+    shares, errors = [], []
+    for (channel, name), (image, noise) in state.setting.seen.images.items():
+        if name != "time":
+            continue
+        unit = effect.dn_per_s * state.setting.layout.regressors(channel).scales["time"]
+        middle = float(np.median(image - image.mean()))
+        wide = max(noise, typical_square(image - image.mean()) ** 0.5)
+        shares.append(1 + others / effect.dn_per_s + middle / unit)
+        errors.append((np.pi / 2 / image.size) ** 0.5 * wide / unit)
+    if not shares:
+        return None
+    share = float(np.mean(shares))
+    error = float(np.sqrt(np.mean(np.square(errors)) / len(errors)))
+    if share + _SURE * error >= _LEAST_SHARE:
+        return None
+    least = f"{max(share, 0):.0%} +- {error:.0%}"
+    return Denial(share, f"most pixels grow with exposure time by {least} of it")
 
 
 def _tail(state: State, effect: DarkCurrent) -> Denial | None:

@@ -26,9 +26,11 @@ def _state(sds: Array, fitted: float, seed: int) -> tuple[Any, Array]:
     mean = np.full(sds.size, np.cbrt(1 + fitted**2 / white))
     # What chance does to a cube root of a variance of so few frames.
     sd = mean / 3 * np.sqrt(2 / (FRAMES - 1))
+    z = (seen - mean) / sd
     keys = tuple(Key("frame_variance", "exposure", f"e{i}", "MONO") for i in range(sds.size))
     state = SimpleNamespace(
         vector=SimpleNamespace(keys=keys, values=seen),
+        mismatches=[SimpleNamespace(statistic="frame_variance", z=float(z.max()))],
         null=SimpleNamespace(mean=mean, sd=sd, known=np.ones(sds.size, bool)),
     )
     return state, np.ones(sds.size)

@@ -43,7 +43,8 @@ def unequal(state: State, effect: Effect, without: Array) -> Denial | None:
         and np.isfinite(without[i])
         and mean[i] > without[i]
     ]
-    if len(which) < _LEAST or ((values - mean)[which] / sd[which]).max() <= FAR_OFF:
+    far = any(m.statistic == "frame_variance" and m.z > FAR_OFF for m in state.mismatches)
+    if not far or len(which) < _LEAST:
         return None
     # Numbers are cube roots of variances relative to those of pixels.
     made = mean[which] ** 3 - without[which] ** 3

@@ -18,6 +18,7 @@ from pydantic import Field, model_validator
 
 from dsis.cfa import Cfa
 from dsis.color import white_balanced
+from dsis.conversion import converted
 from dsis.draw import Draw
 from dsis.effects import Effect, Exposure, Image, ReadOut, Stage, any_effect
 from dsis.effects.poisson_shot_noise import PoissonShotNoise
@@ -335,12 +336,7 @@ class Conversion(BaseLink):
 
     def apply(self, image: Image, exposure: Exposure) -> Image:
         """Return whole codes less black; values below black stay negative."""
-        black = np.float32(exposure.read_out.black_level_dn)
-        white = np.float32(exposure.read_out.white_level_dn)
-        codes: Image = image + black
-        np.clip(np.rint(codes, out=codes), np.float32(0), white, out=codes)
-        codes -= black
-        return codes
+        return converted(image, exposure.read_out.black_level_dn, exposure.read_out.white_level_dn)
 
 
 def read_camera(path: Path) -> Camera:

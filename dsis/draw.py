@@ -34,6 +34,7 @@ _F, _I = np.float32, np.int32
 _SQRT_HALF_BITS = np.int32(0x3F3504F3)
 _LN_2 = np.float32(np.log(2.0))
 _FIELDS = Kept(0, patience=16)
+_FEW = 4096  # deviates, of a line or of one number a frame: to find them takes less time
 
 
 @inlined
@@ -225,7 +226,8 @@ class Draw:
         pixels have.
         """
         out = np.empty((2, places.shape[1]), np.float64)
-        _scatter(out, np.ascontiguousarray(places), self._key(purpose), np.uint64(frame))
+        key = _key(self.seed, self.scope, purpose)
+        _scatter(out, np.ascontiguousarray(places), key, np.uint64(frame))
         return out
 
     def normal_rows(
@@ -245,27 +247,17 @@ class Draw:
         )
         return self._field(purpose, block, frame, 1, normal=True)
 
+    def held(self, purpose: str, grid: PixelGrid, frame: int) -> bool:
+        """Return whether the field of `normal_rows` is kept: then any rows are at hand."""
+        return (self.seed, self.scope, purpose, grid, frame) in _FIELDS
+
     def _field(
         self, purpose: str, grid: PixelGrid, frame: int, threads: int, *, normal: bool
     ) -> NDArray[np.float32]:
-        channels = grid.channels()
-        out = np.empty((grid.rows, grid.columns, channels.shape[2]), np.float32)
-        key = self._key(purpose)
-
-        def block(first: int, last: int) -> None:
-            place = np.array([grid.first_row + first, grid.first_column], np.int64)
-            _fill(out[first:last], place, channels, key, np.uint64(frame), normal)
-
-        over_rows(block, grid.rows, threads)
-        field: NDArray[np.float32] = out.reshape(grid.shape)
-        return field
-
-    def _key(self, purpose: str) -> NDArray[np.uint64]:
-        name = "\x1f".join((str(self.seed), *self.scope, purpose)).encode()
-        words: NDArray[np.uint32] = np.frombuffer(
-            hashlib.blake2b(name, digest_size=8).digest(), "<u4"
-        )
-        return words.astype(np.uint64)
+        place = self.seed, self.scope, purpose
+        if grid.rows * grid.columns <= _FEW:
+            return _few(*place, grid, frame, normal).copy()
+        return _drawn(_key(*place), grid, frame, threads, normal=normal)
 
 
 def keep_fields(most_bytes: int) -> None:
@@ -278,3 +270,33 @@ def _kept(draw: Draw, purpose: str, grid: PixelGrid) -> NDArray[np.float32]:
     field = draw.normal(purpose, grid)
     field.flags.writeable = False
     return field
+
+
+def _key(seed: int, scope: tuple[str, ...], purpose: str) -> NDArray[np.uint64]:
+    name = "\x1f".join((str(seed), *scope, purpose)).encode()
+    words: NDArray[np.uint32] = np.frombuffer(hashlib.blake2b(name, digest_size=8).digest(), "<u4")
+    return words.astype(np.uint64)
+
+
+def _drawn(
+    key: NDArray[np.uint64], grid: PixelGrid, frame: int, threads: int, *, normal: bool
+) -> NDArray[np.float32]:
+    """Return the deviates of a key on `grid`."""
+    channels = grid.channels()
+    out = np.empty((grid.rows, grid.columns, channels.shape[2]), np.float32)
+
+    def block(first: int, last: int) -> None:
+        place = np.array([grid.first_row + first, grid.first_column], np.int64)
+        _fill(out[first:last], place, channels, key, np.uint64(frame), normal)
+
+    over_rows(block, grid.rows, threads)
+    field: NDArray[np.float32] = out.reshape(grid.shape)
+    return field
+
+
+@lru_cache(maxsize=2048)
+def _few(
+    seed: int, scope: tuple[str, ...], purpose: str, grid: PixelGrid, frame: int, normal: bool
+) -> NDArray[np.float32]:
+    """Return few deviates, that every camera with the same draws asks for: not to be changed."""
+    return _drawn(_key(seed, scope, purpose), grid, frame, 1, normal=normal)

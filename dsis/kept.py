@@ -46,6 +46,11 @@ class Kept:
             found = self._made(key, make) if room else None
         return found
 
+    def __contains__(self, key: Hashable) -> bool:
+        """Return whether the array of a key is there; that is no request for it."""
+        with self._lock:
+            return key in self._arrays
+
     def _found(self, key: Hashable) -> NDArray[Any] | None:
         with self._lock:
             self._asked += 1

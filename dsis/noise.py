@@ -86,7 +86,8 @@ def shot_noise(
     out = np.empty(expected_dn.shape, np.float32)  # rows of it are filled as flat views
 
     def block(first: int, last: int) -> None:
-        for top, end in _spans(first, last, out):
+        whole = draw.held("shot_noise", grid, frame)
+        for top, end in [(first, last)] if whole else _spans(first, last, out):
             _add_shot(
                 _flat(expected_dn[top:end]),
                 draw.normal_rows("shot_noise", grid, frame, top, end).reshape(-1),
@@ -114,7 +115,8 @@ def read_noise(
     sigma = np.sqrt(np.maximum(segments.intercept_dn2, np.float32(0)))
 
     def block(first: int, last: int) -> None:
-        for top, end in _spans(first, last, out):
+        whole = draw.held("read_noise", grid, frame)
+        for top, end in [(first, last)] if whole else _spans(first, last, out):
             _add_read(
                 _flat(signal_dn[top:end]),
                 _flat(expected_dn[top:end]),

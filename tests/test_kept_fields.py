@@ -24,3 +24,17 @@ def test_rows_of_a_kept_field_are_those_made_anew(
             rows = [draw.normal_rows("noise", GRID, frame, y, y + 10) for y in range(0, 40, 10)]
             expected = Draw(3).within(scope).normal("noise", GRID, frame)
             np.testing.assert_array_equal(np.concatenate(rows), expected)
+
+
+@pytest.mark.parametrize("kind", ["normal", "uniform"])
+def test_few_deviates_are_those_of_a_larger_field_and_the_callers_own(kind: str) -> None:
+    """What is changed by one caller is not what the next one gets."""
+    line, field = PixelGrid(3, 1000, Cfa.MONO, 4, 2), PixelGrid(30, 1000, Cfa.MONO, 4, 2)
+    for frame in (0, 1):
+        for scope in ("a", "b"):
+            draw = getattr(Draw(3).within(scope), kind)
+            expected = draw("line", field, frame)[:3]
+            for _ in range(2):
+                own = draw("line", line, frame)
+                np.testing.assert_array_equal(own, expected)
+                own[:] = 0

@@ -21,6 +21,7 @@ from analysis.mismatch.observe import Observation, observe
 from analysis.mismatch.scenes import without_picture
 from analysis.mismatch.touches import ALL_SUMS
 from dsis.camera import Camera
+from dsis.conversion import codes_of
 from dsis.draw import Draw, keep_fields
 from dsis.effects import Image
 from dsis.effects.pink_noise import keep_series
@@ -80,7 +81,7 @@ class Model:
         grid = PixelGrid(layout.rows, layout.columns, layout.cfa)
         sensor = Draw(seed).within("sensor", str(replicate))
         times = {e.name: e.exposure_time_s for e in layout.exposures}
-        black = np.float32(self.camera.black_level)
+        black = self.camera.black_level
         lit: dict[str, tuple[Camera, Image]] = {}
 
         def light(name: str) -> tuple[Camera, Image]:
@@ -101,7 +102,7 @@ class Model:
             image = camera.expose(
                 clean, temporal, sensor, number, grid, exposure_time_s=time_s, shared=shared
             )
-            return np.asarray(np.rint(image + black))
+            return codes_of(image, black)
 
         return shot
 

@@ -45,12 +45,10 @@ class AdcDnl(Effect):
         if not self.rms_lsb:
             return image
         black = np.float32(exposure.read_out.black_level_dn)
-        edges = code_edges(exposure.sensor, int(exposure.read_out.white_level_dn), self.rms_lsb)
+        white = int(exposure.read_out.white_level_dn)
         out = np.empty_like(image, order="C")
-        ideal = np.arange(edges.size) - 0.5
-        steps = int(np.abs(edges - ideal).max()) + 1
         flat = np.ascontiguousarray(image).reshape(-1)
-        _convert(flat, black, _reached(edges), steps, out.reshape(-1))
+        _convert(flat, black, *_reached(exposure.sensor, white, self.rms_lsb), out.reshape(-1))
         return out
 
     def contributions(self, point: OperatingPoint) -> Mapping[str, float]:
@@ -82,11 +80,18 @@ def code_edges(sensor: Draw, white_code: int, rms_lsb: float) -> NDArray[np.floa
     return edges
 
 
-def _reached(edges: NDArray[np.float64]) -> NDArray[np.float32]:
-    """Return the least single-precision values that are not below the edges."""
+@lru_cache(maxsize=8)
+def _reached(sensor: Draw, white_code: int, rms_lsb: float) -> tuple[NDArray[np.float32], int]:
+    """Return the least single-precision values that are not below the edges.
+
+    And from how many codes on no edge is away from its place.
+    """
+    edges = code_edges(sensor, white_code, rms_lsb)
     nearest = edges.astype(np.float32)
     above = np.nextafter(nearest, np.float32(np.inf))
-    return np.where(nearest < edges, above, nearest)
+    reached = np.where(nearest < edges, above, nearest)
+    reached.flags.writeable = False
+    return reached, int(np.abs(edges - (np.arange(edges.size) - 0.5)).max()) + 1
 
 
 @kernel

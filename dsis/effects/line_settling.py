@@ -1,13 +1,15 @@
 """Line settling: the read-out has not settled where lines begin, or end."""
 
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
 
 from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, Stage
-from dsis.lines import settled
+from dsis.grid import PixelGrid
+from dsis.lines import Line, settled
 
 Edge = Literal["left", "right", "top", "bottom"]
 
@@ -50,16 +52,7 @@ class LineSettling(Effect):
 
     def apply(self, image: Image, exposure: Exposure) -> Image:
         """Add the offset to what the gain has scaled, near the edge."""
-        grid = exposure.grid
-        (rows, columns), y, x = grid.sensor_shape, grid.row_numbers(), grid.column_numbers()
-        distance = {"left": x, "right": columns - 1 - x, "top": y, "bottom": rows - 1 - y}[
-            self.edge
-        ]
-        share, of_gain = (
-            np.exp(-distance / length) for length in (self.length_pixels, self.gain_length)
-        )
-        gain = (1 + self.gain_percent / 100 * of_gain).astype(np.float32)
-        return settled(image, gain, (self.offset_dn * share).astype(np.float32))
+        return settled(image, *_decays(self, exposure.grid))
 
     @property
     def gain_length(self) -> float:
@@ -87,3 +80,18 @@ class LineSettling(Effect):
         """Return the mean of a decay over a sensor of rows and columns: a geometric sum."""
         lines = shape[self.edge in ("left", "right")]
         return float(np.expm1(-lines / length) / np.expm1(-1 / length)) / lines
+
+
+@lru_cache(maxsize=16)
+def _decays(effect: LineSettling, grid: PixelGrid) -> tuple[Line, Line]:
+    """Return the gain and the offset, DN, of each line of a grid: the same in all frames."""
+    (rows, columns), y, x = grid.sensor_shape, grid.row_numbers(), grid.column_numbers()
+    distance = {"left": x, "right": columns - 1 - x, "top": y, "bottom": rows - 1 - y}[effect.edge]
+    share, of_gain = (
+        np.exp(-distance / length) for length in (effect.length_pixels, effect.gain_length)
+    )
+    gain = (1 + effect.gain_percent / 100 * of_gain).astype(np.float32)
+    offset = (effect.offset_dn * share).astype(np.float32)
+    for line in (gain, offset):
+        line.flags.writeable = False
+    return gain, offset

@@ -1,6 +1,7 @@
 """Periodic noise: interference at one spatial frequency."""
 
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
@@ -14,6 +15,7 @@ from dsis.grid import PixelGrid
 
 Frequency = Annotated[float, Field(ge=-0.5, le=0.5)]
 _POINT = PixelGrid(1, 1, Cfa.MONO)
+Line = NDArray[np.complex64]
 
 
 class PeriodicNoise(Effect):
@@ -66,13 +68,11 @@ class PeriodicNoise(Effect):
         grid, (u, w) = exposure.grid, self.frequency
         turn = float(exposure.temporal.uniform("periodic_noise", _POINT, exposure.frame)[0, 0])
         # cos(a + b) from rows and columns: one product per pixel instead of one cosine.
-        along = np.exp(2j * np.pi * (u * grid.column_numbers() + turn)).astype(np.complex64)
-        down = np.exp(2j * np.pi * w * grid.row_numbers()).astype(np.complex64)
         planes = image.size // (grid.rows * grid.columns)
         return _with_wave(
             np.ascontiguousarray(image).reshape(grid.rows, -1),
-            down.reshape(-1),
-            np.repeat(along.reshape(-1), planes),
+            _down(w, grid),
+            np.repeat(_along(u, turn, grid), planes),
             np.float32(self.amplitude_dn),
         ).reshape(image.shape)
 
@@ -86,10 +86,25 @@ class PeriodicNoise(Effect):
         )
 
 
+@lru_cache(maxsize=16)
+def _down(w: float, grid: PixelGrid) -> Line:
+    """Return the wave of each row: the same in all frames."""
+    down: Line = np.exp(2j * np.pi * w * grid.row_numbers()).astype(np.complex64).reshape(-1)
+    down.flags.writeable = False
+    return down
+
+
+@lru_cache(maxsize=1024)
+def _along(u: float, turn: float, grid: PixelGrid) -> Line:
+    """Return the wave of each column in a frame: the same of all cameras with the same draws."""
+    wave = np.exp(2j * np.pi * (u * grid.column_numbers() + turn))
+    along: Line = wave.astype(np.complex64).reshape(-1)
+    along.flags.writeable = False
+    return along
+
+
 @kernel
-def _with_wave(
-    image: Image, down: NDArray[np.complex64], along: NDArray[np.complex64], amplitude: np.float32
-) -> Image:
+def _with_wave(image: Image, down: Line, along: Line, amplitude: np.float32) -> Image:
     """Return an image (row, sample) with the amplitude times the real part of down x along."""
     out = np.empty(image.shape, np.float32)
     cosine, sine = along.real.copy(), along.imag.copy()

@@ -1,13 +1,15 @@
 """Shading: light falls off from the centre of the sensor to its corners, or to one side."""
 
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
 
 from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, Stage
-from dsis.lines import lit
+from dsis.grid import PixelGrid
+from dsis.lines import Line, lit
 
 
 class Shading(Effect):
@@ -48,19 +50,12 @@ class Shading(Effect):
 
     def apply(self, image: Image, exposure: Exposure) -> Image:
         """Multiply by the light that reaches each pixel."""
-        rows, columns = exposure.grid.sensor_shape
-        y = exposure.grid.row_numbers() - (rows - 1) / 2
-        x = exposure.grid.column_numbers() - (columns - 1) / 2
-        fall = self.falloff_percent / 100 / ((rows / 2) ** 2 + (columns / 2) ** 2)
-        v, u = y / (rows / 2), x / (columns / 2)
-        down = 1 - fall * y**2 + self.tilt_down_percent / 100 * v
-        across = -fall * x**2 + self.tilt_right_percent / 100 * u
-        down += self.bow_down_percent / 100 * (v**2 - 1 / 3)
-        across += self.bow_right_percent / 100 * (u**2 - 1 / 3)
-        if down.min() + across.min() >= 0:
-            return lit(image, down.astype(np.float32), across.astype(np.float32))
-        light = down.astype(np.float32) + across.astype(np.float32)
-        return image * np.maximum(light, np.float32(0))
+        down, across, ends = _light(self, exposure.grid)
+        if not ends:
+            return lit(image, down, across)
+        light: Image = np.maximum(down + across, np.float32(0))
+        made: Image = image * light
+        return made
 
     def contributions(self, point: OperatingPoint) -> Mapping[str, float]:
         """Return what mean and shot noise lose, and the variance of the whole sensor's light."""
@@ -78,3 +73,21 @@ class Shading(Effect):
             "pixel_variance": -lost * point.shot_variance_dn2,
             "fixed_smooth_variance": (bows * 4 / 45 + tilts) * point.signal_dn**2,
         }
+
+
+@lru_cache(maxsize=16)
+def _light(effect: Shading, grid: PixelGrid) -> tuple[Line, Line, bool]:
+    """Return the light of rows and of columns, to be added, and whether it ends somewhere."""
+    rows, columns = grid.sensor_shape
+    y = grid.row_numbers() - (rows - 1) / 2
+    x = grid.column_numbers() - (columns - 1) / 2
+    fall = effect.falloff_percent / 100 / ((rows / 2) ** 2 + (columns / 2) ** 2)
+    v, u = y / (rows / 2), x / (columns / 2)
+    down = 1 - fall * y**2 + effect.tilt_down_percent / 100 * v
+    across = -fall * x**2 + effect.tilt_right_percent / 100 * u
+    down += effect.bow_down_percent / 100 * (v**2 - 1 / 3)
+    across += effect.bow_right_percent / 100 * (u**2 - 1 / 3)
+    lines = down.astype(np.float32), across.astype(np.float32)
+    for line in lines:
+        line.flags.writeable = False
+    return *lines, bool(down.min() + across.min() < 0)

@@ -10,6 +10,7 @@ from dsis.measures.kernels import Frame, Sums
 
 _BLOCK = ROWS_PER_BLOCK
 _FAR = 2**40  # beyond every code
+_MOST = 2**31 - 1
 
 
 class Passed(NamedTuple):
@@ -133,10 +134,10 @@ def _fold(line: Sums, out: Sums) -> None:
 @inlined
 def _take_limits(line: Frame, limits: NDArray[np.int64]) -> None:
     """Widen (not whole, lowest, highest) by a line; the range is that of the whole numbers."""
-    odd, low, high = np.int64(0), limits[1], limits[2]
-    for x in range(line.size):
-        code = np.int64(np.int32(line[x]))
-        odd |= np.int64(np.float32(code) != line[x])  # also where it is not finite
+    odd, low, high = np.int32(0), np.int32(_MOST), np.int32(-_MOST - 1)
+    for x in range(line.size):  # in 32 bits: twice as many at a time
+        code = np.int32(line[x])
+        odd |= np.int32(np.float32(code) != line[x])  # also where it is not finite
         low, high = min(low, code), max(high, code)
     limits[0] |= odd
-    limits[1], limits[2] = low, high
+    limits[1], limits[2] = min(limits[1], np.int64(low)), max(limits[2], np.int64(high))

@@ -173,12 +173,24 @@ def project(images: NDArray[np.floating], basis: Sums) -> Sums:
     planes, rows, columns = images.shape
     out = np.zeros((planes, basis.shape[1], columns))
     for k in range(planes):
-        for y in range(rows):
+        y = 0
+        while y + 4 <= rows:  # four at a time, in their order: sums are written less often
+            one, two = images[k, y], images[k, y + 1]
+            three, four = images[k, y + 2], images[k, y + 3]
+            for degree in range(basis.shape[1]):
+                a, b = basis[y, degree], basis[y + 1, degree]
+                c, d = basis[y + 2, degree], basis[y + 3, degree]
+                into = out[k, degree]
+                for x in range(columns):
+                    into[x] = (((into[x] + a * one[x]) + b * two[x]) + c * three[x]) + d * four[x]
+            y += 4
+        while y < rows:
             line = images[k, y]
             for degree in range(basis.shape[1]):
                 weight, into = basis[y, degree], out[k, degree]
                 for x in range(columns):
                     into[x] += weight * line[x]
+            y += 1
     return out
 
 
@@ -215,8 +227,32 @@ def mean_frame(
     rows, columns = row_means.sum(0) / frames, column_means.sum(0) / frames
     level = rows.sum() / n
     _mean_frame(first, sums[y::step, x::step], frames, rows, columns, level, shift, mean, change)
-    by_row, by_column = (first.sum(axis, dtype=np.float64) for axis in (1, 0))
+    by_row, by_column = _line_sums(first)
     return by_row / m + shift, by_column / n + shift
+
+
+@kernel
+def _line_sums(image: Frame) -> tuple[Sums, Sums]:
+    """Return the sums of rows and of columns."""
+    rows, columns = image.shape
+    by_row, by_column = np.empty(rows), np.zeros(columns)
+    own = np.empty(columns)
+    for y in range(rows):
+        line = image[y]
+        for x in range(columns):
+            own[x] = line[x]
+            by_column[x] += own[x]
+        a = b = c = d = 0.0  # which do not wait for one another
+        end = columns // 4 * 4
+        for x in range(0, end, 4):
+            a += own[x]
+            b += own[x + 1]
+            c += own[x + 2]
+            d += own[x + 3]
+        for x in range(end, columns):
+            a += own[x]
+        by_row[y] = (a + b) + (c + d)
+    return by_row, by_column
 
 
 @kernel

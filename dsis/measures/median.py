@@ -1,5 +1,6 @@
 """The median, exactly that of `numpy.median`: most calls are for few thousand values."""
 
+from math import isnan
 from typing import Any
 
 import numpy as np
@@ -14,39 +15,30 @@ _ROUNDS = 4  # far values may keep nearly all others in one part
 
 def median(values: NDArray[np.floating]) -> float:
     """Return the median of all values, nan where one of them is; there must be some."""
-    return float(_median(np.ascontiguousarray(values).reshape(-1)))
+    flat = np.ascontiguousarray(values).reshape(-1)
+    low, high = flat.min(), flat.max()  # faster than a kernel, which has to keep their order
+    if low == high or isnan(low):
+        return float(low)
+    return float(_median(flat, low, high))
 
 
 @kernel
-def _median(values: NDArray[np.floating]) -> Any:
-    size = values.size
-    for i in range(size):
-        if values[i] != values[i]:
-            return values[i]
-    half = size // 2
-    upper = _ranked(values, half)
-    if size % 2:
+def _median(values: NDArray[np.floating], low: Any, high: Any) -> Any:
+    half = values.size // 2
+    left, place = _around(values, half, low, high)
+    upper = _selected(left, place)
+    if values.size % 2:
         return upper
-    below, lower = 0, values.min()
-    for i in range(size):
-        v = values[i]
-        below += v < upper
-        lower = max(lower, v) if v < upper else lower
-    if below < half:
-        lower = upper
+    # What is selected has those before it on its left.
+    lower = _largest(left[:place]) if place else _largest_below(values, upper)
     return (lower + upper) / values.dtype.type(2)
 
 
 @kernel
-def _ranked(values: NDArray[np.floating], rank: int) -> Any:
-    """Return the value that so many others precede in ascending order."""
+def _around(values: NDArray[np.floating], rank: int, low: Any, high: Any) -> Any:
+    """Return some of the values, all between two of them, and the rank among these."""
     left, place = values, rank
     for _ in range(_ROUNDS):
-        low, high = left[0], left[0]
-        for i in range(left.size):
-            low, high = min(low, left[i]), max(high, left[i])
-        if low == high:
-            return low
         scale = np.float64(_PARTS - 1) / (np.float64(high) - np.float64(low))
         if left.size <= _FEW or not 0 < scale < np.inf:
             break
@@ -67,7 +59,32 @@ def _ranked(values: NDArray[np.floating], rank: int) -> Any:
                 within[k] = left[i]
                 k += 1
         left = within
-    return _selected(left.copy(), place)
+        low, high = _limits(left)
+    return left.copy(), place
+
+
+@kernel
+def _limits(values: NDArray[np.floating]) -> Any:
+    """Return the least and the largest value."""
+    low, high = values[0], values[0]
+    for i in range(values.size):
+        low, high = min(low, values[i]), max(high, values[i])
+    return low, high
+
+
+@kernel
+def _largest(values: NDArray[np.floating]) -> Any:
+    return values.max()
+
+
+@kernel
+def _largest_below(values: NDArray[np.floating], least: Any) -> Any:
+    """Return the largest of the values below one that is not the least of them."""
+    found = values.min()
+    for i in range(values.size):
+        v = values[i]
+        found = max(found, v) if v < least else found
+    return found
 
 
 @kernel

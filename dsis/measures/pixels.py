@@ -13,7 +13,7 @@ from dsis.measures.kernels import FiveSums, Frame, Sums
 
 _BLOCK = ROWS_PER_BLOCK
 _FIRST, _SECOND = 4, 10  # sums of powers, and of products of two
-_OF_PAIRS = 7  # sums of powers and products where there are two frames
+_OF_PAIRS, _ABOUT_MEANS = 2, 5  # the same where there are two frames
 Place = tuple[int, int, int]
 """First row, first column and step of a channel."""
 
@@ -115,22 +115,22 @@ def pair_moments(
     fourth power, -s the mean product.
     """
     n, m = shape
-    variance = np.empty(shape)
-    by_block = np.empty((-(-n // _BLOCK), _OF_PAIRS))
+    variance, blocks = np.empty(shape), -(-n // _BLOCK)
+    powers, products = np.empty((blocks, _OF_PAIRS)), np.empty((blocks, _ABOUT_MEANS))
 
-    def summed(centre: tuple[float, float]) -> Sums:
-        def block(start: int, stop: int) -> None:
-            lines = np.empty((1 + _OF_PAIRS, m))
-            _add_pairs(
-                last, *place, np.array([kept, *centre]), variance, start, stop, lines, by_block
-            )
+    def of_powers(start: int, stop: int) -> None:
+        lines = np.empty((1 + _OF_PAIRS, m))
+        _add_pairs(last, *place, kept, variance, start, stop, lines, powers)
 
-        over_rows(block, n, threads)
-        whole: Sums = by_block.sum(0) / (n * m)
-        return whole
+    over_rows(of_powers, n, threads)
+    square, fourth = (powers.sum(0) / (n * m)).tolist()
 
-    square, fourth = summed((0.0, 0.0))[:2].tolist()
-    squares, squares_3, squares_4, fourths, both = summed((square, fourth))[2:].tolist()
+    def of_products(start: int, stop: int) -> None:
+        lines = np.empty((1 + _ABOUT_MEANS, m))
+        _add_pair_products(last, *place, square, fourth, start, stop, lines, products)
+
+    over_rows(of_products, n, threads)
+    squares, squares_3, squares_4, fourths, both = (products.sum(0) / (n * m)).tolist()
     scatter = Scatter(
         fourth > 0,
         square,
@@ -263,7 +263,7 @@ def _add_pairs(
     y0: int,
     x0: int,
     step: int,
-    numbers: Sums,
+    kept: float,
     variance: Sums,
     first: int,
     stop: int,
@@ -272,31 +272,59 @@ def _add_pairs(
 ) -> None:
     """Write sums over blocks of rows (block, `_OF_PAIRS`) to `out`, and the variance map.
 
-    Of the mean square s and its square, then about their means of d^2, d^3, d^4, f^2 and f d.
-    `numbers`: kept, means of s and s^2.
+    Of the mean square s and its square. `lines` are what a row and its sums by column are kept in.
     """
-    kept, mean2, mean4 = numbers[0], numbers[1], numbers[2]
     square, total = lines[0], lines[1:]
-    m = variance.shape[1]
     for y in range(first, stop):
-        line = last[y0 + y * step]
         if y % _BLOCK == 0:
             total[:] = 0
-        for x in range(m):
-            u = np.float64(line[x0 + x * step])
-            square[x] = u * u / 4
-        for x in range(m):
+        _mean_squares(last[y0 + y * step], x0, step, square)
+        for x in range(square.size):
             s = square[x]
             variance[y, x] = s / kept
             total[0, x] += s
             total[1, x] += s * s
-        for x in range(m):
-            d = square[x] - mean2
-            f = square[x] * square[x] - mean4
-            total[2, x] += d * d
-            total[3, x] += d * d * d
-            total[4, x] += d * d * (d * d)
-            total[5, x] += f * f
-            total[6, x] += f * d
         if (y + 1) % _BLOCK == 0 or y + 1 == stop:
             _write_sums(total, out[y // _BLOCK])
+
+
+@kernel
+def _add_pair_products(
+    last: Frame,
+    y0: int,
+    x0: int,
+    step: int,
+    mean2: float,
+    mean4: float,
+    first: int,
+    stop: int,
+    lines: Sums,
+    out: Sums,
+) -> None:
+    """Write sums over blocks of rows (block, `_ABOUT_MEANS`) to `out`: d^2, d^3, d^4, f^2, f d.
+
+    d and f are the mean square and its square about their means. `lines` as of `_add_pairs`.
+    """
+    square, total = lines[0], lines[1:]
+    for y in range(first, stop):
+        if y % _BLOCK == 0:
+            total[:] = 0
+        _mean_squares(last[y0 + y * step], x0, step, square)
+        for x in range(square.size):
+            d = square[x] - mean2
+            f = square[x] * square[x] - mean4
+            total[0, x] += d * d
+            total[1, x] += d * d * d
+            total[2, x] += d * d * (d * d)
+            total[3, x] += f * f
+            total[4, x] += f * d
+        if (y + 1) % _BLOCK == 0 or y + 1 == stop:
+            _write_sums(total, out[y // _BLOCK])
+
+
+@inlined
+def _mean_squares(line: Frame, x0: int, step: int, square: Sums) -> None:
+    """Write the mean square of two residuals: u / 2 and -u / 2."""
+    for x in range(square.size):
+        u = np.float64(line[x0 + x * step])
+        square[x] = u * u / 4

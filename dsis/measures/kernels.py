@@ -101,13 +101,26 @@ def _split(image: Frame, places: NDArray[np.int64], means: Sums, out: Frame) -> 
 @kernel
 def _count_codes(frame: Frame, histogram: NDArray[np.int64], lowest: int) -> None:
     rows, columns = frame.shape
-    for y in range(rows):
-        line, even, odd = frame[y], histogram[y & 1, 0], histogram[y & 1, 1]
+    first, second, third, fourth = (
+        histogram[0, 0],
+        histogram[0, 1],
+        histogram[1, 0],
+        histogram[1, 1],
+    )
+    # Two rows at a time: neighbours mostly have the same few codes, and a count waits for the last.
+    for y in range(0, rows - 1, 2):
+        line, after = frame[y], frame[y + 1]
         for i in range(columns // 2):
-            even[np.uintp(np.int32(line[2 * i]) - lowest)] += 1
-            odd[np.uintp(np.int32(line[2 * i + 1]) - lowest)] += 1
+            first[np.uintp(np.int32(line[2 * i]) - lowest)] += 1
+            second[np.uintp(np.int32(line[2 * i + 1]) - lowest)] += 1
+            third[np.uintp(np.int32(after[2 * i]) - lowest)] += 1
+            fourth[np.uintp(np.int32(after[2 * i + 1]) - lowest)] += 1
         if columns & 1:
-            even[np.uintp(np.int32(line[columns - 1]) - lowest)] += 1
+            first[np.uintp(np.int32(line[columns - 1]) - lowest)] += 1
+            third[np.uintp(np.int32(after[columns - 1]) - lowest)] += 1
+    if rows & 1:
+        for x in range(columns):
+            histogram[0, x & 1, np.uintp(np.int32(frame[rows - 1, x]) - lowest)] += 1
 
 
 @kernel

@@ -96,7 +96,10 @@ def sure_of_lines(lines: float, pixels: float, dof: float) -> float:
 
 def _of_many(pixels: Array, square: float, by_row: Array, by_column: Array) -> tuple[Array, Array]:
     """Return line means without what few pixels that stand far out add to them."""
-    y, x = np.nonzero(np.abs(pixels) > _FAR_OUT * sqrt(square))
+    limit = _FAR_OUT * sqrt(square)
+    if pixels.max() <= limit and pixels.min() >= -limit:
+        return by_row, by_column
+    y, x = np.nonzero(np.abs(pixels) > limit)
     if not 0 < y.size < _FEW * pixels.size:
         return by_row, by_column
     own = pixels[y, x]
@@ -141,7 +144,7 @@ def _standing_out(pixels: Array, square: float) -> dict[str, Number]:
     """Return how many pixels lie far above the others, as roots."""
     sd = sqrt(square)
     return {
-        f"outlying_pixels of {limit:g}": (float(rooted((pixels > limit * sd).sum())), 1.0)
+        f"outlying_pixels of {limit:g}": (float(rooted(np.count_nonzero(pixels > limit * sd))), 1.0)
         for limit in STANDING_OUT
     }
 

@@ -74,7 +74,7 @@ STRONG: dict[str, tuple[dict[str, object], ...]] = {
     ),
     "nonlinearity": (
         {"percent_full_scale": 3.0, "exponent": 4.0},
-        {"percent_full_scale": -3.0, "exponent": -0.3},
+        {"percent_full_scale": 0.5, "exponent": -0.3},
     ),
     "saturation": ({"softness_dn": 60.0},),
     "dual_gain_mismatch": ({"gain_error_percent": 5.0, "mean": "kinks"},),

@@ -1,9 +1,11 @@
 """Tap mismatch: regions of the sensor are read by different amplifiers."""
 
 from collections.abc import Mapping
+from math import ceil
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, Stage
@@ -16,7 +18,8 @@ class TapMismatch(Effect):
 
     v = Q (1 - g / 2) in the first region and Q (1 + g / 2) in the second: the left and right or
     upper and lower halves, or the even and odd columns or rows. Charge and its noise are scaled.
-    Parts that are no halves meet at the seam, a share of all columns or rows.
+    Parts that are no halves meet at the seam, a share s of all columns or rows: their gains are
+    1 - g (1 - s) and 1 + g s, of mean 1.
     """
 
     kind: Literal["tap_mismatch"] = "tap_mismatch"
@@ -45,24 +48,34 @@ class TapMismatch(Effect):
 
     def apply(self, image: Image, exposure: Exposure) -> Image:
         """Scale each region by its amplifier's gain."""
-        grid = exposure.grid
+        grid, share = exposure.grid, _MIDDLE
         (rows, columns), y, x = grid.sensor_shape, grid.row_numbers(), grid.column_numbers()
         match self.regions:
             case "left_right":
-                second = x >= self.seam * columns
+                second, share = self._parts(x, columns)
             case "top_bottom":
-                second = y >= self.seam * rows
+                second, share = self._parts(y, rows)
             case "even_odd_columns":
                 second = x % 2 == 1
             case "even_odd_rows":
                 second = y % 2 == 1
-        half = self.gain_percent / 200
-        gain = np.where(second, np.float32(1 + half), np.float32(1 - half))
-        return image * gain
+        gain = self.gain_percent / 100
+        return image * np.where(
+            second, np.float32(1 + gain * share), np.float32(1 - gain * (1 - share))
+        )
+
+    def _parts(self, line: NDArray[np.integer], lines: int) -> tuple[NDArray[np.bool_], float]:
+        """Return which lines are of the second part, and the share of all that are of the first."""
+        if self.seam == _MIDDLE:
+            return 2 * line >= lines, _MIDDLE
+        first = ceil(self.seam * lines)
+        return line >= first, first / lines
 
     def contributions(self, point: OperatingPoint) -> Mapping[str, float]:
         """Return what two gains make of shot noise, on average, where both read all colours."""
+        share = self.seam if self.regions in ("left_right", "top_bottom") else _MIDDLE
+        parts = share * (1 - share)
         return {
             "level": 0.0,
-            "pixel_variance": (self.gain_percent / 200) ** 2 * point.shot_variance_dn2,
+            "pixel_variance": parts * (self.gain_percent / 100) ** 2 * point.shot_variance_dn2,
         }

@@ -163,8 +163,8 @@ def _taps(clues: Clues) -> Sequence[Proposal]:
                 "tap_mismatch", ["gain_percent"], ["gain_percent"], gain_percent=gain,
                 regions=regions,
             )  # fmt: skip
-    for regions, axis in (("top_bottom", 0), ("left_right", 1)):
-        parts = unequal_parts(clues, axis)
+    for way, regions in enumerate(("top_bottom", "left_right")):
+        parts = unequal_parts(clues, way)
         if parts is not None:
             name = "gain_percent"
             start = {name: 100 * parts.step, "regions": regions, "seam": parts.seam}

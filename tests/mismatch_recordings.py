@@ -1,5 +1,6 @@
 """Recordings in memory, for what is proven on locked frames."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -111,6 +112,30 @@ def recorded(
         bit_depth=true.bit_depth,
     )
     return InMemory(sensor, exposures, rows, columns, Path(), stacks)
+
+
+def responding(
+    seed: int,
+    levels: tuple[float, ...],
+    response: Callable[[NDArray[np.float64]], NDArray[np.float64]],
+    *,
+    side: int = 64,
+    frames: int = 8,
+) -> InMemory:
+    """Return numpy's own recording of a 12-bit sensor that answers its charge, DN, by a law.
+
+    Shot noise of slope 0.5, read noise of 6 DN^2 after the response, black at 64.
+    """
+    rng = np.random.default_rng(seed)
+    made = recorded(camera(), seed, rows=side, columns=side, frames=frames, levels=levels)
+    stacks = {}
+    flats = {f"flat-{i}": level for i, level in enumerate(levels)}
+    for name, level in ({"dark-0": 0.0, "dark-1": 0.0} | flats).items():
+        shape = (frames, side, side)
+        charge = level + np.sqrt(0.5 * level) * rng.standard_normal(shape)
+        noisy = 64.0 + response(charge) + np.sqrt(6.0) * rng.standard_normal(shape)
+        stacks[name] = np.clip(np.rint(noisy), 0, 4095).astype(np.uint16)
+    return InMemory(made.sensor, made.exposures, side, side, made.folder, stacks)
 
 
 def held_of(recording: Recording, locked: tuple[int, ...] = LOCKED) -> Held:

@@ -9,12 +9,11 @@ from numpy.typing import NDArray
 from analysis.mismatch import find_mismatch
 from analysis.mismatch.candidates import CANDIDATES
 from dsis.effects.nonlinearity import Nonlinearity
-from mismatch_recordings import InMemory, camera, recorded, state_of
+from mismatch_recordings import InMemory, camera, responding, state_of
 
 Array = NDArray[np.float64]
 LEVELS = (150.0, 600.0, 1200.0, 1900.0, 2600.0, 3300.0)
 SLOPE, READ, BLACK, WHITE = 0.5, 6.0, 64.0, 4095.0
-SIZE, FRAMES = 64, 8
 END = 0.85 * (WHITE - BLACK)
 
 
@@ -36,17 +35,7 @@ def _knee(size: float) -> Callable[[Array], Array]:
 
 
 def _recording(seed: int, law: Callable[[Array], Array]) -> InMemory:
-    """Return numpy's own shots, bent, and noise of read-out."""
-    rng = np.random.default_rng(seed)
-    made = recorded(camera(), seed, rows=SIZE, columns=SIZE, frames=FRAMES, levels=LEVELS)
-    stacks = {}
-    flats = {f"flat-{i}": level for i, level in enumerate(LEVELS)}
-    for name, level in ({"dark-0": 0.0, "dark-1": 0.0} | flats).items():
-        shape = (FRAMES, SIZE, SIZE)
-        charge = level + np.sqrt(SLOPE * level) * rng.standard_normal(shape)
-        noisy = BLACK + charge + law(charge) + np.sqrt(READ) * rng.standard_normal(shape)
-        stacks[name] = np.clip(np.rint(noisy), 0, 4095).astype(np.uint16)
-    return InMemory(made.sensor, made.exposures, SIZE, SIZE, made.folder, stacks)
+    return responding(seed, LEVELS, lambda charge: charge + law(charge))
 
 
 def _bend(effect: Nonlinearity, q: Array) -> Array:
@@ -90,7 +79,7 @@ def test_three_levels_tell_no_exponent() -> None:
     made = _recording(5, LAWS["cubic"])
     few = {f"flat-{i}" for i in (0, 2, 4)} | {"dark-0", "dark-1"}
     exposures = tuple(e for e in made.exposures if e.name in few)
-    less = InMemory(made.sensor, exposures, SIZE, SIZE, made.folder, made.stacks)
+    less = InMemory(made.sensor, exposures, made.rows, made.columns, made.folder, made.stacks)
     state = state_of(less, camera(segments=((SLOPE, READ, None),)))
     starts = [one.effect for one in CANDIDATES["nonlinearity"].propose(state.clues())]
     assert starts

@@ -5,34 +5,28 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from analysis.mismatch.candidates import CANDIDATES
 from analysis.mismatch.candidates.response import soft_moments
 from analysis.mismatch.memory import Memory
 from dsis.effects.dual_gain_mismatch import DualGainMismatch
 from dsis.effects.saturation import Saturation
-from mismatch_recordings import InMemory, camera, recorded, state_of
+from mismatch_recordings import InMemory, camera, responding, state_of
 
 LEVELS = (500.0, 1500.0, 2400.0, 2850.0)
 FULL, SOFT = 3000.0, 60.0
-SLOPE, READ, BLACK = 0.5, 6.0, 64.0
-SIZE, FRAMES = 64, 8
+SLOPE, READ = 0.5, 6.0
 
 
 def _recording(seed: int, softness: float) -> InMemory:
-    """Return numpy's own shots, a limit of charge, and noise of read-out."""
-    rng = np.random.default_rng(seed)
-    made = recorded(camera(), seed, rows=SIZE, columns=SIZE, frames=FRAMES, levels=LEVELS)
-    stacks = {}
-    flats = {f"flat-{i}": level for i, level in enumerate(LEVELS)}
-    for name, level in ({"dark-0": 0.0, "dark-1": 0.0} | flats).items():
-        shape = (FRAMES, SIZE, SIZE)
-        charge = level + np.sqrt(SLOPE * level) * rng.standard_normal(shape)
-        if softness:
-            charge = FULL - softness * np.log1p(np.exp((FULL - charge) / softness))
-        noisy = BLACK + np.minimum(charge, FULL) + np.sqrt(READ) * rng.standard_normal(shape)
-        stacks[name] = np.clip(np.rint(noisy), 0, 4095).astype(np.uint16)
-    return InMemory(made.sensor, made.exposures, SIZE, SIZE, made.folder, stacks)
+    """Return a recording whose charge is limited, softly."""
+
+    def limited(charge: NDArray[np.float64]) -> NDArray[np.float64]:
+        soft = FULL - softness * np.log1p(np.exp((FULL - charge) / softness))
+        return np.asarray(np.minimum(soft, FULL))
+
+    return responding(seed, LEVELS, limited)
 
 
 def test_a_soft_limit_starts_near_what_made_it() -> None:

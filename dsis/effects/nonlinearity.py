@@ -62,15 +62,15 @@ class Nonlinearity(Effect):
         return self._bent(image, exposure.read_out.full_scale_dn)
 
     def _bent(self, image: Image, full_scale_dn: float) -> Image:
-        """Return a signal with its bend, DN."""
-        full, end = np.float32(full_scale_dn), np.float32(_END * full_scale_dn)
-        flat = np.ascontiguousarray(image).reshape(-1)
+        """Return a signal with its bend, DN; beyond full scale that of full scale."""
         if self.exponent == _PARABOLA:
-            made = _parabola(flat, np.float32(self._bend(full_scale_dn)), end, full)
-        else:
-            size = self.percent_full_scale / 100 * full_scale_dn / bend_peak(self.exponent)
-            made = _powers(flat, size, self.exponent, float(end), float(full))
-        return made.reshape(image.shape)
+            full, end = np.float32(full_scale_dn), np.float32(_END * full_scale_dn)
+            flat = np.ascontiguousarray(image).reshape(-1)
+            bend = np.float32(self._bend(full_scale_dn))
+            return _parabola(flat, bend, end, full).reshape(image.shape)
+        size = self.percent_full_scale / 100 * full_scale_dn / bend_peak(self.exponent)
+        u = np.clip(image, 0, full_scale_dn).astype(np.float64) / (_END * full_scale_dn)
+        return image + (size * bend_shape(u, self.exponent)).astype(np.float32)
 
     def contributions(self, point: OperatingPoint) -> Mapping[str, float]:
         """Return the shift of the mean, and what the local gain makes of shot noise.
@@ -99,8 +99,8 @@ class Nonlinearity(Effect):
 
 
 def bend_shape(u: NDArray[np.float64], exponent: float) -> NDArray[np.float64]:
-    """Return u (1 - u^k) / k for u > 0; -u ln u where k is 0."""
-    logs = np.log(u)
+    """Return u (1 - u^k) / k, -u ln u where k is 0: 0 where u, which is not negative, is."""
+    logs = np.log(u, out=np.zeros_like(u), where=u > 0)
     return -u * (np.expm1(exponent * logs) / exponent if abs(exponent) > _LOGARITHM else logs)
 
 
@@ -125,20 +125,4 @@ def _parabola(signal: Image, bend: np.float32, end: np.float32, full_scale: np.f
     for i in range(signal.size):
         own = min(signal[i], full_scale)
         out[i] = signal[i] + bend * own * (end - own)
-    return out
-
-
-@kernel
-def _powers(signal: Image, size: float, exponent: float, end: float, full_scale: float) -> Image:
-    """Return a signal with its bend; beyond full scale that of full scale, below black none."""
-    out = np.empty_like(signal)
-    for i in range(signal.size):
-        u = min(float(signal[i]), full_scale) / end
-        bend = 0.0
-        if u > 0:
-            logs = np.log(u)
-            bend = -u * (
-                np.expm1(exponent * logs) / exponent if abs(exponent) > _LOGARITHM else logs
-            )
-        out[i] = signal[i] + np.float32(size * bend)
     return out

@@ -16,10 +16,10 @@ _MIDDLE = 0.5
 class TapMismatch(Effect):
     """Two amplifiers of unequal gain read two regions of the sensor.
 
-    v = Q (1 - g / 2) in the first region and Q (1 + g / 2) in the second: the left and right or
-    upper and lower halves, or the even and odd columns or rows. Charge and its noise are scaled.
-    Parts that are no halves meet at the seam, a share s of all columns or rows: their gains are
-    1 - g (1 - s) and 1 + g s, of mean 1.
+    v = Q (1 - g (1 - s)) in the first region and Q (1 + g s) in the second, where s is the share of
+    the first: the mean gain is 1. Regions are the even and odd columns or rows (s = 1/2), or a left
+    and a right, an upper and a lower part that meet at the seam, a share of all columns or rows:
+    halves unless it is given. Charge and its noise are scaled.
     """
 
     kind: Literal["tap_mismatch"] = "tap_mismatch"
@@ -66,8 +66,6 @@ class TapMismatch(Effect):
 
     def _parts(self, line: NDArray[np.integer], lines: int) -> tuple[NDArray[np.bool_], float]:
         """Return which lines are of the second part, and the share of all that are of the first."""
-        if self.seam == _MIDDLE:
-            return 2 * line >= lines, _MIDDLE
         first = ceil(self.seam * lines)
         return line >= first, first / lines
 

@@ -2,20 +2,19 @@
 
 Diagnoses a recording with the whole vocabulary, then once more for each effect that was named,
 without it: nothing else may be named in its place, and what it explained must stay unexplained.
-Exit status 1 where something else is named.
+Resumable: one line of JSON a diagnosis in --work. Exit status 1 where something else is named.
 """
 
 import argparse
 import sys
-from concurrent.futures import ProcessPoolExecutor
-from functools import partial
-from multiprocessing import get_context
 from pathlib import Path
+from tempfile import gettempdir
 from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parent))  # processes that are started afresh need it too
 from planter import KINDS
 from planter.finder import FINDER, diagnose, named
+from planter.ledger import versions, work_through
 from planter.tables import table
 
 
@@ -34,19 +33,11 @@ def row(whole: dict[str, Any], left: dict[str, Any], kind: str) -> tuple[str, ..
     return kind, ", ".join(instead) or "-", ", ".join(lost) or "-", ", ".join(still) or "-"
 
 
-def found(
-    vocabulary: list[str] | None, recording: Path, finder: str, seed: int, camera: Path
-) -> dict[str, Any]:
-    """Return what a recording is diagnosed as with some vocabulary; None: the whole."""
-    values = diagnose(recording, finder=finder, seed=seed, vocabulary=vocabulary, camera=camera)
-    if "error" in values:
-        sys.exit(values["traceback"])
-    return values
-
-
-def without(how: tuple[Path, str, int, Path], kind: str) -> dict[str, Any]:
-    """Return the same without a kind."""
-    return found(sorted(KINDS - {kind}), *how)
+def found(task: dict[str, Any]) -> dict[str, Any]:
+    """Return what a recording is diagnosed as, with some vocabulary; None: the whole."""
+    paths = {"folder": Path(task["recording"]), "camera": Path(task["camera"])}
+    how = {name: task[name] for name in ("finder", "seed", "vocabulary")}
+    return {"values": diagnose(**paths, **how)}
 
 
 def main() -> None:
@@ -55,19 +46,27 @@ def main() -> None:
     parser.add_argument("recording", type=Path, help="folder or EMVA 1288 descriptor")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--jobs", type=int, default=1, help="diagnoses side by side")
+    parser.add_argument("--work", type=Path, default=Path(gettempdir()) / "dsis-leave-one-out")
     parser.add_argument("--finder", default=FINDER)
     options = parser.parse_args()
 
-    how = options.recording, options.finder, options.seed, options.camera
-    whole = found(None, *how)
+    def diagnosed(vocabularies: dict[str, list[str] | None]) -> dict[str, dict[str, Any]]:
+        how = {name: str(getattr(options, name)) for name in ("camera", "recording", "finder")}
+        tasks = {
+            name: {**how, "seed": options.seed, "vocabulary": words}
+            for name, words in vocabularies.items()
+        }
+        done = work_through(options.work / "found.jsonl", tasks, found, options.jobs)
+        print(versions(done.values()))
+        values = {name: entry["values"] for name, entry in done.items()}
+        for failed in (one for one in values.values() if "error" in one):
+            sys.exit(failed["traceback"])
+        return values
+
+    whole = diagnosed({"all": None})["all"]
     print(f"named: {', '.join(named(whole)) or 'nothing'} ({whole['seconds']:.0f} s)", flush=True)
-    asked = partial(without, how)
-    kinds = named(whole)
-    with ProcessPoolExecutor(options.jobs, get_context("spawn")) as pool:
-        rows = []
-        for kind, left in zip(kinds, pool.map(asked, kinds), strict=True):
-            rows.append(row(whole, left, kind))
-            print(f"without {kind}: {', '.join(named(left))} ({left['seconds']:.0f} s)", flush=True)
+    without = diagnosed({kind: sorted(KINDS - {kind}) for kind in named(whole)})
+    rows = [row(whole, left, kind) for kind, left in without.items()]
     print(table(["left out", "named instead", "no longer named", "left unexplained"], rows))
     wrong = [left for left, instead, _, _ in rows if instead != "-"]
     print("nothing else is named" if not wrong else f"named in place of: {', '.join(wrong)}")

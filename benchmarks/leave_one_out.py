@@ -35,9 +35,14 @@ def row(whole: dict[str, Any], left: dict[str, Any], kind: str) -> tuple[str, ..
 
 def found(task: dict[str, Any]) -> dict[str, Any]:
     """Return what a recording is diagnosed as, with some vocabulary; None: the whole."""
-    paths = {"folder": Path(task["recording"]), "camera": Path(task["camera"])}
-    how = {name: task[name] for name in ("finder", "seed", "vocabulary")}
-    return {"values": diagnose(**paths, **how)}
+    values = diagnose(
+        Path(task["recording"]),
+        finder=task["finder"],
+        seed=task["seed"],
+        vocabulary=task["vocabulary"],
+        camera=Path(task["camera"]),
+    )
+    return {"values": values}
 
 
 def main() -> None:

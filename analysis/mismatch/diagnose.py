@@ -36,9 +36,10 @@ from analysis.mismatch.remarks import remark_on_sizes, remarks_on
 from analysis.mismatch.segments import second_path
 from analysis.mismatch.settle import would_settle
 from analysis.mismatch.source import Source
-from analysis.mismatch.spikes import told_besides, with_spikes, without_spikes
+from analysis.mismatch.spikes import Spikes, told_besides, with_spikes, without_spikes
 from analysis.mismatch.split import Split
 from analysis.mismatch.state import Setting, State
+from analysis.mismatch.steadylight import with_steady_light
 from analysis.mismatch.taking import layout_of
 from analysis.mismatch.thinned import stages, with_all_frames
 from analysis.mismatch.trial import Trial
@@ -98,7 +99,7 @@ def _found(
 ) -> Finding:
     """Return the finding; `how` is the seed and the number of processes."""
     stored, asked = whole_cells(recording), words
-    recording, source, spikes = without_spikes(stored, camera)
+    recording, source, spikes = _read(stored, camera)
     first = unsettled(recording, source)
     words = told_besides(told_beside(words, first), spikes)
     split, layout = _taken(recording, source, without(Split.of(recording), first))
@@ -160,6 +161,12 @@ def _found(
     found = with_first_frames(_finding(camera, whole, final, search, gains, proof, known), first)
     found = with_spikes(found, spikes, stored, split, asked)
     return _said(found, remarks, evidence, asked)
+
+
+def _read(stored: Recording, camera: Camera) -> tuple[Recording, Source, Spikes | None]:
+    """Return the recording without spikes, its source, and these; with light where levels tell."""
+    recording, source, spikes = without_spikes(stored, camera)
+    return with_steady_light(recording, source), source, spikes
 
 
 def _taken(recording: Recording, source: Source, split: Split) -> tuple[Split, Layout]:

@@ -58,12 +58,7 @@ def tested(layout: Layout, null: Null, seen: Vector) -> tuple[Array, Array]:
         if small[np.flatnonzero(row)].all():
             z[size + i] = 0.0
     # The largest of many bins says nothing where it is smaller than chance makes it.
-    peaks = np.array(
-        [
-            key.statistic.endswith(("spectrum_peak", "spectral_peak")) or key.statistic == MOTION
-            for key in null.keys
-        ]
-    )
+    peaks = np.array([key.is_peak or key.statistic == MOTION for key in null.keys])
     z[peaks] = np.maximum(z[peaks], 0.0)
     # No pattern is less than none: lower tails of these ratios of few degrees are heavy.
     nothing = _without_pattern(null, seen)

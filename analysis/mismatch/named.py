@@ -19,6 +19,9 @@ SHAPES = frozenset(
         "at_code",
         "period_codes",
         "full_well_dn",
+        "softness_dn",
+        "exponent",
+        "seam",
         "extent",
     }
 )

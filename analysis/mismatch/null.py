@@ -18,6 +18,7 @@ Array = NDArray[np.float64]
 _OWN = 40.0  # degrees of freedom that the closed form, scaled by name, is worth for a number
 _POOLED = 160.0  # and for the tails: a scale is shared by all numbers of a name
 _LEAST_SCALE = 0.8
+_ODD = 1e-3  # chance of simulations so far off that a score is not normal under the model
 _COMB = 0.4  # relative error of the codes' imbalance that a model predicts
 
 
@@ -71,7 +72,8 @@ def null_of(layout: Layout, simulated: Sequence[Vector], seen: Vector) -> Null:
     """Return the null from simulated recordings.
 
     The closed-form errors are scaled, name by name, to the spread that the simulations show; each
-    number's own spread counts by its degrees of freedom.
+    number's own spread counts by its degrees of freedom. Scores of the highest of many bins are
+    standard normal in white noise: so they are taken, unless the simulations deny it.
     """
     values = np.stack([one.values for one in simulated])
     errors = np.stack([one.errors for one in simulated])
@@ -83,6 +85,8 @@ def null_of(layout: Layout, simulated: Sequence[Vector], seen: Vector) -> Null:
     scale = _by_name(seen.keys, own, known)
     blended = (_OWN * scale + (count - 1) * own) / (_OWN + count - 1)
     sd = error * np.sqrt(np.maximum(blended, _LEAST_SCALE**2) * (1 + 1 / count))
+    normal = known & _normal(seen.keys, np.where(known, np.nan_to_num(values), 0.0))
+    mean, sd = np.where(normal, 0.0, mean), np.where(normal, 1.0, sd)
     # How deep a comb of codes is hangs on the numbers of the camera: on electrons of several DN.
     comb = np.array([key.statistic == "code_imbalance" for key in seen.keys])
     sd = np.where(comb, np.hypot(sd, _COMB * mean), sd)
@@ -122,6 +126,13 @@ def _spread(sums: Contrasts, shared: Sequence[Array], sd: Array) -> Array:
     part = np.minimum(np.sqrt(kept) / sd, 1.0)
     alike: Array = (sums.matrix @ part) ** 2 - sums.matrix**2 @ part**2
     return np.asarray(1 + alike)
+
+
+def _normal(keys: Sequence[Key], values: Array) -> NDArray[np.bool_]:
+    """Return which numbers are scores that simulations, (recording, number), show as normal."""
+    scores = np.array([key.is_peak for key in keys], bool)
+    far = scipy.stats.chi2.sf((values**2).sum(0), len(values)) < _ODD
+    return np.asarray(scores & ~far)
 
 
 def _by_name(keys: Sequence[Key], own: Array, known: NDArray[np.bool_]) -> Array:

@@ -48,6 +48,11 @@ def remarks_on(
         found.append(
             "The light of some flats is unknown: their levels cannot show a bent response."
         )
+    if any(e.light is not None and recording.exposure(e.name).light is None for e in flats):
+        found.append(
+            "The light of the flats is not given. Their levels are in proportion to their exposure "
+            "times: it is taken to be the same in all, and what bends the levels to be the camera."
+        )
     return tuple(found)
 
 

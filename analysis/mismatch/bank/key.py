@@ -31,6 +31,11 @@ class Key:
     detail: str = ""
 
     @property
+    def is_peak(self) -> bool:
+        """Whether it is a normal score of the highest of many bins."""
+        return self.statistic.endswith(("spectrum_peak", "spectral_peak"))
+
+    @property
     def place(self) -> tuple[str, str]:
         """Exposure and channel; of a range of signal in a scene: exposure, channel and range."""
         return self.exposure, f"{self.channel} {self.detail}".strip()

@@ -68,6 +68,20 @@ def test_brighter_fatter_grows_with_the_square_of_the_signal() -> None:
     np.testing.assert_allclose(covariances, 2 * f - 8 * f**2, rtol=SAME_NOISE)
 
 
+@pytest.mark.parametrize("anisotropy", [0.4, -1.0])
+def test_brighter_fatter_has_a_rate_along_each_axis(anisotropy: float) -> None:
+    before = white(np.sqrt(8000.0), 512, 8000.0)
+    after = apply(effect("brighter_fatter", per_dn=2e-6, anisotropy=anisotropy), before)
+    assert after.mean() == pytest.approx(before.mean(), rel=1e-6)
+    rates = np.array([1 + anisotropy, 1 - anisotropy]) * 2e-6 * 8000
+    for (dy, dx), f in zip([(0, 1), (1, 0)], rates, strict=True):
+        covariance = (correlation(after, dy, dx) - correlation(before, dy, dx)) * after.var() / 8000
+        # The kernel's correlation with itself, at its own lag: 2 f (1 - 2 sum f).
+        np.testing.assert_allclose(
+            covariance, 2 * f * (1 - 2 * rates.sum()), rtol=SAME_NOISE, atol=1e-4
+        )
+
+
 @pytest.mark.parametrize("cfa", [Cfa.RGGB, Cfa.MONO])
 def test_spatial_filtering_couples_sites_of_one_colour(cfa: Cfa) -> None:
     step = 1 if cfa is Cfa.MONO else 2

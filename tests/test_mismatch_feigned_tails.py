@@ -9,7 +9,8 @@ import pytest
 from scipy.stats import norm
 
 from analysis.mismatch.bank.key import Key
-from analysis.mismatch.feigned import coded, lopsided
+from analysis.mismatch.feignedtails import coded, lopsided
+from dsis.effects.adc_dnl import AdcDnl
 
 TAILS = "heavy_tailed_read_noise"
 
@@ -69,6 +70,16 @@ def test_codes_that_are_explained_feign_nothing() -> None:
     assert coded(_state(0.1, 0.08, located=False), TAILS, WITHOUT) is None
     assert coded(_state(0.1, 0.0), TAILS, WITHOUT) is None
     assert coded(_state(0.1, 0.08), "rts", WITHOUT) is None
+
+
+def test_widths_that_are_named_feign_tails_too() -> None:
+    """The model's converter is drawn with other codes: 0.03 in noise of one scatter by 0.055."""
+    state = _state(0.1, 0.0, 1.0, located=False)
+    state.camera.effect = (AdcDnl(rms_lsb=0.03),)
+    assert coded(state, TAILS, WITHOUT) is not None
+    far = _state(0.6, 0.0, 1.0, located=False)
+    far.camera.effect = state.camera.effect
+    assert coded(far, TAILS, WITHOUT) is None
 
 
 def test_tails_where_widths_are_unknown_count_as_claimed() -> None:

@@ -15,10 +15,10 @@ from analysis.mismatch.bank.standing import NAME as FIXED_WAVE
 from analysis.mismatch.contradicted import Denial, rival
 from analysis.mismatch.displaced import displaced
 from analysis.mismatch.edged import STATISTIC, edged, single
+from analysis.mismatch.feignedtails import coded, lopsided
+from analysis.mismatch.jumped import jumped
 from analysis.mismatch.nofield import no_field
 from analysis.mismatch.persisting import persisting
-from analysis.mismatch.recalibrate import code_step
-from analysis.mismatch.resolved import FAR_OFF
 from analysis.mismatch.rivalled import rivalled
 from analysis.mismatch.state import State
 from analysis.mismatch.unequal import unequal
@@ -41,10 +41,7 @@ _LEAST_NUMBER = 0.5  # of a cube root of a variance: below, its error is another
 _SHAPED = frozenset({"half_seam", "parity", STATISTIC})
 _NEIGHBOURS = frozenset({"fixed_correlation_0_1", "fixed_correlation_1_0", "fixed_patch_variance"})
 _MOST = 0.5  # of a pattern's variance, or of tails, that something else may feign
-_SCATTER = 1.84  # see `coded`
-_FEW_ELECTRONS = 1.0  # skewness of shot noise of one electron: read noise beside it lessens it
 _LONGEST = 1 / 8  # of a frame's rows, over which bands are taken to last
-_LIKELY = 2.0  # standard deviations that chance may well have
 
 
 def of_another(state: State, effect: Effect, without: Array) -> Denial | None:
@@ -62,6 +59,7 @@ def of_another(state: State, effect: Effect, without: Array) -> Denial | None:
         or single(state, effect)
         or rivalled(state, effect)
         or heated(state, kind)
+        or jumped(state, effect)
         or wandering(state, effect)
         or unequal(state, effect, without)
         or uneven(state, effect)
@@ -249,69 +247,6 @@ def _slow_share(rows: int) -> float:
     turn = 2 * np.pi * cycles / rows
     power = (1 - alike) ** 2 / (1 - 2 * alike * np.cos(turn) + alike**2)
     return float((power / cycles).sum() / (1 / cycles).sum())
-
-
-def coded(state: State, kind: str, without: Array) -> Denial | None:
-    """Return how heavy tails are denied by codes that are not equally wide; None: they are not.
-
-    Codes whose widths scatter by d (of a code) change the excess kurtosis of noise of s codes by
-    chance: by sum(w 4 He2(u) phi(u)) / s over codes at u, whose standard deviation is 1.84 d /
-    sqrt(s). It is the same in all darks, which use the same codes, and another at each level. Where
-    such widths are left unexplained, and two standard deviations feign half of what tails would
-    explain, there may be no tails. What is claimed where widths are unknown, in less noise than two
-    codes, counts as claimed.
-    """
-    codes = ("code_imbalance", "code_spacing")
-    if kind != "heavy_tailed_read_noise" or all(m.statistic not in codes for m in state.mismatches):
-        return None
-    claimed, left = {}, {}
-    for i, key in enumerate(state.vector.keys):
-        place = (key.exposure, key.channel)
-        known = state.null.known[i] and np.isfinite(without[i])
-        if not known or place not in state.setting.seen.levels or key.scope != "exposure":
-            continue
-        if key.statistic == "kurtosis":
-            claimed[place] = state.null.mean[i] - without[i]
-        elif key.statistic == "code_imbalance":
-            seen, expected = state.vector.values[i], state.null.mean[i]
-            left[place] = np.sqrt(max(seen**2 - expected**2, 0.0)) if seen > 0 else 0.0
-    whole = sum(change**2 for change in claimed.values())
-    darks = {e.name for e in state.setting.layout.exposures if e.kind == "dark"}
-    in_darks, elsewhere = 0.0, 0.0
-    for place in sorted(claimed.keys() & left.keys()):
-        sd = max(state.setting.seen.levels[place].variance_dn2, 1e-9) ** 0.5
-        scatter = _SCATTER * left[place] * (code_step(state.camera) / sd) ** 0.5
-        if place[0] in darks:
-            in_darks += abs(claimed[place]) * scatter
-        else:
-            elsewhere += (claimed[place] * scatter) ** 2
-    fake = _LIKELY * (in_darks**2 + elsewhere) ** 0.5
-    if whole <= 0 or fake <= _MOST * whole:
-        return None
-    return Denial(1 - fake / whole, "codes are not equally wide, and feign tails")
-
-
-def lopsided(state: State, kind: str) -> Denial | None:
-    """Return how heavy tails are denied by noise that leans to one side; None: they are not.
-
-    Heavy-tailed noise is as likely above as below. Chance leans it far, which the null with its
-    tails knows; what leans beyond that, and more than shot noise can, are spikes of one sign.
-    """
-    if kind != "heavy_tailed_read_noise":
-        return None
-    left = state.null.departures(state.vector)
-    leans = any(
-        key.statistic == "skewness"
-        and key.scope == "exposure"
-        and abs(z) > FAR_OFF
-        and abs(value) > _FEW_ELECTRONS
-        for key, z, value in zip(state.vector.keys, left, state.vector.values, strict=False)
-    )
-    return (
-        Denial(0.0, "its tails are alike on both sides, those of the noise are not")
-        if leans
-        else None
-    )
 
 
 def carried(state: State, effect: Effect) -> Denial | None:

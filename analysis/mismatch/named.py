@@ -22,6 +22,7 @@ SHAPES = frozenset(
         "softness_dn",
         "exponent",
         "seam",
+        "anisotropy",
         "extent",
     }
 )

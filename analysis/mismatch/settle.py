@@ -14,6 +14,7 @@ _PAIRS = {
     frozenset({"crosstalk", "spatial_filtering"}): "darks: only a filter correlates read noise",
     frozenset({"dsnu", "prnu"}): "darks and a bright flat of many frames",
     frozenset({"dsnu", "hot_pixels"}): "darks at two exposure times",
+    frozenset({"hot_pixels", "rts"}): "darks at two exposure times",
     frozenset({"nonlinearity", "saturation"}): "more levels near the top of the range",
     frozenset({"nonlinearity", "dual_gain_mismatch"}): "more levels on both sides of the switch",
     frozenset({"nonlinearity", "brighter_fatter"}): "flats of known light: only one bends the mean",

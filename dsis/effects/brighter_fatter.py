@@ -8,24 +8,31 @@ from pydantic import Field
 
 from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, Stage
 
+_ALIKE = 0.0  # anisotropy: both axes are alike
+
 
 class BrighterFatter(Effect):
     """Charge is shared with nearest neighbours in proportion to the charge that is there.
 
     Q'(p) = Q(p) + a sum_n (Q(n) + Q(p)) / 2 (Q(n) - Q(p)): at a mean signal S the share a S goes
     to each neighbour. A flat keeps its mean; covariances grow as 2 a m S^2 and the variance falls
-    by 8 a m S^2. Neighbouring sites of a mosaic, of whatever colour, are coupled.
+    by 8 a m S^2. Neighbouring sites of a mosaic, of whatever colour, are coupled. What bounds pixels
+    along rows is not what bounds them along columns: a (1 + e) is the rate along rows, a (1 - e)
+    that along columns, e the `anisotropy`.
     """
 
     kind: Literal["brighter_fatter"] = "brighter_fatter"
     per_dn: Annotated[float, Field(ge=0, le=1e-3, examples=[5e-6])]
+    anisotropy: Annotated[float, Field(ge=-1, le=1, exclude_if=_ALIKE.__eq__)] = _ALIKE
 
     stage: ClassVar[Stage] = Stage.CHARGE
     rank: ClassVar[int] = -50
     draws: ClassVar[bool] = False
     reference: ClassVar[str] = (
         "Antilogus et al., The brighter-fatter effect and pixel correlations in CCD sensors, JINST "
-        "9, 2014; Astier et al., The shape of the photon transfer curve, A&A 629, 2019"
+        "9, 2014; Astier et al., The shape of the photon transfer curve, A&A 629, 2019; Guyonnet "
+        "et al., Evidence for self-interaction of charge distribution in charge-coupled devices, "
+        "A&A 575, 2015 (axes)"
     )
     measures: ClassVar[frozenset[str]] = frozenset(
         {
@@ -58,9 +65,9 @@ class BrighterFatter(Effect):
 
     def exchanged(self, image: Image) -> Image:
         """Return what becomes of the charge of neighbouring sites."""
-        made, square = image.copy(), np.float32(self.per_dn / 2) * image * image
-        for axis in (0, 1):
-            flow = np.diff(square, axis=axis)
+        made, square = image.copy(), image * image
+        for axis, rate in enumerate(self._rates):
+            flow = np.diff(np.float32(rate / 2) * square, axis=axis)
             here, there = (
                 (slice(None),) * axis + (slice(-1),),
                 (slice(None),) * axis + (slice(1, None),),
@@ -69,12 +76,18 @@ class BrighterFatter(Effect):
             made[there] -= flow
         return made
 
+    @property
+    def _rates(self) -> tuple[float, float]:
+        """Rates per DN along columns (from row to row) and along rows."""
+        return self.per_dn * (1 - self.anisotropy), self.per_dn * (1 + self.anisotropy)
+
     def reach_pixels(self) -> int:
         """Return how far away a pixel may matter."""
         return 1
 
     def contributions(self, point: OperatingPoint) -> Mapping[str, float]:
         """Return what a share a S to each neighbour makes of shot noise (leading order in V)."""
-        f = self.per_dn * max(point.signal_dn, 0.0)
-        kernel = dict.fromkeys([(0, 1), (0, -1), (1, 0), (-1, 0)], f) | {(0, 0): 1 - 4 * f}
+        down, across = (rate * max(point.signal_dn, 0.0) for rate in self._rates)
+        kernel = dict.fromkeys([(0, 1), (0, -1)], across) | dict.fromkeys([(1, 0), (-1, 0)], down)
+        kernel[0, 0] = 1 - 2 * (across + down)
         return point.filtered(point.shot_variance_dn2, kernel) | {"level": 0.0}

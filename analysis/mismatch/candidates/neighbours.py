@@ -53,12 +53,17 @@ def _brighter_fatter(clues: Clues) -> Sequence[Proposal]:
     def shape(place: tuple[str, str]) -> float:
         return 2 * clues.signal(place) * clues.shot_share(place)
 
-    across, _ = clues.amplitude(_ALONG_ROWS, shape)
-    down, _ = clues.amplitude(_ALONG_COLUMNS, shape)
+    across, error = clues.amplitude(_ALONG_ROWS, shape)
+    down, other = clues.amplitude(_ALONG_COLUMNS, shape)
     found: list[Proposal] = []
     for rate in ((across + down) / 2, _exchanged(clues)):
         if rate > 0:
             found += proposals("brighter_fatter", ["per_dn"], per_dn=rate)
+    if across + down > 0 and abs(across - down) > _TOLD * np.hypot(error, other):
+        apart = float(np.clip((across - down) / (across + down), -0.95, 0.95))
+        names = ["per_dn", "anisotropy"]
+        start = dict(zip(names, ((across + down) / 2, apart), strict=True))
+        found += proposals("brighter_fatter", names, names[1:], **start)
     return found
 
 

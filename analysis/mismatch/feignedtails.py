@@ -1,0 +1,84 @@
+"""Tails that something else feigns: codes of unequal width, noise that leans to one side."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.mismatch.contradicted import Denial
+from analysis.mismatch.recalibrate import code_step
+from analysis.mismatch.resolved import FAR_OFF
+from analysis.mismatch.state import State
+from dsis.effects.adc_dnl import AdcDnl
+
+Array = NDArray[np.float64]
+_MOST = 0.5  # of tails, that something else may feign
+_SCATTER = 1.84  # see `coded`
+_LIKELY = 2.0  # standard deviations that chance may well have
+_FEW_ELECTRONS = 1.0  # skewness of shot noise of one electron: read noise beside it lessens it
+
+
+def coded(state: State, kind: str, without: Array) -> Denial | None:
+    """Return how heavy tails are denied by codes that are not equally wide; None: they are not.
+
+    Codes whose widths scatter by d (of a code) change the excess kurtosis of noise of s codes by
+    chance: by sum(w 4 He2(u) phi(u)) / s over codes at u, whose standard deviation is 1.84 d /
+    sqrt(s). It is the same in all darks, which use the same codes, and another at each level. Where
+    such widths are left unexplained or named, and two standard deviations feign half of what tails
+    would explain, there may be no tails: of a converter whose widths are named the model draws
+    others. What is claimed where widths are unknown, in less noise than two codes, counts as
+    claimed.
+    """
+    codes = ("code_imbalance", "code_spacing")
+    widths = [e.rms_lsb for e in state.camera.effect if isinstance(e, AdcDnl)]
+    drawn = float(np.linalg.norm(widths)) if widths else 0.0
+    open_ = any(m.statistic in codes for m in state.mismatches)
+    if kind != "heavy_tailed_read_noise" or not (open_ or drawn):
+        return None
+    claimed, left = {}, {}
+    for i, key in enumerate(state.vector.keys):
+        place = (key.exposure, key.channel)
+        known = state.null.known[i] and np.isfinite(without[i])
+        if not known or place not in state.setting.seen.levels or key.scope != "exposure":
+            continue
+        if key.statistic == "kurtosis":
+            claimed[place] = state.null.mean[i] - without[i]
+        elif key.statistic == "code_imbalance":
+            seen, expected = state.vector.values[i], state.null.mean[i]
+            beyond = max(seen**2 - expected**2, 0.0) if open_ and seen > 0 else 0.0
+            left[place] = np.hypot(np.sqrt(beyond), drawn)
+    whole = sum(change**2 for change in claimed.values())
+    darks = {e.name for e in state.setting.layout.exposures if e.kind == "dark"}
+    in_darks, elsewhere = 0.0, 0.0
+    for place in sorted(claimed.keys() & left.keys()):
+        sd = max(state.setting.seen.levels[place].variance_dn2, 1e-9) ** 0.5
+        scatter = _SCATTER * left[place] * (code_step(state.camera) / sd) ** 0.5
+        if place[0] in darks:
+            in_darks += abs(claimed[place]) * scatter
+        else:
+            elsewhere += (claimed[place] * scatter) ** 2
+    fake = _LIKELY * (in_darks**2 + elsewhere) ** 0.5
+    if whole <= 0 or fake <= _MOST * whole:
+        return None
+    return Denial(1 - fake / whole, "codes are not equally wide, and feign tails")
+
+
+def lopsided(state: State, kind: str) -> Denial | None:
+    """Return how heavy tails are denied by noise that leans to one side; None: they are not.
+
+    Heavy-tailed noise is as likely above as below. Chance leans it far, which the null with its
+    tails knows; what leans beyond that, and more than shot noise can, are spikes of one sign.
+    """
+    if kind != "heavy_tailed_read_noise":
+        return None
+    left = state.null.departures(state.vector)
+    leans = any(
+        key.statistic == "skewness"
+        and key.scope == "exposure"
+        and abs(z) > FAR_OFF
+        and abs(value) > _FEW_ELECTRONS
+        for key, z, value in zip(state.vector.keys, left, state.vector.values, strict=False)
+    )
+    return (
+        Denial(0.0, "its tails are alike on both sides, those of the noise are not")
+        if leans
+        else None
+    )

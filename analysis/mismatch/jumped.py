@@ -1,0 +1,26 @@
+"""Pixels that stand out in the dark, and may be some that jump but stay where they are."""
+
+from analysis.mismatch.contradicted import Denial
+from analysis.mismatch.state import State
+from dsis.effects import Effect
+from dsis.effects.hot_pixels import HotPixels
+from dsis.effects.rts import Rts
+
+
+def jumped(state: State, effect: Effect) -> Denial | None:
+    """Return how hot pixels are denied by pixels that jump; None: they are not.
+
+    A pixel that jumps rarely, or back at once, is in one of its two states through all frames of an
+    exposure, and seems brighter than others; that it does not grow with exposure time only another
+    time tells. Where all exposures take the same, and as many pixels jump as stand out, or more,
+    there may be no hot ones.
+    """
+    if not isinstance(effect, HotPixels):
+        return None
+    if len({exposure.exposure_time_s for exposure in state.setting.layout.uniform}) > 1:
+        return None
+    jumping = sum(e.pixel_fraction for e in state.camera.effect if isinstance(e, Rts))
+    if jumping < effect.pixel_fraction:
+        return None
+    why = "pixels that jump may stay in one state, and all exposures take the same time"
+    return Denial(0.0, why)

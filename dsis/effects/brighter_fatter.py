@@ -16,9 +16,9 @@ class BrighterFatter(Effect):
 
     Q'(p) = Q(p) + a sum_n (Q(n) + Q(p)) / 2 (Q(n) - Q(p)): at a mean signal S the share a S goes
     to each neighbour. A flat keeps its mean; covariances grow as 2 a m S^2 and the variance falls
-    by 8 a m S^2. Neighbouring sites of a mosaic, of whatever colour, are coupled. What bounds pixels
-    along rows is not what bounds them along columns: a (1 + e) is the rate along rows, a (1 - e)
-    that along columns, e the `anisotropy`.
+    by 8 a m S^2. Neighbouring sites of a mosaic, of whatever colour, are coupled. Pixels
+    are not bounded alike along both axes: a (1 + e) is the rate along rows, a (1 - e) that along
+    columns, e the `anisotropy`.
     """
 
     kind: Literal["brighter_fatter"] = "brighter_fatter"

@@ -8,9 +8,12 @@ import numpy as np
 
 from analysis.mismatch.bank.coherent import RANKS, Peak, line_name
 from analysis.mismatch.bank.scalars import UNKNOWN
-from analysis.mismatch.candidates.candidate import Candidate, Proposal, proposals
+from analysis.mismatch.candidates.candidate import Candidate, Proposal, measured, proposals
 from analysis.mismatch.clues import Clues, alike
+from analysis.mismatch.framewalk import FrameMeans, Walk, walk_of
 from analysis.mismatch.instance import Frequency, same_line
+from dsis.effects.black_level_drift import BlackLevelDrift
+from dsis.effects.flicker import Flicker
 
 _ALTERNATING = {"checkerboard": ((0.5, 0.5),), "rows": ((0.0, 0.5),), "columns": ((0.5, 0.0),)}
 _BY_PLANE = {  # of a mosaic: what alternates in each of its planes
@@ -22,6 +25,7 @@ _BY_PLANE = {  # of a mosaic: what alternates in each of its planes
 _SLOW = ("row_variance", "slow_row_variance", "row_correlation", "line_correlation",
          "frame_variance", "row_spectrum_peak")  # fmt: skip
 _BANDS = {"rows of light": "row_spectrum_peak of light", "rows": "row_spectrum_peak"}
+_PERSISTS = 3.0  # of log-likelihood: odds of 20 that a wander of frames lasts
 _TINY = 1e-300
 _WAVES = 64  # a row: means over rows have next to nothing of shorter ones
 _PARABOLA = 1.3  # scatter of a parabola's top on half bins, over the bound (Rife & Boorstyn, 1974)
@@ -40,7 +44,26 @@ def _drift(clues: Clues) -> Sequence[Proposal]:
     variance, _ = clues.amplitude("frame_variance", alike)
     if variance <= 0:
         return []
-    return proposals("black_level_drift", ["sigma_dn"], sigma_dn=sqrt(variance))
+    walk = _walk(clues)
+    if walk is None or walk.gain < _PERSISTS:
+        return proposals("black_level_drift", ["sigma_dn"], sigma_dn=sqrt(variance))
+    values = {"sigma_dn": walk.sigma_dn, "persistence": walk.persistence}
+    start = proposals("black_level_drift", (), **values)
+    return [measured(own, values, walk.errors) for own in start]
+
+
+def _walk(clues: Clues) -> Walk | None:
+    """Return how the means of whole frames wander; None: it is not seen, or is the camera's own."""
+    if any(isinstance(own, BlackLevelDrift) for own in clues.camera.effect):
+        return None
+    of_light = [own.sigma_percent for own in clues.camera.effect if isinstance(own, Flicker)]
+    share = float(np.linalg.norm(of_light)) / 100 if of_light else 0.0
+    found = []
+    for exposure in clues.layout.uniform:
+        signals = [clues.signal((exposure.name, c)) for c in clues.layout.channels]
+        light = share * float(np.mean(signals))
+        found.append(FrameMeans.of(clues.seen.lines, exposure.name, exposure.numbers, light))
+    return walk_of([own for own in found if own is not None])
 
 
 def _flicker(clues: Clues) -> Sequence[Proposal]:

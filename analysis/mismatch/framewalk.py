@@ -1,0 +1,125 @@
+"""How the mean of whole frames wanders: how far, and how long it stays where it is.
+
+An offset that follows b(t) = rho b(t - 1) + sqrt(1 - rho^2) n(t) has the covariance sigma^2 rho^k
+over k frames. Means of frames have it beside what pixels and lines make of them, which is new in
+each. Of few frames an offset that stays shows less of its variance than one that does not: both are
+fitted together, by the likelihood of contrasts between the frames of each exposure (restricted
+maximum likelihood: Patterson & Thompson, Biometrika 58, 1971), whose level nobody knows.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import helmert
+
+from analysis.mismatch.bank.linemeans import AXES, Axis, LineMeans
+
+Array = NDArray[np.float64]
+_LEAST = 3  # frames of an exposure
+_PERSISTENCES = np.linspace(0.0, 0.98, 50)
+_WIDEST, _SIZES = 30.0, 121  # of the scatter that is seen, times and over; sizes tried
+_INTERVAL = 1.92  # of log-likelihood: half of chi-squared at 95 %
+_NORMAL = 1.96
+
+
+@dataclass(frozen=True)
+class Walk:
+    """A wander of whole frames.
+
+    Attributes
+    ----------
+    sigma_dn, persistence
+        Its standard deviation, and its correlation from frame to frame.
+    errors
+        Of both by name: to the farther end of the 95 % interval of the profile likelihood, over
+        1.96.
+    gain
+        Of log-likelihood over one that does not persist, nats.
+    """
+
+    sigma_dn: float
+    persistence: float
+    errors: Mapping[str, float]
+    gain: float
+
+
+@dataclass(frozen=True)
+class FrameMeans:
+    """Means of the frames of one exposure.
+
+    Attributes
+    ----------
+    numbers
+        Of the frames in the order of recording, (frame,).
+    means
+        DN, (frame,).
+    new_dn2
+        Variance of a mean by what is new in each frame: pixels, lines, light.
+    """
+
+    numbers: Array
+    means: Array
+    new_dn2: float
+
+    @classmethod
+    def of(
+        cls,
+        lines: Mapping[tuple[str, Axis], LineMeans],
+        exposure: str,
+        numbers: Sequence[int],
+        light_dn: float = 0.0,
+    ) -> "FrameMeans | None":
+        """Return them of the lines of an exposure; None: they are not known.
+
+        `light_dn` is the standard deviation of its light.
+        """
+        rows, columns = (lines.get((exposure, axis)) for axis in AXES)
+        if rows is None or columns is None or not _LEAST <= rows.frames == len(numbers):
+            return None
+        new = [own.moving.mean() / own.moving.size for own in (rows, columns)]
+        pixels = rows.noise_dn2 / rows.moving.size  # which both have
+        means = rows.parts.mean(1)
+        return cls(np.array(numbers, float), means, float(sum(new) - pixels + light_dn**2))
+
+
+def walk_of(exposures: Sequence[FrameMeans]) -> Walk | None:
+    """Return the likeliest wander of frames; None where they show none."""
+    excess = [float(own.means.var(ddof=1)) - own.new_dn2 for own in exposures]
+    if not exposures or max(excess) <= 0:
+        return None
+    top = float(np.sqrt(max(excess)))
+    sizes = top * np.geomspace(1 / _WIDEST, _WIDEST, _SIZES)
+    likely = np.zeros((_PERSISTENCES.size, _SIZES))
+    for own in exposures:
+        likely += _loglik(own, sizes)
+    at, of = (int(i) for i in np.unravel_index(int(likely.argmax()), likely.shape))
+    best = float(likely[at, of])
+    errors = {
+        name: _reach(values, likely.max(axis), which) / _NORMAL
+        for name, values, axis, which in (
+            ("sigma_dn", sizes, 0, of),
+            ("persistence", _PERSISTENCES, 1, at),
+        )
+    }
+    gain = best - float(likely[0].max())
+    return Walk(float(sizes[of]), float(_PERSISTENCES[at]), errors, gain)
+
+
+def _loglik(own: FrameMeans, sizes: Array) -> Array:
+    """Return the log-likelihood of contrasts between frames: (persistence, size)."""
+    contrasts = helmert(own.numbers.size)
+    seen = contrasts @ own.means
+    apart = np.abs(own.numbers[:, np.newaxis] - own.numbers)
+    alike = _PERSISTENCES[:, np.newaxis, np.newaxis] ** apart
+    values, vectors = np.linalg.eigh(contrasts @ alike @ contrasts.T)
+    turned = np.einsum("pji,j->pi", vectors, seen)[:, np.newaxis]
+    square = sizes[:, np.newaxis] ** 2 * np.maximum(values, 0.0)[:, np.newaxis] + own.new_dn2
+    return np.asarray(-(np.log(square) + turned**2 / square).sum(2) / 2)
+
+
+def _reach(values: Array, likely: Array, at: int) -> float:
+    """Return how far the farther end of an interval is from the likeliest of some values."""
+    inside = values[likely > likely[at] - _INTERVAL]
+    return float(max(inside[-1] - values[at], values[at] - inside[0]))

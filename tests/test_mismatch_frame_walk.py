@@ -1,0 +1,49 @@
+"""How far whole frames wander, and how long that lasts: numpy's own autoregressive walks."""
+
+import numpy as np
+import pytest
+
+from analysis.mismatch.framewalk import FrameMeans, Walk, walk_of
+
+NEW_DN2 = 0.04**2
+FRAMES = [n for n in range(10) if n not in (3, 7)]  # locked frames are not looked at
+
+
+def _walk(
+    rng: np.random.Generator, sigma: float, persistence: float, exposures: int = 10
+) -> Walk | None:
+    found = []
+    for _ in range(exposures):
+        walk = [rng.standard_normal()]
+        for _ in range(9):
+            walk.append(
+                persistence * walk[-1] + np.sqrt(1 - persistence**2) * rng.standard_normal()
+            )
+        means = 100 + sigma * np.array(walk) + np.sqrt(NEW_DN2) * rng.standard_normal(10)
+        found.append(FrameMeans(np.array(FRAMES, float), means[FRAMES], NEW_DN2))
+    return walk_of(found)
+
+
+@pytest.mark.parametrize("persistence", [0.0, 0.6, 0.8])
+def test_size_and_persistence_are_those_planted(persistence: float) -> None:
+    rng = np.random.default_rng(3)
+    found = [_walk(rng, 0.2, persistence) for _ in range(40)]
+    walks = [own for own in found if own is not None]
+    assert len(walks) == len(found)
+    inside = [abs(own.sigma_dn - 0.2) < 1.96 * own.errors["sigma_dn"] for own in walks]
+    lasting = [
+        abs(own.persistence - persistence) < 1.96 * own.errors["persistence"] + 0.011
+        for own in walks  # half a step of those tried
+    ]
+    assert np.mean(inside) > 0.88  # 95 % of 40, two standard deviations below
+    assert np.mean(lasting) > 0.88
+    assert np.median([own.sigma_dn for own in walks]) == pytest.approx(0.2, rel=0.1)
+    sure = np.mean([own.gain > 3.0 for own in walks])
+    assert sure > 0.7 if persistence else sure < 0.05
+
+
+def test_frames_that_stand_still_do_not_wander() -> None:
+    rng = np.random.default_rng(5)
+    means = 50 + 1e-3 * rng.standard_normal(8)
+    assert walk_of([FrameMeans(np.arange(8.0), means, NEW_DN2)]) is None
+    assert walk_of([]) is None

@@ -217,7 +217,11 @@ def _rows(alike: float, white: float, length: float, seed: int) -> Any:
     keep = np.exp(-1 / length)
     drawn = rng.standard_normal((400, 200)) * (1 - keep**2) ** 0.5
     rows = alike**0.5 * lfilter([1.0], [1.0, -keep], drawn, axis=1)[:, 60:]
-    rows = rows + (1 + white) ** 0.5 * rng.standard_normal(rows.shape)
+    return _of_rows(rows + (1 + white) ** 0.5 * rng.standard_normal(rows.shape))
+
+
+def _of_rows(rows: NDArray[np.float64]) -> Any:
+    """Return a state of means of rows, (frame, row)."""
     power = float((rows**2).mean())
     values = {
         ("row_correlation", f"lag {k}"): float((rows[:, k:] * rows[:, :-k]).mean()) / power
@@ -233,6 +237,17 @@ def test_rows_that_are_alike_are_no_white_noise_of_rows(length: float) -> None:
     denial = displaced(state, "row_noise", _none(state))
     assert denial is not None
     assert denial.share < 0.25
+
+
+def test_a_half_that_moves_is_no_white_noise_of_rows() -> None:
+    """Rows beside one another are as alike as those farther off, or by chance a little less."""
+    seen = []
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        halves = np.where(np.arange(140) < 70, 0.7, -0.7) * rng.choice([-1, 1], (100, 1))
+        state = _of_rows(halves + rng.standard_normal(halves.shape))
+        seen.append(displaced(state, "row_noise", _none(state)))
+    assert all(seen)
 
 
 def test_white_rows_beside_some_that_are_alike_stay() -> None:

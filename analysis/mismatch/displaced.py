@@ -294,7 +294,7 @@ def _of_alike_rows(state: State) -> Denial | None:
     shares = [
         one["lag 1"] ** 2 / one["lag 2"]
         for one in lags.values()
-        if len(one) == 2 and 0 < one["lag 2"] < one["lag 1"]
+        if len(one) == 2 and min(one.values()) > 0
     ]
     if not shares:
         return None

@@ -1,0 +1,49 @@
+"""Outermost lines pull smooth surfaces along: they are no field of gains. Maps are numpy's own."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter
+
+from analysis.mismatch.fewedges import of_outermost_lines
+from dsis.effects.prnu import Prnu
+from dsis.effects.smooth_prnu import SmoothPrnu
+
+FIELD = SmoothPrnu(sigma_percent=0.05, length_pixels=12.0)
+NOISE = 2e-3
+
+
+def _state(*maps: NDArray[np.float64]) -> Any:
+    images = {(f"{k}", "gain"): (own, NOISE) for k, own in enumerate(maps)}
+    return SimpleNamespace(setting=SimpleNamespace(seen=SimpleNamespace(images=images)))
+
+
+def _map(seed: int, *, edge: float = 0.0, field: float = 0.0) -> NDArray[np.float64]:
+    rng = np.random.default_rng(seed)
+    smooth = gaussian_filter(rng.standard_normal((48, 64)), 8.0, mode="wrap")
+    image = NOISE * rng.standard_normal((48, 64)) + field * NOISE * smooth / smooth.std()
+    image[0] += edge * NOISE
+    image[:, -1] -= edge * NOISE
+    return image
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_lines_at_an_edge_are_no_field(seed: int) -> None:
+    denial = of_outermost_lines(_state(*(_map(4 * seed + k, edge=1.2) for k in range(4))), FIELD)
+    assert denial is not None
+    assert denial.share < 0.5
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("edge", [0.0, 0.3])
+def test_a_field_goes_on_inside(seed: int, edge: float) -> None:
+    maps = [_map(4 * seed + k, edge=edge, field=0.3) for k in range(4)]
+    assert of_outermost_lines(_state(*maps), FIELD) is None
+    assert of_outermost_lines(_state(*maps), Prnu(sigma_percent=0.05)) is None
+
+
+def test_nothing_is_denied_where_nothing_is_smooth() -> None:
+    assert of_outermost_lines(_state(), FIELD) is None

@@ -77,6 +77,8 @@ def test_widths_that_are_named_feign_tails_too() -> None:
     state = _state(0.1, 0.0, 1.0, located=False)
     state.camera.effect = (AdcDnl(rms_lsb=0.03),)
     assert coded(state, TAILS, WITHOUT) is not None
+    state.null.known[1] = False  # noise of one code does not show the widths
+    assert coded(state, TAILS, WITHOUT) is not None
     far = _state(0.6, 0.0, 1.0, located=False)
     far.camera.effect = state.camera.effect
     assert coded(far, TAILS, WITHOUT) is None

@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.contradicted import Denial
+from analysis.mismatch.layout import Place
 from analysis.mismatch.recalibrate import code_step
 from analysis.mismatch.resolved import FAR_OFF
 from analysis.mismatch.state import State
@@ -33,7 +34,8 @@ def coded(state: State, kind: str, without: Array) -> Denial | None:
     open_ = any(m.statistic in codes for m in state.mismatches)
     if kind != "heavy_tailed_read_noise" or not (open_ or drawn):
         return None
-    claimed, left = {}, {}
+    claimed: dict[Place, float] = {}
+    left: dict[Place, float] = {}
     for i, key in enumerate(state.vector.keys):
         place = (key.exposure, key.channel)
         known = state.null.known[i] and np.isfinite(without[i])
@@ -44,10 +46,12 @@ def coded(state: State, kind: str, without: Array) -> Denial | None:
         elif key.statistic == "code_imbalance":
             seen, expected = state.vector.values[i], state.null.mean[i]
             beyond = max(seen**2 - expected**2, 0.0) if open_ and seen > 0 else 0.0
-            left[place] = np.hypot(np.sqrt(beyond), drawn)
+            left[place] = float(np.hypot(np.sqrt(beyond), drawn))
     whole = sum(change**2 for change in claimed.values())
     darks = {e.name for e in state.setting.layout.exposures if e.kind == "dark"}
     in_darks, elsewhere = 0.0, 0.0
+    if drawn:
+        left = dict.fromkeys(claimed, drawn) | left
     for place in sorted(claimed.keys() & left.keys()):
         sd = max(state.setting.seen.levels[place].variance_dn2, 1e-9) ** 0.5
         scatter = _SCATTER * left[place] * (code_step(state.camera) / sd) ** 0.5

@@ -10,7 +10,7 @@ from scipy.linalg import toeplitz
 
 from analysis.mismatch.rank import LEAST_GAIN, TOLD_APART, Ranked
 from analysis.mismatch.rowlaw import RowLaw, bands, beside, constant_of, fitted, pink, waves_of
-from analysis.mismatch.rowpower import SLOW, Powers, Size, powers_of
+from analysis.mismatch.rowpower import SLOW, Powers, Size, powers_of, without_lines
 from analysis.mismatch.rowtold import as_shown, unlike_frames
 
 SURE = 5.0  # standard errors
@@ -189,6 +189,30 @@ def test_what_is_weak_is_told_wrongly_no_more_often_than_is_said(cause: Rows, si
         assert odds is not None
         wrong += (odds if cause is _pink else -odds) < -TOLD_APART
     assert wrong <= 1
+
+
+@pytest.mark.parametrize("kind", ["pink_noise", "row_banding"])
+def test_a_line_beside_them_changes_nothing(kind: str) -> None:
+    """Bands of a lamp's light, of a phase of their own in each frame, as large as they are."""
+
+    def made(rng: np.random.Generator) -> Any:
+        rows = np.arange(SIZE.rows)[:, np.newaxis] / SIZE.rows
+        wave = 0.6 * np.cos(2 * np.pi * (8.49 * rows + rng.uniform()))
+        return wave + (_pink(rng) if kind == "pink_noise" else _bands(7.0)(rng))
+
+    rng = np.random.default_rng(21)
+    powers = without_lines(_powers(made, 0.5, rng), SIZE)
+    odds = RowLaw(SIZE, powers).odds(kind, *({"pink_noise", "row_banding"} - {kind}), NOTHING)
+    assert odds is not None
+    assert odds > 3
+
+
+def test_no_line_is_cut_out_of_what_is_smooth() -> None:
+    rng = np.random.default_rng(22)
+    for cause, sigma in ((_pink, 0.4), (_bands(7.0), 0.4), (_bands(1.0), 0.0)):
+        powers = _powers(cause, sigma, rng)
+        for before, after in zip(powers, without_lines(powers, SIZE), strict=True):
+            np.testing.assert_array_equal(before.slow, after.slow)
 
 
 def _ranked(kind: str, gain: float, *mean: float) -> Ranked:

@@ -1,13 +1,14 @@
 """Power of frames in waves down and along them: what rows have in common, beside single pixels."""
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 from scipy.special import gammainccinv, gammaincinv
+from scipy.stats import norm
 
 from analysis.mismatch.layout import Layout
 
@@ -22,6 +23,8 @@ _CHANCE = 1e-3  # that any wave of white noise is taken for a line
 _FAR = 5.0  # standard deviations: what is farther off is a spike's
 _NORMAL = 1.4826  # standard deviation of normal noise over its median deviation
 _CLIPPED = 0.01  # share of samples at the ends of the converter
+_SLOWEST, _REACH = 4, 3  # first band that may be a line; bands to either side that are around it
+_MOST_LINES = 4
 _LEAST = 0.1  # of the mean power of white noise, that smoothing leaves
 
 
@@ -107,7 +110,10 @@ def down(rows: int) -> Array:
 
 
 def row_powers(layout: Layout, frames_of: FramesOf) -> list[Powers]:
-    """Return the powers of each dark and flat that has two frames, and few clipped samples."""
+    """Return the powers of each dark and flat that has two frames, and few clipped samples.
+
+    Lines down the frame, as bands of a lamp's light are, are cut down: see `without_lines`.
+    """
     found = []
     for e in layout.uniform:
         if len(e.numbers) < 2:
@@ -117,7 +123,45 @@ def row_powers(layout: Layout, frames_of: FramesOf) -> list[Powers]:
         own = powers_of(partial(frames_of, e.name), layout.black_dn, ends, flickers=flickers)
         if own is not None:
             found.append(own)
-    return found
+    return without_lines(found, Size(layout.rows, layout.columns))
+
+
+def without_lines(powers: Sequence[Powers], size: Size) -> list[Powers]:
+    """Return powers whose lines among waves down the frame are cut down to what is around them.
+
+    Offsets of rows that forget, or rise as 1 / f, have power that changes smoothly from band to
+    band: over few of them nearly as a power of the frequency. What stands out of that by more than
+    chance, in all exposures together, is a line.
+    """
+    bands, count = size.counts.size, sum(own.frames for own in powers)
+    if not count or bands < _SLOWEST + 2 * _REACH:
+        return list(powers)
+    shares = [own.slow[:, 0, 0] * own.frames / count / float(own.waves.mean()) for own in powers]
+    seen = np.log(np.sum(shares, 0))
+    error = np.sqrt(2 / (size.counts * count))
+    place = np.log(size.starts + 1 + (size.counts - 1) / 2)
+    lines = np.zeros(bands, np.bool_)
+    level = seen.copy()
+    for _ in range(_MOST_LINES):
+        beyond = np.zeros(bands)
+        for own in range(_SLOWEST, bands):
+            near = np.abs(np.arange(bands) - own) <= _REACH
+            near &= ~lines & (np.arange(bands) != own)
+            shape = (
+                np.stack([np.ones(bands), place - place[own]], 1)[near] / error[near, np.newaxis]
+            )
+            inverse = np.linalg.pinv(shape.T @ shape)
+            level[own] = (inverse @ shape.T @ (seen[near] / error[near]))[0]
+            if not lines[own]:
+                beyond[own] = (seen[own] - level[own]) / np.hypot(error[own], inverse[0, 0] ** 0.5)
+        if beyond.max() < norm.isf(_CHANCE / bands):
+            break
+        lines[int(beyond.argmax())] = True
+    cut = np.where(lines, np.exp((level - seen) / 2), 1.0)
+    products = cut[:, np.newaxis, np.newaxis] * np.ones((SLOW, SLOW))
+    products[:, 1:, 1:] = 1.0  # what rows have in common is the first
+    products[:, 0, 0] = cut**2
+    return [replace(own, slow=own.slow * products) for own in powers] if lines.any() else [*powers]
 
 
 def powers_of(

@@ -54,7 +54,9 @@ _BY_DRAW = frozenset(
 _BY_BIN = frozenset({"periodic_noise"})  # of few frames: the noise of one bin comes on top
 # That greens differ is seen; what amplifiers of even and odd rows make of red and blue is not.
 _SAYS_LESS = {"channel_imbalance": "tap_mismatch"}
-_TWINS = {"tap_mismatch": "channel_imbalance", "readout_memory": "crosstalk"}
+_TWINS = {"tap_mismatch": "channel_imbalance", "readout_memory": "crosstalk",
+          "heavy_tailed_read_noise": "read_noise_spread",
+          "read_noise_spread": "heavy_tailed_read_noise"}  # fmt: skip
 _FAR_OFF, _LITTLE = 8.0, 0.3  # departures, and the share of one that is little
 _STRONG = 30.0  # gain of log-likelihood beside which what gained little before needs no new trial
 _WORTH_IT = 0.3  # share of it
@@ -371,8 +373,9 @@ def twin(
 
     Amplifiers of even and odd rows do nearly what greens that differ do to a mosaic whose light
     is of unknown colour: only the noise of each channel tells. Correlations have no side: memory of
-    the sample before may be charge that neighbours exchange. Where that explains more, and also
-    what the best leaves alone, so much the more.
+    the sample before may be charge that neighbours exchange. Noise that differs from pixel to pixel
+    has heavy tails in all of them together. Where that explains more, and also what the best leaves
+    alone, so much the more.
     """
     other = _TWINS.get(best.kind)
     if other is None or other in vocabulary:

@@ -11,7 +11,7 @@ import scipy.special
 from numpy.typing import NDArray
 
 from analysis.mismatch import bandgain
-from analysis.mismatch.bandgain import foretold, gain_of_bands
+from analysis.mismatch.bandgain import foretold, gain_of_bands, place_of_bands
 from analysis.mismatch.phaselaw import moving_on, there
 
 FramesOf = Callable[[str], Iterator[NDArray[np.float64]]]
@@ -222,3 +222,22 @@ def test_exposures_that_are_added_gain_what_all_of_them_gain_anew(
 
     expected = [odds(1) - odds(0), odds(2) - odds(1)]
     np.testing.assert_allclose(gains, expected, atol=1e-9)
+
+
+@pytest.mark.parametrize("cycles", [0.8, 1.13, 2.4, 7.3])
+def test_where_bands_are_is_told_to_its_error(cycles: float) -> None:
+    """From a start on half a cycle, as peaks are, slow bands too: errors are the bound."""
+    off = []
+    for seed in range(40):
+        frames = _frames(3 * DEPTH, seed, cycles=cycles)
+        found = place_of_bands(LAYOUT, frames, max(round(2 * cycles) / 2, 1.0))
+        if found is not None:  # of less than a cycle the end of what is tried may be likeliest
+            off.append((found[0] - cycles) / found[1])
+    assert len(off) > (30 if cycles < 1 else 39)
+    assert np.mean(np.abs(off) < 1.96) > 0.85  # 95 % of 40, three standard deviations below
+    assert abs(np.mean(off)) < 0.6
+
+
+def test_where_nothing_is_no_place_is_told() -> None:
+    assert place_of_bands(LAYOUT, _frames(0.0, 3), 7.0) is None
+    assert place_of_bands(_layout(2), _frames(0.0, 3, frames=2), 47.9) is None

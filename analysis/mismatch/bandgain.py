@@ -21,6 +21,9 @@ _BETWEEN = (-1 / 3, 0.0, 1 / 3)  # bins by which a frequency may be off
 _FAR = (-19, -15, -12, -9, -7, -5, 5, 7, 9, 12, 15, 19)  # bins that say what rows have in common
 _NEAR = (-2, -1, 1, 2)  # bins that a band leaves as they are, and slow waves do not
 _LEAST_EACH = 2  # frames of an exposure, that know what is fixed
+_OFF, _STEP, _APART = 0.9, 0.06, 3  # bins about a peak, between places; steps of a parabola
+_SLOWEST = 0.5  # cycles a frame: a slower wave is a slope
+_CLEAR = 5.0  # standard errors of the power, from which a place is told
 _LOWEST = 1.0  # cycles a frame: below, a wave is much like the frame's mean
 
 
@@ -47,6 +50,66 @@ def gain_of_bands(layout: Layout, frames_of: FramesOf, cycles: float) -> float:
         return -np.inf
     share = min(np.sqrt(2 * np.pi) * bands.bins, 1.0)
     return odds_of(bands.parts) - float(np.log(layout.rows / 2 / share))
+
+
+def place_of_bands(
+    layout: Layout, frames_of: FramesOf, cycles: float
+) -> tuple[float, float] | None:
+    """Return where bands are, cycles in the rows of a frame, and its error; None: nothing is seen.
+
+    Where a cosine and a sine explain most of what frames have beside their mean, each at its own
+    amplitude: by least squares, for of few cycles the three are not as good as independent, and a
+    peak of the power is pulled off by the same wave that runs backwards. The error is that of the
+    likelihood's bend, and no less than the bound of Rife & Boorstyn (IEEE Transactions on
+    Information Theory 20, 1974).
+
+    Parameters
+    ----------
+    layout, frames_of
+        The frames.
+    cycles
+        Where to look, from `_OFF` below to as much above.
+    """
+    rows = layout.rows
+    tried = np.arange(-_OFF, _OFF + _STEP / 2, _STEP) + cycles
+    tried = tried[(tried >= _SLOWEST) & (tried <= rows / 2)]
+    far = [cycles + k for k in _FAR if _LOWEST <= cycles + k <= rows / 2]
+    if tried.size < 2 * _APART + 1 or not far:
+        return None
+    places = [(0.0, own / rows) for own in (*tried, *far)]
+    power = Power(tuple(projections(layout, frames_of, places)), tuple(_light(layout) ** 2))
+    if not any(power.weights):
+        return None
+    seen = power.over(power.ground([slice(tried.size, None)]))
+    likely: NDArray[np.float64] = np.zeros(tried.size)
+    size = max(float(seen.excess[: tried.size].max()), 0.0)
+    for own, weight in zip(seen.found, seen.weights, strict=True):
+        share = size * weight / (1 + size * weight)
+        likely += share * _explained(own[:, : tried.size], tried, rows)
+    best = int(likely.argmax())
+    if size < _CLEAR * seen.error or not _APART <= best < tried.size - _APART:
+        return None
+    below, at, above = (float(likely[best + k * _APART]) for k in (-1, 0, 1))
+    bend = below - 2 * at + above
+    step = _APART * _STEP
+    error = max(seen.bins(size), step / np.sqrt(-bend)) if bend < 0 else np.inf
+    return float(tried[best] + step * (below - above) / (2 * bend)), float(error)
+
+
+def _explained(
+    found: NDArray[np.complex128], cycles: NDArray[np.float64], rows: int
+) -> NDArray[np.float64]:
+    """Return half of what cosines and sines explain of frames, noise at 1: (place,).
+
+    By projections (frame, place) of frames less their mean, which know both waves as if they were
+    independent of one another, and of it.
+    """
+    angle = 2 * np.pi * cycles[:, np.newaxis] * np.arange(rows) / rows
+    cosine, sine = np.cos(angle), np.sin(angle)
+    cosine, sine = (own - own.mean(1, keepdims=True) for own in (cosine, sine))
+    a, b, c = (2 * (u * v).mean(1) for u, v in ((cosine, cosine), (cosine, sine), (sine, sine)))
+    u, v = found.real, -found.imag
+    return np.asarray((c * u**2 - 2 * b * u * v + a * v**2).sum(0) / (a * c - b**2))
 
 
 def foretold(

@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.mismatch.bandgain import gain_of_bands
+from analysis.mismatch.bandgain import gain_of_bands, place_of_bands
 from analysis.mismatch.instance import Frequency, frequency_of, same_line
 from analysis.mismatch.layout import Layout
 from analysis.mismatch.paired import Pairs, pairs_of
@@ -101,7 +101,7 @@ class WholeFrames:
         return None
 
     def measured(self, effect: Effect) -> Measured | None:
-        """Return what frames tell of a line or of pixels that jump; None: too little is seen.
+        """Return what frames tell of a line, bands or pixels that jump; None: too little is seen.
 
         The parameters that are so known, and their errors.
         """
@@ -109,6 +109,10 @@ class WholeFrames:
             seen = self._telegraph
             sure = seen is not None and seen.gain >= SURE and seen.known
             return (seen.values, seen.errors) if seen is not None and sure else None
+        if isinstance(effect, LineFlicker):
+            place = place_of_bands(self.layout, self.frames_of, effect.cycles_per_frame)
+            name = "cycles_per_frame"
+            return None if place is None else ({name: place[0]}, {name: place[1]})
         line = self.line(effect)
         return None if line is None else (line.values, line.errors)
 

@@ -48,7 +48,7 @@ def _drift(clues: Clues) -> Sequence[Proposal]:
     if walk is None or walk.gain < _PERSISTS:
         return proposals("black_level_drift", ["sigma_dn"], sigma_dn=sqrt(variance))
     values = {"sigma_dn": walk.sigma_dn, "persistence": walk.persistence}
-    start = proposals("black_level_drift", (), **values)
+    start = proposals("black_level_drift", (), (), **values)
     return [measured(own, values, walk.errors) for own in start]
 
 

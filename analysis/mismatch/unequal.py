@@ -1,9 +1,11 @@
 """Frames whose means scatter by other amounts in other exposures: no offset of the read-out."""
 
+from collections.abc import Sequence
 from math import ceil
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import chi2
 
 from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.resolved import FAR_OFF
@@ -13,6 +15,10 @@ from dsis.effects.black_level_drift import BlackLevelDrift
 
 Array = NDArray[np.float64]
 _LEAST = 4  # places, that halves of them tell something
+_TELLING = 3  # exposures, that most of them tell something
+_CLEAR = 3.0  # standard deviations, by which a drift stands out
+_CHANCE = 1e-3  # of a variance, on either side
+_TINY = 1e-9
 _MOST = 0.25  # of a drift, below which chance leaves no half of them that scatter least
 
 
@@ -21,7 +27,8 @@ def unequal(state: State, effect: Effect, without: Array) -> Denial | None:
 
     The black level knows neither light nor exposure time: frames of all exposures wander by as
     much. Where with it some still scatter far more, and the half of all that scatter least show
-    less than a quarter of it together, it is something else that only some exposures have.
+    less than a quarter of it together, it is something else that only some exposures have. So it is
+    where most exposures that can tell do not scatter as they would, see `_agreeing`.
 
     Parameters
     ----------
@@ -44,8 +51,11 @@ def unequal(state: State, effect: Effect, without: Array) -> Denial | None:
         and mean[i] > without[i]
     ]
     far = any(m.statistic == "frame_variance" and m.z > FAR_OFF for m in state.mismatches)
-    if not far or len(which) < _LEAST:
+    if not far:
         return None
+    denial = _agreeing(state, which, without)
+    if denial is not None or len(which) < _LEAST:
+        return denial
     # Numbers are cube roots of variances relative to those of pixels.
     made = mean[which] ** 3 - without[which] ** 3
     shown = (values[which] ** 3 - without[which] ** 3) / made
@@ -57,3 +67,28 @@ def unequal(state: State, effect: Effect, without: Array) -> Denial | None:
     return Denial(
         max(share, 0.0), "frames of some exposures wander far more, and those of others less"
     )
+
+
+def _agreeing(state: State, which: Sequence[int], without: Array) -> Denial | None:
+    """Return how a wander of all frames is denied by exposures that scatter otherwise; None: not.
+
+    Variances of frames' means are chi-squared, of so many degrees of freedom as the null scatters
+    by. An exposure tells where the wander would stand out of what there is without it; where of
+    three and more less than half have a variance that chance allows with it, no wander of one size
+    is in all. Channels of an exposure move together.
+    """
+    exposures: dict[str, list[int]] = {}
+    for i in which:
+        exposures.setdefault(state.vector.keys[i].exposure, []).append(i)
+    agree = []
+    for own in exposures.values():
+        mean, sd, bare = state.null.mean[own], state.null.sd[own], without[own]
+        share = float((sd / mean).mean())
+        if float((mean / np.maximum(bare, _TINY)).mean()) < 1 + _CLEAR * share:
+            continue
+        free = 2 / (9 * share**2)
+        ratio = float((state.vector.values[own] ** 3).mean() / (mean**3).mean())
+        agree.append(_CHANCE < float(chi2.cdf(free * ratio, free)) < 1 - _CHANCE)
+    if len(agree) < _TELLING or 2 * sum(agree) >= len(agree):
+        return None
+    return Denial(sum(agree) / len(agree), "frames of most exposures do not wander by as much")

@@ -87,7 +87,10 @@ def _saturation(clues: Clues) -> Sequence[Proposal]:
     nearest = beyond[np.abs(expected - min(skewness, 0.0)).argmin()]
     if not np.isfinite(error):
         nearest = 1.5
-    found: list[Proposal] = _full(clues, top)
+    told = _full(clues, top)
+    if told:
+        return told
+    found: list[Proposal] = []
     for z in (nearest, nearest + 0.5, nearest - 0.5, 0.3):
         found += proposals("saturation", ["full_well_dn"], full_well_dn=level + float(z) * sd)
     found += proposals("saturation", ["full_well_dn"], full_well_dn=0.99 * level)

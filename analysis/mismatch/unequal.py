@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
+from analysis.mismatch.bank.key import MOSAIC
 from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.resolved import FAR_OFF
 from analysis.mismatch.state import State
@@ -16,9 +17,8 @@ from dsis.effects.black_level_drift import BlackLevelDrift
 Array = NDArray[np.float64]
 _LEAST = 4  # places, that halves of them tell something
 _TELLING = 3  # exposures, that most of them tell something
-_CLEAR = 3.0  # standard deviations, by which a drift stands out
+_CLEAR, _SEEN = 4.0, 2.0  # standard deviations, by which a drift would stand out, and does
 _CHANCE = 1e-3  # of a variance, on either side
-_TINY = 1e-9
 _MOST = 0.25  # of a drift, below which chance leaves no half of them that scatter least
 
 
@@ -41,21 +41,13 @@ def unequal(state: State, effect: Effect, without: Array) -> Denial | None:
     """
     if not isinstance(effect, BlackLevelDrift):
         return None
-    values, mean, sd = state.vector.values, state.null.mean, state.null.sd
-    which = [
-        i
-        for i, key in enumerate(state.vector.keys)
-        if (key.statistic, key.scope) == ("frame_variance", "exposure")
-        and state.null.known[i]
-        and np.isfinite(without[i])
-        and mean[i] > without[i]
-    ]
-    far = any(m.statistic == "frame_variance" and m.z > FAR_OFF for m in state.mismatches)
-    if not far:
+    if not any(m.statistic == "frame_variance" and m.z > FAR_OFF for m in state.mismatches):
         return None
-    denial = _agreeing(state, which, without)
+    which = _wandering(state, without, "exposure")
+    denial = _agreeing(state, _wandering(state, without, MOSAIC) or which, without)
     if denial is not None or len(which) < _LEAST:
         return denial
+    values, mean, sd = state.vector.values, state.null.mean, state.null.sd
     # Numbers are cube roots of variances relative to those of pixels.
     made = mean[which] ** 3 - without[which] ** 3
     shown = (values[which] ** 3 - without[which] ** 3) / made
@@ -69,26 +61,42 @@ def unequal(state: State, effect: Effect, without: Array) -> Denial | None:
     )
 
 
+def _wandering(state: State, without: Array, scope: str) -> list[int]:
+    """Return which numbers say how far frames wander, of those that an effect would raise."""
+    mean = state.null.mean
+    return [
+        i
+        for i, key in enumerate(state.vector.keys)
+        if (key.statistic, key.scope, key.detail) == ("frame_variance", scope, "")
+        and state.null.known[i]
+        and np.isfinite(without[i])
+        and mean[i] > without[i]
+    ]
+
+
 def _agreeing(state: State, which: Sequence[int], without: Array) -> Denial | None:
     """Return how a wander of all frames is denied by exposures that scatter otherwise; None: not.
 
     Variances of frames' means are chi-squared, of so many degrees of freedom as the null scatters
-    by. An exposure tells where the wander would stand out of what there is without it; where of
-    three and more less than half have a variance that chance allows with it, no wander of one size
-    is in all. Channels of an exposure move together.
+    by. An exposure can tell where the wander would clearly stand out of what there is without it;
+    it agrees where something does, by as much as chance allows. Where of three and more that can
+    tell less than half agree, no wander of one size is in all. Channels of an exposure move
+    together.
     """
     exposures: dict[str, list[int]] = {}
     for i in which:
         exposures.setdefault(state.vector.keys[i].exposure, []).append(i)
     agree = []
     for own in exposures.values():
-        mean, sd, bare = state.null.mean[own], state.null.sd[own], without[own]
-        share = float((sd / mean).mean())
-        if float((mean / np.maximum(bare, _TINY)).mean()) < 1 + _CLEAR * share:
+        values, mean, bare = state.vector.values[own], state.null.mean[own], without[own]
+        share = float((state.null.sd[own] / mean).mean())
+        above = float(mean.mean() / bare.mean()) - 1, float(values.mean() / bare.mean()) - 1
+        if above[0] < _CLEAR * share:
             continue
         free = 2 / (9 * share**2)
-        ratio = float((state.vector.values[own] ** 3).mean() / (mean**3).mean())
-        agree.append(_CHANCE < float(chi2.cdf(free * ratio, free)) < 1 - _CHANCE)
+        ratio = float((values**3).mean() / (mean**3).mean())
+        chance = float(chi2.cdf(free * ratio, free))
+        agree.append(above[1] > _SEEN * share and _CHANCE < chance < 1 - _CHANCE)
     if len(agree) < _TELLING or 2 * sum(agree) >= len(agree):
         return None
     return Denial(sum(agree) / len(agree), "frames of most exposures do not wander by as much")

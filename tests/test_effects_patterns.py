@@ -27,10 +27,11 @@ def test_line_flicker_is_a_sinusoid_of_its_depth() -> None:
     assert stats.kstest(phases, stats.uniform(-np.pi, 2 * np.pi).cdf).pvalue > P_MIN
 
 
-def test_pink_noise_falls_as_one_over_f_along_the_read_out() -> None:
+@pytest.mark.parametrize("along", ["rows", "columns"])
+def test_pink_noise_falls_as_one_over_f_along_the_read_out(along: str) -> None:
     sigma, shape = 5.0, (128, 128)
-    one = effect("pink_noise", sigma_dn=sigma)
-    series = np.stack([apply(one, np.zeros(shape), t).ravel() for t in range(60)])
+    one, order = effect("pink_noise", sigma_dn=sigma, along=along), "CF"[along == "columns"]
+    series = np.stack([apply(one, np.zeros(shape), t).ravel(order) for t in range(60)])
     power = (np.abs(np.fft.rfft(series * np.hanning(series.shape[1]))) ** 2).mean(0)
     k = np.arange(power.size)
     octaves = [(2**j, 2 ** (j + 1)) for j in range(2, 12)]
@@ -40,7 +41,8 @@ def test_pink_noise_falls_as_one_over_f_along_the_read_out() -> None:
     assert abs(slope + 1) < 0.05  # the lowest octave averages 4 bins x 60 frames: 6 %
     assert abs((series**2).mean() / sigma**2 - 1) < 0.1  # each frame mean: a tenth of the variance
     crop = apply(one, np.zeros((30, 40)), 7, grid=PixelGrid(30, 40, Cfa.MONO, 50, 60, *shape))
-    np.testing.assert_array_equal(crop, series[7].reshape(shape)[50:80, 60:100])
+    np.testing.assert_array_equal(crop, series[7].reshape(shape, order=order)[50:80, 60:100])
+    assert ("along" in one.model_dump()) == (along == "columns")  # what is usual is not written
 
 
 @pytest.mark.parametrize(("u", "w"), [(17, 40), (128, 3), (0, 9)])

@@ -47,7 +47,7 @@ STRONG: dict[str, tuple[dict[str, object], ...]] = {
     "hot_pixels": ({"mean_dn_per_s": 3e4}, {"mean_dn_per_s": 3e4, "pixel_fraction": 0.5}),
     "impulse": ({"mean_dn": 3000.0},),
     "periodic_noise": ({"amplitude_dn": 30.0}, {"amplitude_dn": 30.0, "frequency": (0, 0.2)}),
-    "pink_noise": ({"sigma_dn": 20.0},),
+    "pink_noise": ({"sigma_dn": 20.0}, {"sigma_dn": 20.0, "along": "columns"}),
     "quantisation": (
         {"step_dn": 2.5},
         {"step_dn": 30.0},

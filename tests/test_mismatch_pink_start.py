@@ -54,7 +54,7 @@ def test_shares_are_those_of_drawn_series() -> None:
 
 @pytest.mark.parametrize(("row", "frame"), [(0.4, 0.0), (0.4, 9.0), (-0.1, 0.05)])
 def test_the_search_starts_from_rows_and_else_from_frames(row: float, frame: float) -> None:
-    found = {"row_variance": (row, 0.1), "frame_variance": (frame, 0.1)}
+    found = {"row_variance": (row, 0.1), "frame_variance": (frame, 0.1), "column_variance": (0, 1)}
     clues: Any = Stub(layout=Stub(rows=96, columns=128), amplitude=lambda name, _: found[name])
     of_row, of_frame = pink_shares(96, 128)
     sizes = [one.effect.model_dump()["sigma_dn"] for one in PINK.propose(clues)]
@@ -65,3 +65,15 @@ def test_the_search_starts_from_rows_and_else_from_frames(row: float, frame: flo
 def test_where_neither_varies_it_is_not_proposed() -> None:
     clues: Any = Stub(layout=Stub(rows=96, columns=128), amplitude=lambda *_: (-0.1, 0.1))
     assert not PINK.propose(clues)
+
+
+@pytest.mark.parametrize(("column", "proposed"), [(0.4, True), (0.2, False), (-0.4, False)])
+def test_it_starts_along_columns_where_these_clearly_vary(column: float, proposed: bool) -> None:
+    found = {"row_variance": (-0.1, 0.1), "frame_variance": (-0.1, 0.1)}
+    found["column_variance"] = (column, 0.1)
+    clues: Any = Stub(layout=Stub(rows=96, columns=128), amplitude=lambda name, _: found[name])
+    own = [one.effect.model_dump() for one in PINK.propose(clues)]
+    assert [one.get("along") for one in own] == ["columns"] * 2 * proposed
+    if proposed:
+        expected = column / pink_shares(128, 96)[0]
+        assert max(one["sigma_dn"] for one in own) ** 2 == pytest.approx(expected)

@@ -24,14 +24,21 @@ Moves = Callable[[Any, int, float], Array]
 """(rng, frames, signal) -> (frame, row), DN."""
 
 
-def _state(seed: int, cfa: Cfa, *moves: Moves, known: float = 0.0) -> Any:
-    """Return a state whose frames are moved; `known`: the share that is explained already."""
+def _state(
+    seed: int, cfa: Cfa, *moves: Moves, known: float = 0.0, columns: Moves | None = None
+) -> Any:
+    """Return a state whose frames are moved; `known`: the share that is explained already.
+
+    `columns` moves columns, which are left unexplained.
+    """
     sites = {"MONO": (0, 0)} if cfa is Cfa.MONO else {
         "R": (0, 0), "Gr": (0, 1), "Gb": (1, 0), "B": (1, 1)
     }  # fmt: skip
     rng, lines, keys = np.random.default_rng(seed), {}, []
     for k, (count, noise, signal) in enumerate(zip(FRAMES, NOISE_DN, SIGNAL_DN, strict=True)):
         moved = sum(one(rng, count, signal) for one in moves)[..., np.newaxis]
+        if columns is not None:
+            moved = moved + columns(rng, count, signal)[:, np.newaxis]
         frames = 1000 + signal + moved + rng.normal(0, noise, (count, ROWS, COLUMNS))
         sums = Accumulator(ROWS, COLUMNS, cfa)
         for frame in frames:
@@ -48,6 +55,7 @@ def _state(seed: int, cfa: Cfa, *moves: Moves, known: float = 0.0) -> Any:
             layout=SimpleNamespace(uniform=uniform, channels=tuple(sites)),
         ),
         calibrated=SimpleNamespace(fit=SimpleNamespace(signal_dn=signals)),
+        mismatches=[SimpleNamespace(statistic="column_variance")] * (columns is not None),
         vector=SimpleNamespace(keys=keys, values=np.full(len(keys), 3.0)),
         null=SimpleNamespace(known=np.ones(len(keys), bool)),
         expected=np.full(len(keys), np.cbrt(1 + 26 * known)),
@@ -70,6 +78,18 @@ def _flicker(share: float) -> Moves:
 def _half(step: float, share: float = 0.5) -> Moves:
     """Return a step that alternates in a share of the rows."""
     return lambda _, n, __: step * (-1.0) ** np.arange(n)[:, None] * (share > HEIGHT + 0.5)
+
+
+def _columns(size: float, power: float) -> Moves:
+    """Return columns whose noise falls with a power of the frequency, from two frames' length."""
+
+    def moves(rng: Any, n: int, _: float) -> Array:
+        falls = np.append(0.0, np.arange(1.0, COLUMNS + 1) ** (-power / 2))
+        parts = rng.normal(size=(2, n, COLUMNS + 1))
+        series = np.fft.irfft((parts[0] + 1j * parts[1]) * falls, 2 * COLUMNS)[:, :COLUMNS]
+        return size * series / (2 * (falls**2).sum()) ** 0.5 * 2 * COLUMNS / 2**0.5
+
+    return moves
 
 
 def _waves(size: float, cycles: float) -> Moves:
@@ -121,3 +141,21 @@ def test_what_is_explained_already_need_not_be() -> None:
 
 def test_other_effects_are_not_asked() -> None:
     assert not _denied(_state(1, Cfa.MONO, _half(2.0)), "row_noise")
+
+
+@pytest.mark.parametrize("cfa", [Cfa.MONO, Cfa.RGGB])
+@pytest.mark.parametrize("power", [0.9, 1.1, 1.5])
+def test_slow_noise_of_columns_is_no_drift(cfa: Cfa, power: float) -> None:
+    """As of a sensor that is read column by column, whose amplifier has 1/f noise."""
+    states = [_state(s, cfa, _drift(0.0), columns=_columns(3.0, power)) for s in range(8)]
+    assert sum(_denied(state, "black_level_drift") for state in states) >= 6  # of few frames
+    for state in states:
+        state.mismatches = []  # where columns are explained nothing is said of them
+        assert not _denied(state, "black_level_drift")
+
+
+def test_drift_is_believed_beside_noise_of_columns() -> None:
+    for seed in range(4):
+        for columns in (_columns(1.0, 0.0), _columns(0.5, 1.0)):
+            state = _state(seed, Cfa.MONO, _drift(1.0), columns=columns)
+            assert not _denied(state, "black_level_drift")

@@ -62,7 +62,7 @@ def unlike_drawn(
     why
         In words.
     """
-    field = effect.sigma_percent**2 * _spectrum(image.shape, effect.length_pixels)
+    field = effect.sigma_percent**2 * spectrum(image.shape, effect.length_pixels)
     share = share_of(image, field)
     if share > _NORMAL:
         return None
@@ -125,7 +125,7 @@ def white_of(image: Array) -> float:
     return max(float((steps**2).mean()) / 2, 1e-12)
 
 
-def _spectrum(shape: tuple[int, ...], length: float) -> Array:
+def spectrum(shape: tuple[int, ...], length: float) -> Array:
     """Return the power of a field of variance 1 at each frequency: (row, half the columns)."""
     y, x = (np.minimum(np.arange(size), size - np.arange(size)) for size in shape)
     covariance = np.exp(-np.hypot(y[:, np.newaxis], x) / length)

@@ -40,6 +40,7 @@ _FORMS = {
     "kurtosis": 0.2,
     "kurtosis_within_pixels": 0.3,
     "variance_spread": 0.15,
+    "smooth_variance_spread": 0.15,
     "skewness": 0.12,
 }
 

@@ -12,6 +12,7 @@ from analysis.mismatch.basefit import BaseFit, Offsets, colour, fit_base
 from analysis.mismatch.bending import bending_offsets, bends, bent_by
 from analysis.mismatch.flattened import flattened
 from analysis.mismatch.layout import Layout, Place, sites
+from analysis.mismatch.limited import lit
 from analysis.mismatch.model import Model, Sites
 from analysis.mismatch.observe import Level, Observation
 from analysis.mismatch.rounding import rounded, unrounded
@@ -124,12 +125,13 @@ def calibrate(
             last, change = change, _change(before, fit, seen.levels)
             settled = change <= _SAME or _left(change, last) <= _SAME
         if len(switches) == 1 and not settled:
-            own, added = recorded.fitted(seen.levels)
-            again = partial(fitted, replace(added, bulk_dn2={}), levels=own)
-            switches = _moved(own, left_out, switches, fit, again)
+            many, added = recorded.fitted(seen.levels)
+            again = partial(fitted, replace(added, bulk_dn2={}), levels=many)
+            switches = _moved(many, left_out, switches, fit, again)
             fit = fitted(recorded, switches)
         before = fit
-        model = Model(with_numbers(camera, fit, switches, layout.black_dn), signals_of(layout, fit))
+        own = with_numbers(camera, fit, switches, layout.black_dn)
+        model = Model(own, lit(own, layout, signals_of(layout, fit)))
         if settled:
             break
         effects = bending_offsets(model, layout, seed + 1, jobs, spiky=spiky)

@@ -1,6 +1,7 @@
 """The light under which another camera has the levels that were recorded.
 
-Where colours exchange charge a mosaic's levels are not its light. The light of a model is such that
+Where colours exchange charge a mosaic's levels are not its light, nor are those that a full well
+hides. The light of a model is such that
 levels are right with the effects that its camera has. A camera with one more, or without it, under
 the same light has levels that nobody recorded: above a switch of the read-out, say, what is below.
 """
@@ -12,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.layout import Layout, sites
+from analysis.mismatch.limited import full_well_of, lit
 from analysis.mismatch.model import Model, Sites
 from dsis.camera import Camera
 from dsis.cfa import Cfa
@@ -30,14 +32,14 @@ def relit(model: Model, camera: Camera, layout: Layout) -> Model:
     share in all of them; where it is not, by its own in each. Where no light gives these levels, it
     stays as it is. So does that of scenes.
     """
-    made = model.with_camera(camera)
+    made = _unhidden(model, camera, layout)
     if layout.cfa is Cfa.MONO:
         return made
     before, after = _exchanging(model.camera), _exchanging(camera)
     flats = [e for e in layout.uniform if e.kind == "flat" and (model.signals[e.name] > 0).all()]
     if before == after or not flats:
         return made
-    signals = np.stack([model.signals[e.name] for e in flats])
+    signals = np.stack([made.signals[e.name] for e in flats])
     wanted = _of_colours(np.stack([exchanged(before, own) for own in signals]), layout.cfa)
     known = np.array([e.light is not None for e in flats])
     off = np.inf
@@ -55,7 +57,20 @@ def relit(model: Model, camera: Camera, layout: Layout) -> Model:
     if off > _NEAR:
         return made
     names = [e.name for e in flats]
-    return replace(made, signals={**model.signals, **dict(zip(names, signals, strict=True))})
+    return replace(made, signals={**made.signals, **dict(zip(names, signals, strict=True))})
+
+
+def _unhidden(model: Model, camera: Camera, layout: Layout) -> Model:
+    """Return the model with another camera, under light that its full well hides as it does."""
+    before, after = full_well_of(model.camera), full_well_of(camera)
+    if before == after:
+        return model.with_camera(camera)
+    flats = {e.name for e in layout.uniform if e.kind == "flat" and e.light is None}
+    levels = {
+        name: np.minimum(own, before) if before is not None and name in flats else own
+        for name, own in model.signals.items()
+    }
+    return Model(camera, lit(camera, layout, levels))
 
 
 def exchanged(effects: Iterable[Effect], signal_dn: Sites) -> Sites:

@@ -15,6 +15,7 @@ from analysis.mismatch.polish import with_effects
 from analysis.mismatch.rank import LEAST_GAIN, TOLD_APART, Ranked, alike, replicates_for
 from analysis.mismatch.state import State
 from dsis.effects import Effect
+from dsis.effects.pink_noise import PinkNoise
 
 _OTHER = {"pink_noise": "row_banding", "row_banding": "pink_noise"}
 _WORDS = {"pink_noise": "1/f noise", "row_banding": "bands of rows"}
@@ -27,11 +28,11 @@ def as_shown(state: State, frames: WholeFrames | None, fitted: Sequence[Ranked])
     both are much alike, and simulated: what frames say decides, at odds of 20; below that both tie.
     """
     fitted = as_pixels_show(frames, as_maps_show(state, fitted))
-    odds = None if not fitted else _odds(state, frames, fitted[0].kind)
+    odds = None if not fitted else _odds(state, frames, fitted[0])
     if odds is None:
         return list(fitted)
     best, other = fitted[0], _OTHER[fitted[0].kind]
-    second = next((one for one in fitted if one.kind == other), None)
+    second = next((one for one in fitted if _of_rows(one) == other), None)
     if second is None:
         return list(fitted)
     first = best
@@ -43,7 +44,7 @@ def as_shown(state: State, frames: WholeFrames | None, fitted: Sequence[Ranked])
             first, second = replace(second, gain=best.gain), best
         behind = min(second.gain, best.gain - abs(odds))
         second = replace(second, gain=max(behind, LEAST_GAIN))
-    rest = [one for one in fitted if one.kind not in _OTHER]
+    rest = [one for one in fitted if _of_rows(one) is None]
     return sorted([first, second, *rest], key=lambda one: -one.gain)
 
 
@@ -61,7 +62,7 @@ def unlike_frames(
         return unlike_pixels(state.camera, frames, best, others, partial(_explained, state))
     if (denial := no_field(state, best.polished.effects[0])) is not None:
         return denial
-    odds = _odds(state, frames, best.kind)
+    odds = _odds(state, frames, best)
     if odds is None or odds > TOLD_APART or _any(others, _OTHER[best.kind]):
         return None
     why = f"whole frames may as well show {_WORDS[_OTHER[best.kind]]}"
@@ -78,12 +79,14 @@ def _explained(state: State, effect: Effect) -> float:
     return gain if isfinite(gain) else 0.0
 
 
-def _odds(state: State, frames: WholeFrames | None, kind: str) -> float | None:
+def _odds(state: State, frames: WholeFrames | None, best: Ranked) -> float | None:
     """Return by how much frames prefer one of both, nats; None: it is none, or not asked.
 
-    Beside the other, which the camera has, it is no rival.
+    Beside the other, which the camera has, it is no rival; nor is noise along columns, which rows
+    do not show.
     """
-    if frames is None or kind not in _OTHER:
+    kind = _of_rows(best)
+    if frames is None or kind is None:
         return None
     there = frozenset(own.kind for own in state.camera.effect)
     if _OTHER[kind] in there:
@@ -92,4 +95,12 @@ def _odds(state: State, frames: WholeFrames | None, kind: str) -> float | None:
 
 
 def _any(fitted: Sequence[Ranked], kind: str) -> bool:
-    return any(one.kind == kind for one in fitted)
+    return any(_of_rows(one) == kind for one in fitted)
+
+
+def _of_rows(one: Ranked) -> str | None:
+    """Return which of both an effect is; None: none, or one that goes along columns."""
+    effect = one.proposal.effect
+    if isinstance(effect, PinkNoise) and effect.along == "columns":
+        return None
+    return one.kind if one.kind in _OTHER else None

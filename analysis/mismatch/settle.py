@@ -4,6 +4,9 @@ _PAIRS = {
     frozenset({"black_level_drift", "flicker"}): "darks, and a second signal level",
     frozenset({"row_noise", "line_flicker"}): "darks: only row noise is there without light",
     frozenset({"row_noise", "pink_noise"}): "more frames: pink noise correlates successive rows",
+    frozenset({"column_noise", "pink_noise"}): (
+        "more frames: pink noise correlates successive columns"
+    ),
     frozenset({"row_noise", "row_banding"}): "more frames: only bands are alike in successive rows",
     frozenset({"pink_noise", "row_banding"}): "more frames: pink noise is alike along rows too",
     frozenset(

@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import beta
+from scipy import fft
+from scipy.stats import beta, chi2
 
 from analysis.mismatch.bank.linemeans import AXES, Axis, LineMeans
 from analysis.mismatch.contradicted import Denial
@@ -16,6 +17,7 @@ _OF_LIGHT = {"flicker": True, "black_level_drift": False}
 _NAMES = {"row": "upper and lower parts", "column": "left and right parts"}
 _UNLIKE = 0.3  # of what moves a frame, by which a part may depart from it
 _CHANCE = 1e-3  # that parts tell so much of what the whole moves by
+_COLUMNS = frozenset({"column_variance", "column_spectrum_peak"})
 _MOST = 0.5  # of what moves the mean of a frame, that parts may make
 
 
@@ -27,7 +29,8 @@ def of_moving_parts(state: State, kind: str, without: Array) -> Denial | None:
     an amplifier of its own. So of the variance of frames' means is left, once it was regressed on
     the differences of a few parts, what the whole has: 1 / (1' C^-1 1), C their covariance; by
     chance the share has a beta distribution. Where that is half of what the effect would explain or
-    less, and hardly ever by chance, the frame does not move as a whole.
+    less, and hardly ever by chance, the frame does not move as a whole. Nor where columns that are
+    left unexplained are alike over a part of the frame, see `_slow`.
 
     Parameters
     ----------
@@ -40,8 +43,12 @@ def of_moving_parts(state: State, kind: str, without: Array) -> Denial | None:
     """
     if kind not in _OF_LIGHT:
         return None
-    said = (_denied(state, axis, without, of_light=_OF_LIGHT[kind]) for axis in AXES)
-    return next((denial for denial in said if denial is not None), None)
+    for axis in AXES:
+        own = _moving(state, axis, without, of_light=_OF_LIGHT[kind])
+        if own is not None and (denial := _apart(own, axis)) is not None:
+            return denial
+    coloured = any(m.statistic in _COLUMNS for m in state.mismatches)
+    return _slow(own) if own is not None and coloured and not _OF_LIGHT[kind] else None
 
 
 @dataclass(frozen=True)
@@ -58,7 +65,21 @@ class _Parts:
         return float(self.covariance.mean()) - self.noise / _PARTS
 
 
-def _denied(state: State, axis: Axis, without: Array, *, of_light: bool) -> Denial | None:
+@dataclass(frozen=True)
+class _Moving:
+    """How parts move in all exposures, weighted as far as the mean does.
+
+    Covariance (part, part), noise of one part, what an effect would explain of the mean's variance,
+    and degrees of freedom.
+    """
+
+    covariance: Array
+    noise: float
+    claimed: float
+    free: float
+
+
+def _moving(state: State, axis: Axis, without: Array, *, of_light: bool) -> _Moving | None:
     total, inverse = np.zeros((_PARTS, _PARTS)), 0.0
     noise = claimed = size = 0.0
     for exposure in state.setting.layout.uniform:
@@ -73,17 +94,39 @@ def _denied(state: State, axis: Axis, without: Array, *, of_light: bool) -> Deni
         size += weight * scale
         inverse += (weight * scale) ** 2 / own.free
     free = size**2 / inverse if inverse else 0.0  # Satterthwaite (1946)
-    if claimed <= 0 or free < _PARTS:
-        return None
+    return _Moving(total, noise, claimed, free) if claimed > 0 and free >= _PARTS else None
+
+
+def _apart(own: _Moving, axis: Axis) -> Denial | None:
+    """Return how frames that move are denied by parts that move against each other; None: not."""
+    total, noise, free = own.covariance, own.noise, own.free
     unlike = _UNLIKE**2 * max(float(total.mean()) - noise / _PARTS, 0.0)
     one, apart = np.ones(_PARTS), total + unlike * np.eye(_PARTS)
     left = 1 / float(one @ np.linalg.solve(apart, one))
     usual = left * free / (free - _PARTS + 1) - (noise + unlike) / _PARTS
     chance = beta.cdf(left / float(apart.mean()), (free - _PARTS + 1) / 2, (_PARTS - 1) / 2)
-    if usual > _MOST * claimed or chance > _CHANCE:
+    if usual > _MOST * own.claimed or chance > _CHANCE:
         return None
     why = f"{_NAMES[axis]} move against each other, and take the mean of the frame along"
-    return Denial(max(usual / claimed, 0.0), why)
+    return Denial(max(usual / own.claimed, 0.0), why)
+
+
+def _slow(own: _Moving) -> Denial | None:
+    """Return how drift is denied by slow waves across columns; None: it is not.
+
+    Noise of a read-out that goes from column to column has no less power at no frequency, in the
+    mean of a frame, than in waves of half a cycle and of one, if it falls with frequency as 1/f
+    noise does, or is white. Where these would move the mean by half as much as the effect, and are
+    hardly ever noise of single pixels, the frame may not move as a whole.
+    """
+    waves = fft.dct(np.eye(_PARTS), axis=0, norm="ortho")[1:3]
+    power, noise = float(np.mean([one @ own.covariance @ one for one in waves])), own.noise
+    made, free = (power - noise) / _PARTS, len(waves) * own.free
+    by_chance = noise > 0 and float(chi2.sf(free * power / noise, free)) > _CHANCE
+    if made < _MOST * own.claimed or by_chance:
+        return None
+    why = "columns are alike over parts of the frame, and move its mean as well"
+    return Denial(max(1 - made / own.claimed, 0.0), why)
 
 
 def _parts(state: State, exposure: str, axis: Axis, *, of_light: bool) -> _Parts | None:

@@ -35,6 +35,7 @@ STATISTICS = {
     "scene_motion": "movement of the scene",
     "variance_spread": "spread of the noise over pixels",
     "variance_persistence": "pixels noisy at every exposure",
+    "smooth_variance_spread": "noise that varies smoothly over the sensor",
     "noisy_pixels": "few pixels far noisier",
     "outlying_pixels": "few pixels far out",
     "one_off_outliers": "single spikes",

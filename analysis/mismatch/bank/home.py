@@ -11,7 +11,7 @@ from analysis.mismatch.bank.edges import names as edge_names
 from analysis.mismatch.bank.key import MOSAIC, Key
 from analysis.mismatch.bank.parts import STANDING_OUT
 from analysis.mismatch.bank.patches import SIZES
-from analysis.mismatch.bank.persistent import OUTSTANDING
+from analysis.mismatch.bank.persistent import OUTSTANDING, SURFACE
 from analysis.mismatch.bank.seams import WHOLE
 from analysis.mismatch.bank.surfaces import LOW
 from analysis.mismatch.bank.together import TOGETHER
@@ -68,6 +68,7 @@ _POOLED = frozenset(
         *(("fixed_smooth_falloff", name, "") for name in ("gain", "time")),
         *(("outlying_pixels", "time", f"{limit:g}") for limit in STANDING_OUT),
         ("variance_persistence", "all", ""),
+        (SURFACE, "all", ""),
         *(("noisy_pixels", "all", str(limit)) for limit in OUTSTANDING),
         ("spectral_peak", "all", ""),
         ("row_spectrum_peak", "all", ""),

@@ -1,13 +1,17 @@
-"""Which pixels are noisy in every exposure."""
+"""Which pixels, and which parts of the sensor, are noisy in every exposure."""
 
 from math import sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.mismatch.bank.scalars import UNKNOWN, Number
+from analysis.mismatch.bank.robust import drawn_in
+from analysis.mismatch.bank.scalars import UNKNOWN, Number, ratio_root
+from dsis.measures.fixed_pattern import Smooth
 
 Array = NDArray[np.float64]
+SURFACE = "smooth_variance_spread"
+_BOWED = 2  # degree of surfaces that lean or bow
 OUTSTANDING = (4, 7, 12)  # standard deviations of a pixel's summed variance
 
 
@@ -34,16 +38,34 @@ class VarianceSums:
         self.fourths += square**2
 
     def numbers(self) -> dict[str, Number]:
-        """Return the persistence, and how many pixels stand out by so many standard deviations.
+        """Return persistence, surface, and how many pixels stand out by so many deviations.
 
         Counts enter as twice their root (Anscombe 1948), of standard deviation 1.
         """
-        found = {"variance_persistence": self._persistence()}
+        found = {"variance_persistence": self._persistence(), SURFACE: self._surface()}
         sd = sqrt(self.squares)
         for limit in OUTSTANDING:
             count = int((self.total > limit * sd).sum()) if sd > 0 else 0
             found[f"noisy_pixels of {limit}"] = (2 * sqrt(count + 3 / 8), 1.0)
         return found
+
+    def _surface(self) -> Number:
+        """Return the power of surfaces that lean or bow in the summed variances: 1 if all is white.
+
+        Of orthonormal polynomials of first and second degree, in the square of single pixels. Few
+        pixels that are far noisier count as much as any of the many may.
+        """
+        smooth, apart = Smooth.of(*self.total.shape), drawn_in(self.total)
+        if smooth.degree < _BOWED:
+            return UNKNOWN
+        found = smooth.coefficients(apart)
+        order = np.arange(len(found))[:, np.newaxis] + np.arange(len(found))
+        squares = found[(order > 0) & (order <= _BOWED)] ** 2
+        rest = float((apart**2).sum() - squares.sum() - found[0, 0] ** 2)
+        free = apart.size - squares.size - 1
+        if free <= 0 or not rest > 0:
+            return UNKNOWN
+        return ratio_root(float(squares.mean()) * free / rest, squares.size, free)
 
     def _persistence(self) -> Number:
         """Return the mean product of different exposures in units of its null error."""

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm
 
-from analysis.mismatch.candidates.candidate import Candidate, Proposal, proposals
+from analysis.mismatch.candidates.candidate import Candidate, Proposal, measured, proposals
 from analysis.mismatch.clues import Clues
 from analysis.mismatch.layout import Place
 from dsis.effects.nonlinearity import bend_peak, bend_shape
@@ -17,6 +17,8 @@ _EXPONENTS = np.geomspace(0.2, 16.0, 20) - 1  # of a bend: from a power law to a
 _LEAST_FLATS = 2  # on each side of a switch
 _SOFTNESS = np.geomspace(0.2, 8.0, 9)  # standard deviations of noise: a harder limit is hard
 _BEYOND = np.linspace(-1.0, 6.0, 22)
+_LEFT = 0.05  # of shot noise, at a full well that is far below the light
+_BELOW = np.linspace(1.0, 8.0, 71)  # standard deviations of a full well below the light
 _NU = 6.0  # of Student's t law, by which numbers depart
 _NODES, _WEIGHTS = np.polynomial.hermite_e.hermegauss(41)
 _WEIGHTS = _WEIGHTS / _WEIGHTS.sum()
@@ -85,11 +87,41 @@ def _saturation(clues: Clues) -> Sequence[Proposal]:
     nearest = beyond[np.abs(expected - min(skewness, 0.0)).argmin()]
     if not np.isfinite(error):
         nearest = 1.5
+    told = _full(clues, top)
+    if told:
+        return told
     found: list[Proposal] = []
     for z in (nearest, nearest + 0.5, nearest - 0.5, 0.3):
         found += proposals("saturation", ["full_well_dn"], full_well_dn=level + float(z) * sd)
     found += proposals("saturation", ["full_well_dn"], full_well_dn=0.99 * level)
     return [*found, *_soft_limits(clues, top)]
+
+
+def _full(clues: Clues, top: Place) -> list[Proposal]:
+    """Return the full well that a flat of unknown light has reached: its level is that.
+
+    By the share of shot noise that is left, which says how far below the light the limit lies, and
+    by that how far the mean is from it (a censored normal law). Nothing where much is left, or
+    where light is known, which levels tell by more.
+    """
+    lights = {e.name: e.light for e in clues.layout.exposures if e.kind == "flat"}
+    if lights.get(top[0], 0.0) is not None:
+        return []
+    level, own = clues.signal(top), clues.seen.levels[top]
+    dark, bright = (float(v) for v in clues.fit.line_dn2(np.array([0.0, level])))
+    if bright <= dark:
+        return []
+    share = max(own.variance_dn2 - 1 / 12 - dark, 0.0) / (bright - dark)
+    if share > _LEFT:
+        return []
+    limit = -_BELOW
+    left = norm.pdf(limit) + limit * norm.cdf(limit)  # of the mean, below the limit
+    square = (1 + limit**2) * norm.cdf(limit) + limit * norm.pdf(limit) - left**2
+    missing = float(np.interp(share, square[::-1], left[::-1])) * (bright - dark) ** 0.5
+    made = proposals("saturation", ["full_well_dn"], full_well_dn=level + missing)
+    error = float(np.hypot(own.level_error_dn, missing))
+    return [measured(one, {"full_well_dn": level + missing}, {"full_well_dn": error})
+            for one in made]  # fmt: skip
 
 
 def _soft_limits(clues: Clues, top: Place) -> list[Proposal]:

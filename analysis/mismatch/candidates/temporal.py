@@ -21,9 +21,11 @@ _BY_PLANE = {  # of a mosaic: what alternates in each of its planes
     "rows": ((0.0, 0.25), (0.5, 0.25)),
     "columns": ((0.25, 0.0), (0.25, 0.5)),
 }
-# Most of pink noise is in the slowest waves down the frame: one of them may stand out.
+# Most of pink noise is in the slowest waves across lines: one of them may stand out.
 _SLOW = ("row_variance", "slow_row_variance", "row_correlation", "line_correlation",
-         "frame_variance", "row_spectrum_peak")  # fmt: skip
+         "frame_variance", "row_spectrum_peak", "column_variance",
+         "column_spectrum_peak")  # fmt: skip
+_CLEAR = 3.0  # standard errors of what columns vary by
 _BANDS = {"rows of light": "row_spectrum_peak of light", "rows": "row_spectrum_peak"}
 _PERSISTS = 3.0  # of log-likelihood: odds of 20 that a wander of frames lasts
 _TINY = 1e-300
@@ -124,20 +126,28 @@ def _brightness(clues: Clues, channel: str) -> list[tuple[float, float]]:
 def _pink(clues: Clues) -> Sequence[Proposal]:
     """Start from the size that makes rows vary as they do; where they do not, frames.
 
-    In a frame's mean is a single number of each frame, in its rows many: these know the size.
+    In a frame's mean is a single number of each frame, in its rows many: these know the size. Of a
+    sensor that is read column by column columns do, where they clearly vary.
     """
-    of_row, of_frame = pink_shares(clues.layout.rows, clues.layout.columns)
+    rows, columns = clues.layout.rows, clues.layout.columns
     row, _ = clues.amplitude("row_variance", alike)
     frame, _ = clues.amplitude("frame_variance", alike)
-    variance = row / of_row if row > 0 else frame / of_frame
-    if variance <= 0:
-        return []
-    starts = (sqrt(variance), sqrt(variance / 3))  # what else makes rows vary has a part of it
-    return [one for s in starts for one in proposals("pink_noise", ["sigma_dn"], sigma_dn=s)]
+    of_row, of_frame = pink_shares(rows, columns)
+    variances = {"rows": row / of_row if row > 0 else frame / of_frame}
+    column, error = clues.amplitude("column_variance", alike)
+    if column > _CLEAR * error:
+        variances["columns"] = column / pink_shares(columns, rows)[0]
+    return [
+        one
+        for along, variance in variances.items()
+        if variance > 0
+        for size in (sqrt(variance), sqrt(variance / 3))  # what else makes lines vary has a part
+        for one in proposals("pink_noise", ["sigma_dn"], sigma_dn=size, along=along)
+    ]
 
 
 def pink_shares(rows: int, columns: int) -> tuple[float, float]:
-    """Return which shares of the variance of 1/f noise are those of rows, and of frames.
+    """Return which shares of the variance of 1/f noise along rows are those of rows, and of frames.
 
     A mean over n of N samples keeps sinc^2(k n / N) of the wave of k cycles in N; here N are two
     frames, and waves have 1 / k. Their sum is ln(N / 2) and Euler's constant, nearly. Components

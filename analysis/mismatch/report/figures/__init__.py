@@ -40,6 +40,7 @@ NOISY_PIXELS = frozenset(
 OFF_AXIS = frozenset({"spectral_peak", "phase", "alternation_variance"})
 OF_CODES = frozenset({"code_spacing", "code_imbalance"})
 _SURFACES = ("fixed_smooth_variance", "fixed_patch_variance")
+NOISY_PARTS = "smooth_variance_spread"
 MANY_PIXELS = frozenset({"fixed_pixel_variance"})
 VARIANCE = "pixel_variance"
 _EXPOSURES = 3  # panels of frame means
@@ -145,6 +146,8 @@ def _curves(
 def _patterns(m: Mismatch, name: str, evidence: Evidence) -> Iterator[Picture]:
     if name in NOISY_PIXELS:
         yield from _map(m, "variance_map", evidence, "pixels")
+    elif name == NOISY_PARTS:
+        yield from _map(m, "variance_map", evidence, "smooth")
     elif name == FIXED_WAVE and m.statistic in evidence.shown_in:
         yield from _of_map(m, evidence.shown_in[m.statistic].map, evidence)
     elif name.startswith(MAPPED) and m.statistic in evidence.shown_in:

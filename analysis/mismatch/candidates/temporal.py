@@ -27,7 +27,7 @@ _SLOW = ("row_variance", "slow_row_variance", "row_correlation", "line_correlati
          "column_spectrum_peak")  # fmt: skip
 _CLEAR = 3.0  # standard errors of what columns vary by
 _BANDS = {"rows of light": "row_spectrum_peak of light", "rows": "row_spectrum_peak"}
-_PERSISTS = 3.0  # of log-likelihood: odds of 20 that a wander of frames lasts
+_PERSISTS = 1.0  # of log-likelihood: more than a parameter gains by chance (Akaike, 1974)
 _TINY = 1e-300
 _WAVES = 64  # a row: means over rows have next to nothing of shorter ones
 _PARABOLA = 1.3  # scatter of a parabola's top on half bins, over the bound (Rife & Boorstyn, 1974)

@@ -23,12 +23,16 @@ def made(monkeypatch: pytest.MonkeyPatch) -> list[tuple[float, int]]:
     """Return what was simulated: the camera's black level, and the replicate."""
     found: list[tuple[float, int]] = []
 
-    def simulate(model: Any, _layout: Any, replicates: Any, _seed: int, _jobs: int) -> list[Any]:
+    def simulate(
+        model: Any, _layout: Any, replicates: Any, _seed: int, _jobs: int, tell: Any, _made: Any
+    ) -> list[Any]:
         found.extend((model.camera.black_level, number) for number in replicates)
-        return [(model.camera.black_level, number) for number in replicates]
+        return [tell((model.camera.black_level, number)) for number in replicates]
 
-    def simulated(layout: Any, seed: int, which: tuple[Any, int]) -> Any:
-        return [simulate(model, layout, [which[1]], seed, 1)[0] for model, _ in which[0]]
+    def simulated(layout: Any, seed: int, tell: Any, which: tuple[Any, int]) -> Any:
+        return [
+            simulate(model, layout, [which[1]], seed, 1, tell, made)[0] for model, made in which[0]
+        ]
 
     monkeypatch.setattr(module, "simulate", simulate)
     monkeypatch.setattr(module, "simulated_together", simulated)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import analysis.mismatch.simulations as module
-from analysis.mismatch.model import Model, each, processes
+from analysis.mismatch.model import Model, both, each, in_turn, processes
 from analysis.mismatch.simulations import Simulations
 from dsis.cfa import Cfa
 from mismatch_recordings import camera
@@ -97,3 +97,17 @@ def test_a_failure_calls_off_what_was_not_begun() -> None:
 def test_one_job_starts_no_process() -> None:
     with processes(1):
         assert each(partial(_twice, 0), range(3), 2) == [(os.getpid(), 2 * i) for i in range(3)]
+
+
+def test_results_come_one_by_one() -> None:
+    with processes(2):
+        assert next(iter(in_turn(_failing, [1, 0], 2))) > 0
+
+
+def test_two_calls_beside_one_another_may_ask_for_processes() -> None:
+    work = partial(_twice, 1)
+    with processes(2):
+        apart, here = both(partial(each, work, [1], 2), os.getpid, 2)
+    assert apart[0][0] != here == os.getpid()
+    assert apart[0][1] == 3
+    assert both(partial(each, work, [1], 2), os.getpid, 1) == ([(here, 3)], here)

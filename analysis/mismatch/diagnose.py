@@ -129,7 +129,7 @@ def _found(
         return _said(found, remarks, evidence, asked)
     base = whole if large else State.of(setting, camera, step)
     # Of a large recording lines are looked for, and measured, in the same frames.
-    frames = WholeFrames(with_all_frames(layout) if large else layout, frames_of)
+    frames = WholeFrames(with_all_frames(layout) if large else layout, frames_of, how[1])
     search = Search(
         setting,
         camera,

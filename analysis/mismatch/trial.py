@@ -129,7 +129,8 @@ class Trial:
         layout = self.numbers.whole[0]
         numbers = {e.name: e.numbers for e in layout.exposures}
         source = self.numbers.source
-        return WholeFrames(layout, lambda name: source.frames(name, numbers[name]))
+        jobs = self.numbers.setting.jobs
+        return WholeFrames(layout, lambda name: source.frames(name, numbers[name]), jobs)
 
     def foretold(self, effect: Effect) -> Gained | None:
         """Return what locked frames gain by bands of light that the others foretell; None: nothing.

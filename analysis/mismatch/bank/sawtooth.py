@@ -77,7 +77,9 @@ def sawteeth(samples: tuple[Samples, ...], *, whole: bool = False) -> tuple[Sawt
     return tuple(found)
 
 
-def _best(samples: tuple[Samples, ...], best: Sawtooth, places: Array, *, whole: bool) -> Sawtooth:
+def _best(
+    samples: tuple[Samples, ...], best: Sawtooth, places: NDArray[np.floating], *, whole: bool
+) -> Sawtooth:
     """Return the best of a sawtooth and those of its period which fall at some places."""
     sums = _sums(samples, best.period, tuple(places.tolist()))
     for k, at in enumerate(places.tolist()):

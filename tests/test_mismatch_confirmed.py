@@ -24,7 +24,7 @@ def _asked(
     """Return what is said of bands of light by pixels, by other frames' phases and by all."""
     monkeypatch.setattr(confirmed, "shown_by_all", lambda *_: by_all)
     one = Stub(name="line_flicker", gain=10.0, proposal=Stub(effect=BANDS))
-    search: Any = Stub(named=[one], fitted_without=lambda *_: Stub(effect=()))
+    search: Any = Stub(named=[one], setting=Stub(jobs=1), fitted_without=lambda *_: Stub(effect=()))
     trial: Any = Stub(
         gains=lambda _, without: dict.fromkeys(without, pixels),
         foretold=lambda _: foretold,

@@ -101,8 +101,8 @@ def _held(monkeypatch: pytest.MonkeyPatch, locked: int, pairs: int) -> tuple[Any
     taken += [Taken(f"pair-{i:02}", "dark", 0.01 * i, None, (0, 1)) for i in range(pairs)]
     layout = Layout(tuple(taken), 4000, 4000, Cfa.MONO, 64.0, 4095.0, {}, {})
     assert layout.large
-    monkeypatch.setattr("analysis.mismatch.heldnumbers.observe", lambda *_: "observed again")
-    setting: Any = SimpleNamespace(layout=layout, seen="observed")
+    monkeypatch.setattr("analysis.mismatch.heldnumbers.observe", lambda *_, **__: "observed again")
+    setting: Any = SimpleNamespace(layout=layout, seen="observed", jobs=1)
     split: Any = SimpleNamespace(locked={f"stack-{i}": (5,) for i in range(locked)})
     return HeldNumbers(SimpleNamespace(), split, SimpleNamespace(), setting), layout  # type: ignore[arg-type]
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import analysis.mismatch.simulations as module
-from analysis.mismatch.model import Model, each, processes
+from analysis.mismatch.model import Model, both, each, in_turn, processes
 from analysis.mismatch.simulations import Simulations
 from dsis.cfa import Cfa
 from mismatch_recordings import camera
@@ -23,12 +23,16 @@ def made(monkeypatch: pytest.MonkeyPatch) -> list[tuple[float, int]]:
     """Return what was simulated: the camera's black level, and the replicate."""
     found: list[tuple[float, int]] = []
 
-    def simulate(model: Any, _layout: Any, replicates: Any, _seed: int, _jobs: int) -> list[Any]:
+    def simulate(
+        model: Any, _layout: Any, replicates: Any, _seed: int, _jobs: int, tell: Any, _made: Any
+    ) -> list[Any]:
         found.extend((model.camera.black_level, number) for number in replicates)
-        return [(model.camera.black_level, number) for number in replicates]
+        return [tell((model.camera.black_level, number)) for number in replicates]
 
-    def simulated(layout: Any, seed: int, which: tuple[Any, int]) -> Any:
-        return [simulate(model, layout, [which[1]], seed, 1)[0] for model, _ in which[0]]
+    def simulated(layout: Any, seed: int, tell: Any, which: tuple[Any, int]) -> Any:
+        return [
+            simulate(model, layout, [which[1]], seed, 1, tell, made)[0] for model, made in which[0]
+        ]
 
     monkeypatch.setattr(module, "simulate", simulate)
     monkeypatch.setattr(module, "simulated_together", simulated)
@@ -93,3 +97,17 @@ def test_a_failure_calls_off_what_was_not_begun() -> None:
 def test_one_job_starts_no_process() -> None:
     with processes(1):
         assert each(partial(_twice, 0), range(3), 2) == [(os.getpid(), 2 * i) for i in range(3)]
+
+
+def test_results_come_one_by_one() -> None:
+    with processes(2):
+        assert next(iter(in_turn(_failing, [1, 0], 2))) > 0
+
+
+def test_two_calls_beside_one_another_may_ask_for_processes() -> None:
+    work = partial(_twice, 1)
+    with processes(2):
+        apart, here = both(partial(each, work, [1], 2), os.getpid, 2)
+    assert apart[0][0] != here == os.getpid()
+    assert apart[0][1] == 3
+    assert both(partial(each, work, [1], 2), os.getpid, 1) == ([(here, 3)], here)

@@ -38,7 +38,7 @@ class Staged:
 class Setting:
     """A setting of which only the layout counts."""
 
-    drafts = 4
+    drafts, jobs = 4, 1
 
     def __init__(self, layout: Any) -> None:
         self.layout = layout

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from analysis.mismatch.model import simulate
+from analysis.mismatch.observe import Observation
 from analysis.mismatch.simulations import Simulations
 from analysis.mismatch.state import State
 from analysis.mismatch.touches import (
@@ -54,9 +55,13 @@ def state(request: pytest.FixtureRequest) -> State:
     return state_of(recording, camera(cfa=request.param))
 
 
+def itself(seen: Observation) -> Observation:
+    return seen
+
+
 def numbers(state: State, made: frozenset[str]) -> Vector:
     layout, model = state.setting.layout, state.calibrated.model
-    (seen,) = simulate(model, layout, [0], 5, 1, made)
+    (seen,) = simulate(model, layout, [0], 5, 1, itself, made)
     return vector(layout, seen, state.calibrated.refit(layout, seen.levels))
 
 
@@ -81,7 +86,9 @@ def test_a_sum_left_out_leaves_its_numbers_unknown_and_no_others(
 def test_variances_without_spikes_are_made_where_they_are_asked_for(state: State) -> None:
     """All else is the same with them and without."""
     layout, model = state.setting.layout, state.calibrated.model
-    (whole,), (some,) = (simulate(model, layout, [0], 5, 1, made) for made in (RECORDED, ALL_SUMS))
+    (whole,), (some,) = (
+        simulate(model, layout, [0], 5, 1, itself, made) for made in (RECORDED, ALL_SUMS)
+    )
     assert not state.calibrated.sums
     for place, level in whole.levels.items():
         assert level.bulk_dn2 == pytest.approx(level.variance_dn2, rel=0.1)

@@ -49,6 +49,10 @@ def numbers(state: State, layout: Layout, seen: Observation) -> np.ndarray:
     return vector(layout, seen, state.calibrated.refit(layout, seen.levels)).values
 
 
+def itself(seen: Observation) -> Observation:
+    return seen
+
+
 def test_side_by_side_is_as_one_by_one(state: State) -> None:
     layout, model = state.setting.layout, state.calibrated.model
     made = [ALL_SUMS, frozenset({SPECTRA}), *[ALL_SUMS] * (len(SOME) - 2)]
@@ -57,7 +61,7 @@ def test_side_by_side_is_as_one_by_one(state: State) -> None:
     ]
     darker = models[0].camera.model_copy(update={"black_level": models[0].camera.black_level + 3})
     models[-1] = model.with_camera(darker)
-    together = simulated_together(layout, 5, (list(zip(models, made, strict=True)), 1))
+    together = simulated_together(layout, 5, itself, (list(zip(models, made, strict=True)), 1))
     for own, sums, seen in zip(models, made, together, strict=True):
         alone = simulated(layout, 5, (own, 1, sums))
         np.testing.assert_array_equal(
@@ -72,7 +76,7 @@ def test_a_lone_recording_is_the_same_in_threads(state: State, threads: int) -> 
     layout, model = state.setting.layout, state.calibrated.model
     model = model.with_camera(model.camera.model_copy(update={"effect": SOME[0]}))
     alone = simulated(layout, 5, (model, 1, RECORDED))
-    (seen,) = simulate(model, layout, [1], 5, threads, RECORDED)
+    (seen,) = simulate(model, layout, [1], 5, threads, itself, RECORDED)
     np.testing.assert_array_equal(
         numbers(state, layout, seen), numbers(state, layout, alone), strict=True
     )
@@ -82,7 +86,7 @@ def test_a_lone_recording_is_the_same_in_threads(state: State, threads: int) -> 
 def test_of_other_light_nothing_is_shared(state: State) -> None:
     layout, model = state.setting.layout, state.calibrated.model
     brighter = Model(model.camera, {name: 1.5 * own for name, own in model.signals.items()})
-    one, two = simulated_together(layout, 5, ([(model, ALL_SUMS), (brighter, ALL_SUMS)], 0))
+    one, two = simulated_together(layout, 5, itself, ([(model, ALL_SUMS), (brighter, ALL_SUMS)], 0))
     for seen, own in ((one, model), (two, brighter)):
         assert seen.levels == simulated(layout, 5, (own, 0, ALL_SUMS)).levels
 

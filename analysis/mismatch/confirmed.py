@@ -8,6 +8,7 @@ from analysis.mismatch.allframes import shown_by_all
 from analysis.mismatch.finding import Gain
 from analysis.mismatch.instance import same_place
 from analysis.mismatch.judge import Judge
+from analysis.mismatch.model import side_by_side
 from analysis.mismatch.name import Search
 from analysis.mismatch.named import Named, unclear
 from analysis.mismatch.state import State
@@ -140,5 +141,6 @@ def _foretold(named: Named, without: Camera, trial: Trial, told: Gained) -> Gain
 
 
 def _fitted_without(search: Search, final: State, some: Sequence[Named]) -> dict[str, Camera]:
-    """Return the cameras without each of some effects."""
-    return {named.name: search.fitted_without(final, named) for named in some}
+    """Return the cameras without each of some effects, fitted side by side."""
+    fitted = side_by_side(partial(search.fitted_without, final), some, search.setting.jobs)
+    return {named.name: camera for named, camera in zip(some, fitted, strict=True)}

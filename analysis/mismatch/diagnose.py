@@ -23,7 +23,7 @@ from analysis.mismatch.finding import (
 )
 from analysis.mismatch.instance import kind_of
 from analysis.mismatch.layout import Layout
-from analysis.mismatch.model import processes
+from analysis.mismatch.model import both, processes
 from analysis.mismatch.name import Search
 from analysis.mismatch.named import Named
 from analysis.mismatch.observe import observe
@@ -109,7 +109,7 @@ def _found(
     # What is left out proves nothing either: copies of a frame are told from any simulation.
     split = split.without(development.keys() - {e.name for e in layout.exposures})
     album, frames_of = Album(layout), partial(_frames_of, source, numbers)
-    seen = observe(layout, frames_of, album, keep=True)
+    seen = observe(layout, frames_of, album, keep=True, threads=how[1])
     large = layout.large
     setting = Setting.of(layout, seen, split.interpolated, *how)
     setting = replace(setting, given=len(camera.effect))
@@ -118,14 +118,19 @@ def _found(
     whole = State.of(setting if large else _of_all_frames(setting, trial), camera, step)
     if not (words and whole.mismatches):
         search = Search(setting, camera, whole, words, step)
-        proof = _proof_without(trial, whole, _calibrated_to(setting, whole, camera), step, source)
-        evidence = evidence_of(whole, whole, album if large else trial.numbers.album, split)
+        calibrated = _calibrated_to(setting, whole, camera)
+        album = album if large else trial.numbers.album
+        proof, evidence = both(
+            partial(_proof_without, trial, whole, calibrated, step, source),
+            partial(evidence_of, whole, whole, album, split),
+            setting.jobs,
+        )
         found = with_first_frames(_finding(camera, whole, whole, search, {}, proof, {}), first)
         found = with_spikes(found, spikes, stored, split, asked)
         return _said(found, remarks, evidence, asked)
     base = whole if large else State.of(setting, camera, step)
     # Of a large recording lines are looked for, and measured, in the same frames.
-    frames = WholeFrames(with_all_frames(layout) if large else layout, frames_of)
+    frames = WholeFrames(with_all_frames(layout) if large else layout, frames_of, how[1])
     search = Search(
         setting,
         camera,
@@ -152,8 +157,11 @@ def _found(
     if users and not whole.mismatches:  # all that differed
         remarks = (*remarks, remark_on_sizes(users))
     known = {name: change * scale / whole.null.sd for name, change in known.items()}
-    proof = trial.proof(search.base, final, step, source)
-    evidence = evidence_of(search.base, final, album, split)
+    proof, evidence = both(
+        partial(trial.proof, search.base, final, step, source),
+        partial(evidence_of, search.base, final, album, split),
+        setting.jobs,
+    )
     if not large:
         final = whole if everything is None else everything
         departures = Change(len(whole.mismatches), len(final.mismatches))
@@ -223,7 +231,8 @@ def _searched(search: Search, source: Source) -> State:
         if layout == whole.layout:
             break
         numbers = {e.name: e.numbers for e in layout.exposures}
-        seen = observe(layout, partial(_frames_of, source, numbers), keep=True)
+        frames_of = partial(_frames_of, source, numbers)
+        seen = observe(layout, frames_of, keep=True, threads=whole.jobs)
         # All states here are on the way: what is found is judged on all frames.
         search.setting = replace(whole, layout=layout, seen=seen, nulls=whole.drafts)
         state = State.of(search.setting, camera, search.step)

@@ -22,11 +22,11 @@ from analysis.mismatch.recalibrate import Calibrated
 from analysis.mismatch.relit import relit
 from analysis.mismatch.source import Source
 from analysis.mismatch.split import Split
-from analysis.mismatch.state import Setting, State
+from analysis.mismatch.state import Setting, State, judged, numbers
 from analysis.mismatch.taking import layout_of
 from analysis.mismatch.thinned import Stage, thinned
 from analysis.mismatch.touches import ALL_SUMS, RECORDED, differing, sums_for, touched
-from analysis.mismatch.vector import Vector, vector
+from analysis.mismatch.vector import Vector
 from dsis.camera import Camera
 from dsis.recording import Recording
 
@@ -77,7 +77,11 @@ class HeldNumbers:
         layout = layout_of(self.recording, numbers, self.source.frames)
         album = Album(layout)
         seen = observe(
-            layout, lambda name: self.source.frames(name, numbers[name]), album, keep=True
+            layout,
+            lambda name: self.source.frames(name, numbers[name]),
+            album,
+            keep=True,
+            threads=self.setting.jobs,
         )
         return layout, seen, album
 
@@ -98,7 +102,12 @@ class HeldNumbers:
             return whole, self.setting.seen
         kept = tuple(e for e in whole.exposures if e.name not in left_out)
         layout, numbers = replace(whole, exposures=kept), {e.name: e.numbers for e in kept}
-        return layout, observe(layout, lambda name: self.source.frames(name, numbers[name]))
+        seen = observe(
+            layout,
+            lambda name: self.source.frames(name, numbers[name]),
+            threads=self.setting.jobs,
+        )
+        return layout, seen
 
     @property
     def frames(self) -> int:
@@ -117,7 +126,7 @@ class HeldNumbers:
         one, other = self._made(yardstick, final, (final.camera, without), made)
         layout, seen = self.whole
         parts = ((layout, seen), self.rest)
-        recorded = [_vector_of(yardstick, *part) for part in parts]
+        recorded = [judged(one, yardstick, own) for one, own in parts]
         keys, places = _shared(recorded)
         whole, rest = (
             Numbers(own.values[of], one[i][:, of], other[i][:, of], own.errors[of])
@@ -140,17 +149,14 @@ class HeldNumbers:
         judges = f"{yardstick.model.camera.model_dump_json()} {final.camera.model_dump_json()}"
         keys = [f"{judges} {one.model_dump_json()} {sorted(sums)}" for one in cameras]
         missing = {k: c for k, c in zip(keys, cameras, strict=True) if k not in self.kept}
-        layouts = whole, rest = self.whole[0], self.rest[0]
+        whole, rest = self.whole[0], self.rest[0]
         count = _FEW if self.setting.large else _SIMULATIONS
         models = [relit(final.calibrated.model, camera, whole) for camera in missing.values()]
 
-        work = partial(_two, whole, rest, (self.setting.seed + 3, sums))
+        work = partial(_two, whole, rest, (self.setting.seed + 3, sums), yardstick)
         # All side by side: a few of one camera would leave processes idle in the end.
         asked = [(model, number) for model in models for number in range(count)]
-        made = [
-            [_vector_of(yardstick, *part).values for part in zip(layouts, both, strict=True)]
-            for both in each(work, asked, self.setting.jobs)
-        ]
+        made = each(work, asked, self.setting.jobs)
         for i, key in enumerate(missing):
             own = made[i * count : (i + 1) * count]
             first, second = (np.stack(part) for part in zip(*own, strict=True))
@@ -171,10 +177,6 @@ def _yardstick(final: State, without: Camera) -> Calibrated:
     return replace(calibrated, model=calibrated.model.with_camera(without), switches=switches)
 
 
-def _vector_of(calibrated: Calibrated, layout: Layout, seen: Observation) -> Vector:
-    return vector(layout, seen, calibrated.refit(layout, seen.levels))
-
-
 def _shared(parts: Sequence[Vector]) -> tuple[list[Key], list[list[int]]]:
     """Return what all have a number of, and where each has it.
 
@@ -186,15 +188,20 @@ def _shared(parts: Sequence[Vector]) -> tuple[list[Key], list[list[int]]]:
 
 
 def _two(
-    whole: Layout, rest: Layout, how: tuple[int, frozenset[str]], which: tuple[Model, int]
-) -> tuple[Observation, Observation]:
-    """Return what all frames of a simulated recording show, and what those of `rest` show.
+    whole: Layout,
+    rest: Layout,
+    how: tuple[int, frozenset[str]],
+    yardstick: Calibrated,
+    which: tuple[Model, int],
+) -> tuple[Array, Array]:
+    """Return the numbers of all frames of a simulated recording, and of those of `rest`.
 
     `how` are the seed, and which sums are made; `which` are the model and the replicate.
     """
     (seed, sums), (model, replicate) = how, which
     frames, again = (model.frames(own, replicate, seed) for own in (whole, rest))
-    return _observed(whole, rest, frames, again, sums)
+    one, other = _observed(whole, rest, frames, again, sums)
+    return numbers(whole, yardstick, one), numbers(rest, yardstick, other)
 
 
 def _observed(

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar, copy_context
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -113,15 +113,27 @@ def simulate(
     replicates: Sequence[int],
     seed: int,
     jobs: int,
+    tell: Callable[[Observation], R],
     made: frozenset[str] = ALL_SUMS,
-) -> list[Observation]:
-    """Return the observations of simulated recordings, one for each replicate number.
+) -> Iterator[R]:
+    """Yield what observations of simulated recordings tell, one for each replicate number.
 
-    `made` as of `observe`. Of a single one exposures are made, and looked at, side by side.
+    Whoever simulates tells: an observation is large, and what is told of it takes time. `made` as
+    of `observe`. Of a single one exposures are made, and looked at, side by side.
     """
     threads = jobs if len(replicates) == 1 and _alone.get() else 1
-    work = partial(simulated, layout, seed, threads=threads)
-    return each(work, [(model, one, made) for one in replicates], jobs)
+    work = partial(_told, layout, seed, tell, threads)
+    return in_turn(work, [(model, one, made) for one in replicates], jobs)
+
+
+def _told(
+    layout: Layout,
+    seed: int,
+    tell: Callable[[Observation], R],
+    threads: int,
+    which: tuple[Model, int, frozenset[str]],
+) -> R:
+    return tell(simulated(layout, seed, which, threads))
 
 
 def simulated(
@@ -162,12 +174,19 @@ def each(work: Callable[[T], R], items: Sequence[T], jobs: int) -> list[R]:
     A frame is small work: threads would wait for one another's Python. Work, items and results are
     pickled.
     """
+    return list(in_turn(work, items, jobs))
+
+
+def in_turn(work: Callable[[T], R], items: Sequence[T], jobs: int) -> Iterator[R]:
+    """Yield what `each` returns, one by one as soon as it is there."""
     pool = _pool.get()
     if pool is None or jobs <= 1 or (len(items) < 2 and _alone.get()):
-        return in_threads(work, items, jobs)
+        yield from in_threads(work, items, jobs)
+        return
     running = [pool.submit(work, item) for item in items]
     try:
-        return [one.result() for one in running]
+        for one in running:
+            yield one.result()
     finally:
         for one in running:
             one.cancel()
@@ -192,6 +211,17 @@ def side_by_side(work: Callable[[T], R], items: Sequence[T], jobs: int) -> list[
         finally:
             for one in running:
                 one.cancel()
+
+
+def both(one: Callable[[], T], other: Callable[[], R], jobs: int) -> tuple[T, R]:
+    """Return what two calls return, made side by side: see `side_by_side`."""
+    calls: list[Callable[[], Any]] = [one, other]
+    first, second = side_by_side(_called, calls, jobs)
+    return first, second
+
+
+def _called(call: Callable[[], R]) -> R:
+    return call()
 
 
 def in_threads(work: Callable[[T], R], items: Sequence[T], jobs: int) -> list[R]:

@@ -55,10 +55,13 @@ class WholeFrames:
     ----------
     layout, frames_of
         The frames.
+    jobs
+        Threads that look at them.
     """
 
     layout: Layout
     frames_of: FramesOf
+    jobs: int = 1
     _shown: dict[Frequency, bool] = field(default_factory=dict)
     _looks: dict[Frequency, "Look"] = field(default_factory=dict)
     _gains: dict[tuple[Frequency, bool], float] = field(default_factory=dict)
@@ -119,7 +122,9 @@ class WholeFrames:
     @cached_property
     def _telegraph(self) -> Telegraph | None:
         """The pixels that jump; of a large recording nothing is asked."""
-        return None if self.layout.large else telegraph(self.layout, self.frames_of)
+        if self.layout.large:
+            return None
+        return telegraph(self.layout, self.frames_of, self.jobs)
 
     def spread_rather(self, sure: float) -> float:
         """Return by how much frames prefer read noises that spread to pixels that jump, nats.

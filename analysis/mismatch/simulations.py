@@ -28,7 +28,7 @@ class Simulations:
     layout, model
         What is simulated; every camera has the model's levels, see `relit`.
     numbers_of
-        Gives the bank's numbers of an observation.
+        Gives the bank's numbers of an observation; processes are sent it.
     seed, jobs
         Of the simulations.
     sums
@@ -70,11 +70,12 @@ class Simulations:
             ([(self._model(wanted[key]), self._made(wanted[key])) for key in keys], number)
             for keys, number in groups
         ]
-        made = each(partial(simulated_together, self.layout, self.seed), work, self.jobs)
+        one = partial(simulated_together, self.layout, self.seed, self.numbers_of)
+        made = each(one, work, self.jobs)
         ahead: dict[str, list[Array]] = {}
         for (keys, _), some in zip(groups, made, strict=True):
-            for key, seen in zip(keys, some, strict=True):
-                ahead.setdefault(key, []).append(self.numbers_of(seen))
+            for key, numbers in zip(keys, some, strict=True):
+                ahead.setdefault(key, []).append(numbers)
         for key, more in ahead.items():
             known = self.kept.get(key, [])
             self.kept[key] = [*known[: replicates - len(more)], *more]
@@ -86,9 +87,7 @@ class Simulations:
         missing = range(len(known), replicates)
         if missing:
             which = self._model(camera), self.layout, missing, self.seed, self.jobs
-            made = self._made(camera)
-            some = simulate(*which) if made == ALL_SUMS else simulate(*which, made=made)
-            known = [*known, *(self.numbers_of(one) for one in some)]
+            known = [*known, *simulate(*which, self.numbers_of, self._made(camera))]
             self.kept[key] = known
         return np.stack(known[:replicates])
 

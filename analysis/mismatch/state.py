@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -145,12 +146,11 @@ class State:
         layout, seen = setting.layout, setting.seen
         calibrated = setting.calibrated(camera, None if near is None else near.calibrated)
         vectors, fits = [], []
-        for first in range(0, nulls, setting.jobs):
-            batch = range(first, min(first + setting.jobs, nulls))
-            which = calibrated.model, layout, batch, setting.seed, setting.jobs
-            for one in simulate(*which, made=ALL_SUMS | calibrated.sums):
-                fits.append(calibrated.refit(layout, one.levels))
-                vectors.append(vector(layout, one, fits[-1]))
+        which = calibrated.model, layout, range(nulls), setting.seed, setting.jobs
+        tell = partial(_refitted, layout, calibrated)
+        for fit, one in simulate(*which, tell, ALL_SUMS | calibrated.sums):
+            fits.append(fit)
+            vectors.append(one)
             progress()
         own = vector(layout, seen, calibrated.residual)
         null = null_of(layout, vectors, own)
@@ -160,7 +160,7 @@ class State:
         simulations = Simulations(
             layout,
             calibrated.model,
-            lambda one: numbers(layout, calibrated, one),
+            partial(numbers, layout, calibrated),
             setting.seed,
             setting.jobs,
             calibrated.sums,
@@ -203,4 +203,14 @@ class State:
 
 def numbers(layout: Layout, calibrated: Calibrated, seen: Observation) -> Array:
     """Return the numbers of a simulated recording, its base numbers fitted as the recording's."""
-    return vector(layout, seen, calibrated.refit(layout, seen.levels)).values
+    return judged(layout, calibrated, seen).values
+
+
+def judged(layout: Layout, calibrated: Calibrated, seen: Observation) -> Vector:
+    """Return the numbers of an observation, its base numbers fitted as the recording's."""
+    return _refitted(layout, calibrated, seen)[1]
+
+
+def _refitted(layout: Layout, calibrated: Calibrated, seen: Observation) -> tuple[BaseFit, Vector]:
+    fit = calibrated.refit(layout, seen.levels)
+    return fit, vector(layout, seen, fit)

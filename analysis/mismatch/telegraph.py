@@ -8,6 +8,7 @@ from the best of these laws, and beside the best of them.
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import reduce
 from math import exp, inf, isfinite, log, sqrt
 
 import numpy as np
@@ -18,6 +19,7 @@ from scipy.stats import chi2
 from analysis.mismatch.layout import Layout
 from analysis.mismatch.pixellaw import MOST_FRAMES, of_jumps, of_spikes, of_variances
 from analysis.mismatch.projections import FramesOf
+from dsis.recording.ahead import in_order
 
 Array = NDArray[np.float64]
 _LEAST_FRAMES = 3  # of which a median pixel tells the noise
@@ -156,13 +158,15 @@ def _log_normal(spread: float, centre: float) -> Array:
     return np.asarray(np.diff(ndtr((edges - centre) / spread)))
 
 
-def telegraph(layout: Layout, frames_of: FramesOf) -> Telegraph | None:
+def telegraph(layout: Layout, frames_of: FramesOf, jobs: int = 1) -> Telegraph | None:
     """Return the pixels that jump; None: too few frames, or codes, tell.
 
     Parameters
     ----------
     layout, frames_of
         The frames: asked are darks and flats, of a larger sensor its middle.
+    jobs
+        Threads; the result is the same.
 
     References
     ----------
@@ -176,20 +180,25 @@ def telegraph(layout: Layout, frames_of: FramesOf) -> Telegraph | None:
     chosen, weight = _chosen(blocks, least)
     longest = max(time for *_, time in blocks)
     heights = _HEIGHTS * sqrt(least)
-    jumps = np.zeros((chosen.size, heights.size, _SWITCHING.size))
-    own = np.zeros((chosen.size, _RATIOS.size))
-    grown = np.zeros((chosen.size, _ADDED.size))
-    spikes = np.zeros((chosen.size, _SPIKES.size, _SPIKY.size))
-    twins = np.zeros((chosen.size, heights.size))
-    for x, noise, time in blocks:
+
+    def told(block: tuple[Array, Array, float]) -> tuple[Array, ...]:
+        x, noise, time = block
         some, dn2 = x[chosen], noise[chosen]
-        jumps += of_jumps(some, dn2, heights, _SWITCHING)
-        own += of_variances(some, dn2, (_RATIOS - 1) * least)
         part = time / longest if longest > 0 else 1.0
-        grown += of_variances(some, dn2, _ADDED * least * part)
-        spikes += of_spikes(some, dn2, _SPIKES * least, _SPIKY)
-        twins += of_variances(some, dn2, heights**2 / 4)
-    return _fitted(jumps, _Others(own, grown, spikes, twins), weight, heights)
+        return (
+            of_jumps(some, dn2, heights, _SWITCHING),
+            of_variances(some, dn2, (_RATIOS - 1) * least),
+            of_variances(some, dn2, _ADDED * least * part),
+            of_spikes(some, dn2, _SPIKES * least, _SPIKY),
+            of_variances(some, dn2, heights**2 / 4),
+        )
+
+    def added(sums: tuple[Array, ...], more: tuple[Array, ...]) -> tuple[Array, ...]:
+        return tuple(a + b for a, b in zip(sums, more, strict=True))
+
+    # Blocks are added in their order, whoever looked at them.
+    jumps, *others = reduce(added, in_order(told, blocks, jobs if jobs > 1 else 0))
+    return _fitted(jumps, _Others(*others), weight, heights)
 
 
 def _blocks(layout: Layout, frames_of: FramesOf) -> Iterator[tuple[Array, Array, float]]:

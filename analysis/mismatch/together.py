@@ -5,8 +5,9 @@ first link that is another, a frame of one is a frame of the other. So frames of
 made camera by camera, each from where it parts from an earlier one, and then looked at.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import takewhile
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ from analysis.mismatch.observe import Kept, Observation, finished, observing
 from dsis.camera import Camera
 from dsis.exposing import Begun, Shared
 
+R = TypeVar("R")
 _MOST_BYTES = 256 << 20  # in each process, of all cameras that are looked at together
 _PIXEL_BYTES = 128  # sums over frames and exposures that a camera takes for each pixel
 _LARGEST_CODE = 65535
@@ -31,12 +33,14 @@ def most_together(layout: Layout) -> int:
     return max(_MOST_BYTES // (pixels * (_PIXEL_BYTES + 2 * frames)), 1)
 
 
-def simulated_together(layout: Layout, seed: int, which: Work) -> list[Observation]:
-    """Return the observation of one simulated recording of each of some models; see `simulated`."""
+def simulated_together(
+    layout: Layout, seed: int, tell: Callable[[Observation], R], which: Work
+) -> list[R]:
+    """Return what one simulated recording of each of some models tells; see `simulate`."""
     some, replicate = which
     models = [model for model, _ in some]
     if len(models) < 2 or not _alike(models):
-        return [simulated(layout, seed, (model, replicate, made)) for model, made in some]
+        return [tell(simulated(layout, seed, (model, replicate, made))) for model, made in some]
     frames = _Frames(models, layout, replicate, seed)
     running = [
         observing(layout, own, None, Kept(places=False, made=made))
@@ -46,7 +50,7 @@ def simulated_together(layout: Layout, seed: int, which: Work) -> list[Observati
         frames.take(exposure)
         for one in running:
             next(one)
-    return [finished(one) for one in running]
+    return [tell(finished(one)) for one in running]
 
 
 def _alike(models: Sequence[Model]) -> bool:

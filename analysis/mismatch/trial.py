@@ -13,7 +13,7 @@ from analysis.mismatch.given import Ratio
 from analysis.mismatch.heldnumbers import HeldNumbers
 from analysis.mismatch.model import each, simulate
 from analysis.mismatch.null import null_of
-from analysis.mismatch.observe import Observation, observe
+from analysis.mismatch.observe import observe
 from analysis.mismatch.phase import WholeFrames
 from analysis.mismatch.prove.gain import heldout_gain, telling
 from analysis.mismatch.prove.gap import gap_closed
@@ -23,10 +23,10 @@ from analysis.mismatch.prove.proof import hold_seen, loglik_of, prove_held
 from analysis.mismatch.prove.virtual import Signals
 from analysis.mismatch.source import Source
 from analysis.mismatch.split import Split
-from analysis.mismatch.state import Setting, State
+from analysis.mismatch.state import Setting, State, judged
 from analysis.mismatch.taking import layout_of
 from analysis.mismatch.touches import ALL_SUMS
-from analysis.mismatch.vector import Vector, vector
+from analysis.mismatch.vector import Vector
 from dsis.camera import Camera
 from dsis.effects import Effect
 from dsis.effects.line_flicker import LineFlicker
@@ -129,7 +129,8 @@ class Trial:
         layout = self.numbers.whole[0]
         numbers = {e.name: e.numbers for e in layout.exposures}
         source = self.numbers.source
-        return WholeFrames(layout, lambda name: source.frames(name, numbers[name]))
+        jobs = self.numbers.setting.jobs
+        return WholeFrames(layout, lambda name: source.frames(name, numbers[name]), jobs)
 
     def foretold(self, effect: Effect) -> Gained | None:
         """Return what locked frames gain by bands of light that the others foretell; None: nothing.
@@ -206,18 +207,18 @@ class Trial:
         except InputError:
             return None  # no exposure has two locked frames
         numbers = {e.name: e.numbers for e in layout.exposures}
-        seen = observe(layout, lambda name: source.frames(name, numbers[name]))
         setting = base.setting
+        seen = observe(
+            layout, lambda name: source.frames(name, numbers[name]), threads=setting.jobs
+        )
 
-        def vector_of(one: Observation) -> Vector:
-            # One yardstick for all: the final model's base numbers.
-            return vector(layout, one, final.calibrated.refit(layout, one.levels))
+        # One yardstick for all: the final model's base numbers.
+        vector_of = partial(judged, layout, final.calibrated)
 
         def simulated(state: State) -> list[Vector]:
             model = state.calibrated.model
             which = model, layout, range(_REPLICATES), setting.seed + 2, setting.jobs
-            made = ALL_SUMS | final.calibrated.sums
-            return [vector_of(one) for one in simulate(*which, made=made)]
+            return list(simulate(*which, vector_of, ALL_SUMS | final.calibrated.sums))
 
         own, before, after = vector_of(seen), simulated(base), simulated(final)
         nulls = [null_of(layout, [*after[:i], *after[i + 1 :]], one) for i, one in enumerate(after)]

@@ -62,8 +62,7 @@ class Sawtooth:
     chi2: float
 
 
-@lru_cache(maxsize=8)
-@lru_cache(maxsize=4)  # of the recorded ones, which are asked again whatever the model
+@lru_cache(maxsize=8)  # of the recorded ones, which are asked again whatever the model
 def sawteeth(samples: tuple[Samples, ...], *, whole: bool = False) -> tuple[Sawtooth, ...]:
     """Return for each of `PERIODS` the sawtooth that explains most, by least squares.
 
@@ -72,27 +71,37 @@ def sawteeth(samples: tuple[Samples, ...], *, whole: bool = False) -> tuple[Sawt
     found = []
     for period in PERIODS:
         best, coarse = Sawtooth(0.0, period, 0.0, 0.0), period / PLACES
-        for at in coarse * np.arange(PLACES):
-            best = _better(samples, best, float(at), whole=whole)
-        for at in best.at_code + coarse / _FINER * np.arange(1 - _FINER, _FINER):
-            best = _better(samples, best, float(at) % period, whole=whole)
-        found.append(best)
+        best = _best(samples, best, coarse * np.arange(PLACES), whole=whole)
+        finer = best.at_code + coarse / _FINER * np.arange(1 - _FINER, _FINER)
+        found.append(_best(samples, best, finer % period, whole=whole))
     return tuple(found)
 
 
-def _better(samples: Sequence[Samples], best: Sawtooth, at: float, *, whole: bool) -> Sawtooth:
-    """Return the better of a sawtooth and that of its period which falls at `at`."""
-    phase = (np.arange(FOLDED) - at) / best.period
-    residue = phase - np.floor(phase) - 0.5
-    top = bottom = 0.0
-    for own in samples:
-        square, moved, before = _against(residue, own.one, own.other, own.moved, own.before)
-        top += moved / sqrt(own.variance_dn2)
-        top += whole * own.follows * before / own.variance_dn2
-        bottom += (square - (not whole) * before**2 / own.square_dn2) / own.variance_dn2
-    if bottom > 0 and top**2 / bottom > best.chi2:
-        return Sawtooth(top / bottom, best.period, at, top**2 / bottom)
+def _best(
+    samples: tuple[Samples, ...], best: Sawtooth, places: NDArray[np.floating], *, whole: bool
+) -> Sawtooth:
+    """Return the best of a sawtooth and those of its period which fall at some places."""
+    sums = _sums(samples, best.period, tuple(places.tolist()))
+    for k, at in enumerate(places.tolist()):
+        top = bottom = 0.0
+        for own, of_places in zip(samples, sums, strict=True):
+            square, moved, before = of_places[:, k].tolist()
+            top += moved / sqrt(own.variance_dn2)
+            top += whole * own.follows * before / own.variance_dn2
+            bottom += (square - (not whole) * before**2 / own.square_dn2) / own.variance_dn2
+        if bottom > 0 and top**2 / bottom > best.chi2:
+            best = Sawtooth(top / bottom, best.period, at, top**2 / bottom)
     return best
+
+
+@lru_cache(maxsize=64)
+def _sums(
+    samples: tuple[Samples, ...], period: int, places: tuple[float, ...]
+) -> tuple[Array, ...]:
+    """Return of each exposure's samples what `_against` does, of residues at some places."""
+    phases = (np.arange(FOLDED)[:, np.newaxis] - np.array(places)) / period
+    residues = phases - np.floor(phases) - 0.5
+    return tuple(_against(residues, o.one, o.other, o.moved, o.before) for o in samples)
 
 
 def profile(samples: Sequence[Samples], period: int, parts: int) -> tuple[Array, Array]:
@@ -118,14 +127,20 @@ def profile(samples: Sequence[Samples], period: int, parts: int) -> tuple[Array,
 
 
 @kernel
-def _against(
-    residue: Array, one: Frame, other: Frame, moved: Array, before: Array
-) -> tuple[float, float, float]:
-    """Return the sums of a residue's change squared, times what moved, and what moved before."""
-    square = along = through = 0.0
-    for i in range(one.size):
-        apart = residue[one[i]] - residue[other[i]]
-        square += apart * apart
-        along += apart * moved[i]
-        through += apart * before[i]
-    return square, along, through
+def _against(residues: Array, one: Frame, other: Frame, moved: Array, before: Array) -> Array:
+    """Return the sums of a residue's change squared, times what moved, and what moved before.
+
+    Of residues at some places, (code, place), each: (3, place). All at once: a vector instruction
+    takes several places.
+    """
+    places = np.uintp(residues.shape[1])
+    sums = np.zeros(3 * residues.shape[1])
+    for i in range(np.uintp(one.size)):
+        here, there = residues[np.uintp(one[i])], residues[np.uintp(other[i])]
+        change, earlier = moved[i], before[i]
+        for k in range(places):
+            apart = here[k] - there[k]
+            sums[k] += apart * apart
+            sums[places + k] += apart * change
+            sums[places + places + k] += apart * earlier
+    return sums.reshape(3, -1)

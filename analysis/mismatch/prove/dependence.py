@@ -5,12 +5,12 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
-from scipy.special import ndtri
 
 from analysis.mismatch.prove.held import Held
 from analysis.mismatch.prove.law import Law, below, innovations
 from analysis.mismatch.prove.populations import CONSPICUOUS, GROUPS
 from analysis.mismatch.prove.residuals import Residuals
+from analysis.mismatch.prove.scores import normal_scores
 from analysis.mismatch.prove.sites import site_means
 from analysis.mismatch.prove.spectrum import spectrum_of
 from analysis.mismatch.prove.sure import sure
@@ -19,7 +19,6 @@ from analysis.mismatch.prove.whittle import periodogram
 from dsis.effects import Image
 
 _MOST = 0.9  # correlation with the frame before
-_FARTHEST = 1e-9  # probability: scores end at six standard deviations
 
 
 def with_dependence(own: Residuals, base: Residuals, held: Held) -> Law:
@@ -58,11 +57,10 @@ def with_dependence(own: Residuals, base: Residuals, held: Held) -> Law:
 
 def _scores(virtual: Residuals, name: str, held: Held) -> Image:
     """Return normal scores of fresh frames: float32 (frame, row, column)."""
-    made = []
-    for u in virtual.standardised(name, held):
-        p = below(virtual.law, name, u, virtual.sensed.groups, held)
-        np.clip(p, _FARTHEST, 1 - _FARTHEST, out=p)
-        made.append(ndtri(p, out=p).astype(np.float32))
+    made = [
+        normal_scores(below(virtual.law, name, u, virtual.sensed.groups, held)).astype(np.float32)
+        for u in virtual.standardised(name, held)
+    ]
     return np.stack(made)
 
 

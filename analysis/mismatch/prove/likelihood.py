@@ -18,7 +18,6 @@ from zlib import crc32
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtri
 
 from analysis.mismatch.prove.cells import Cells
 from analysis.mismatch.prove.held import Codes, Held, HeldExposure
@@ -34,6 +33,7 @@ from analysis.mismatch.prove.law import (
 )
 from analysis.mismatch.prove.learning import law_of
 from analysis.mismatch.prove.levels import frame_means, level_loglik
+from analysis.mismatch.prove.scores import normal_scores
 from analysis.mismatch.prove.shape import Shape
 from analysis.mismatch.prove.sites import means_of_most, site_places, spread_over
 from analysis.mismatch.prove.virtual import Signals
@@ -42,7 +42,6 @@ from dsis.camera import Camera
 
 _GROSS = 1e-9  # chance of a gross error: any code alike
 _BLOCK = 256  # knots at a time: of a bright scene there are 1e5, among as many codes
-_FARTHEST = 1e-9  # probability: scores end at six standard deviations
 
 
 @dataclass(frozen=True)
@@ -149,7 +148,7 @@ def _scored(
     key = [model.seed, crc32(exposure.name.encode()), number]
     place = np.random.default_rng(key).random(codes.shape)
     p = low + place * (high - low)
-    return logs, np.asarray(ndtri(np.clip(p, _FARTHEST, 1 - _FARTHEST)), np.float64)
+    return logs, normal_scores(p)
 
 
 def _norm(law: Law, name: str, centre: Array, sd: Array, held: Held) -> Array:

@@ -23,6 +23,7 @@ from analysis.mismatch.rivalled import rivalled
 from analysis.mismatch.state import State
 from analysis.mismatch.unequal import unequal
 from analysis.mismatch.uneven import uneven
+from analysis.mismatch.wholeframes import of_pink_noise
 from dsis.effects import Effect
 from dsis.effects.black_level_drift import BlackLevelDrift
 from dsis.effects.readout_memory import ReadoutMemory
@@ -63,6 +64,7 @@ def of_another(state: State, effect: Effect, without: Array) -> Denial | None:
         or rivalled(state, effect)
         or heated(state, kind)
         or wandering(state, effect)
+        or of_pink_noise(state, effect)
         or unequal(state, effect, without)
         or uneven(state, effect)
         or coded(state, kind, without)

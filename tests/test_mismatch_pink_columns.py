@@ -10,7 +10,7 @@ from analysis.mismatch import find_mismatch
 from dsis.cfa import Cfa
 from mismatch_recordings import FEW_LEVELS, camera, recorded
 
-ROWS, COLUMNS = 64, 96
+ROWS, COLUMNS = 48, 64
 VOCABULARY = frozenset({"pink_noise", "column_noise", "row_noise", "black_level_drift"})
 Moves = Callable[[np.random.Generator, int], NDArray[np.float64]]
 """(rng, frames) -> (frame, row, column), DN."""

@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from analysis.mismatch.bank.key import Key
 from analysis.mismatch.bank.linemeans import AXES, line_means
-from analysis.mismatch.wholeframes import of_moving_parts
+from analysis.mismatch.wholeframes import of_moving_parts, of_pink_noise
 from dsis.cfa import Cfa
 from dsis.measures import Accumulator
+from exposing import effect
 
 ROWS, COLUMNS = 40, 48
 FRAMES = (14, 5, 5, 4)
@@ -159,3 +160,27 @@ def test_drift_is_believed_beside_noise_of_columns() -> None:
         for columns in (_columns(1.0, 0.0), _columns(0.5, 1.0)):
             state = _state(seed, Cfa.MONO, _drift(1.0), columns=columns)
             assert not _denied(state, "black_level_drift")
+
+
+def _beside_pink(drift: float, pink: float, frames: int) -> bool:
+    layout = SimpleNamespace(rows=64, columns=96, uniform=[SimpleNamespace(numbers=range(frames))])
+    effects = [effect("pink_noise", sigma_dn=pink)] if pink else []
+    state: Any = SimpleNamespace(
+        camera=SimpleNamespace(effect=effects), setting=SimpleNamespace(layout=layout)
+    )
+    return of_pink_noise(state, effect("black_level_drift", sigma_dn=drift)) is not None
+
+
+@pytest.mark.parametrize("frames", [6, 16])
+def test_1_f_noise_that_goes_on_from_frame_to_frame_is_no_drift(frames: int) -> None:
+    """A series over all frames, against one of the same power that ends at two frames' length."""
+    rng, size, draws = np.random.default_rng(3), 64 * 96, 200
+    falls = np.append(0.0, np.arange(1.0, 4 * frames * size + 1) ** -0.5)
+    parts = rng.normal(size=(2, draws, 64 * frames + 1))  # slower than a 64th of a frame suffices
+    slow = np.fft.irfft((parts[0] + 1j * parts[1]) * falls[: 64 * frames + 1], 128 * frames)
+    means = slow.reshape(draws, 8, 16 * frames)[:, 0].reshape(draws, frames, 16).mean(2)
+    unit = 4 * (1 / np.arange(1, size)).sum() / (128 * frames) ** 2  # of two frames' length
+    wander = float((means.var(1, ddof=1) / unit).mean()) ** 0.5
+    assert _beside_pink(wander, 1.0, frames)
+    assert not _beside_pink(3 * wander, 1.0, frames)
+    assert not _beside_pink(wander, 0.0, frames)

@@ -23,6 +23,7 @@ from analysis.mismatch.rivalled import rivalled
 from analysis.mismatch.state import State
 from analysis.mismatch.unequal import unequal
 from analysis.mismatch.uneven import uneven
+from analysis.mismatch.wholeframes import of_pink_noise
 from dsis.effects import Effect
 from dsis.effects.black_level_drift import BlackLevelDrift
 from dsis.effects.readout_memory import ReadoutMemory
@@ -61,6 +62,7 @@ def of_another(state: State, effect: Effect, without: Array) -> Denial | None:
         or heated(state, kind)
         or jumped(state, effect)
         or wandering(state, effect)
+        or of_pink_noise(state, effect)
         or unequal(state, effect, without)
         or uneven(state, effect)
         or coded(state, kind, without)

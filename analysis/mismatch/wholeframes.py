@@ -1,6 +1,7 @@
 """Frames that move as a whole, and frames whose mean moves because a part of them does."""
 
 from dataclasses import dataclass
+from math import log
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +11,9 @@ from scipy.stats import beta, chi2
 from analysis.mismatch.bank.linemeans import AXES, Axis, LineMeans
 from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.state import State
+from dsis.effects import Effect
+from dsis.effects.black_level_drift import BlackLevelDrift
+from dsis.effects.pink_noise import PinkNoise
 
 Array = NDArray[np.float64]
 _PARTS = 4  # of a frame: a wave has two phases, beside what all have
@@ -163,3 +167,25 @@ def _unexplained(state: State, exposure: str, without: Array) -> float:
             made.append(float(mean) ** 3 - 1)
     whole = float(np.mean(seen)) if seen else 0.0
     return float(np.clip(1 - np.mean(made) / whole, 0.0, 1.0)) if whole > 0 else 1.0
+
+
+def of_pink_noise(state: State, effect: Effect) -> Denial | None:
+    """Return how drift is denied by 1/f noise that the camera has; None: it is not.
+
+    That noise is one series in each frame, and ends at waves of two frames' length; a read-out goes
+    on from frame to frame. Its variance is shared by ln(N / 2) + 0.58 natural intervals of
+    frequency, of N pixels; each further one has as much, and between two frames' length and all n
+    frames, with the trend that is left below, lie about ln(n / 2) + 1/3. Where these make half of
+    the drift, frames may not move by themselves.
+    """
+    pink = [e.sigma_dn for e in state.camera.effect if isinstance(e, PinkNoise)]
+    if not isinstance(effect, BlackLevelDrift) or not pink or not effect.sigma_dn:
+        return None
+    layout = state.setting.layout
+    frames = max(len(e.numbers) for e in layout.uniform)
+    within = log(layout.rows * layout.columns / 2) + np.euler_gamma
+    made = max(pink) ** 2 / within * max(log(frames / 2) + 1 / 3, 0.0)
+    if made < _MOST * effect.sigma_dn**2:
+        return None
+    why = "1/f noise that goes on from frame to frame moves their means by as much"
+    return Denial(max(1 - made / effect.sigma_dn**2, 0.0), why)

@@ -4,6 +4,7 @@ A lamp that is left alone while the exposure time is changed is the usual way to
 levels (EMVA 1288, release 4.0, section 6). Where nobody wrote down the light, levels tell it.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -34,61 +35,72 @@ def with_steady_light(recording: Recording, source: Source) -> Recording:
     that is set anew for each flat scatters more. Flats of the longest times may be darker: they
     are full. Else the recording itself.
     """
-    flats = recording.of_kind("flat")
-    times = np.array([e.exposure_time_s for e in flats])
-    few = len(set(times.tolist())) < _LEAST or times.min() <= 0
-    if few or times.max() < _TIMES * times.min() or any(e.light is not None for e in flats):
+    flats, darks = recording.of_kind("flat"), recording.of_kind("dark")
+    times = _times(flats)
+    few = len(set(times.tolist())) < _LEAST or times.max() < _TIMES * times.min()
+    if few or times.min() <= 0 or not darks or any(e.light is not None for e in flats):
         return recording
-    darks = [_levels(recording, source, e) for e in recording.of_kind("dark")]
-    if not darks:
+    level, error, clipped = _levels(recording, source, flats)
+    black, unsure, _ = _levels(recording, source, darks)
+    darkest = int(level.sum(0).argmin())  # colour of a mosaic: it is full last
+    order = np.argsort(_times(darks), kind="stable")
+    beneath, doubt = (
+        np.interp(times, _times(darks)[order], own[order, darkest]) for own in (black, unsure)
+    )
+    whole = clipped[:, darkest] <= CLIPPED_SHARE
+    signal, errors = level[:, darkest] - beneath, np.hypot(error[:, darkest], doubt)
+    if not _steady(times[whole], signal[whole], errors[whole]):
         return recording
-    order = np.argsort([e.exposure_time_s for e in recording.of_kind("dark")], kind="stable")
-    at = np.array([e.exposure_time_s for e in recording.of_kind("dark")])[order]
-    levels = [_levels(recording, source, e) for e in flats]
-    # Of a mosaic the darkest colour is full last.
-    of = int(np.argmin([sum(means[c] for means, _, _ in levels) for c in range(len(levels[0][0]))]))
-    black, unsure = (np.array([darks[i][k][of] for i in order]) for k in (0, 1))
-    signal = np.array([m[of] for m, _, _ in levels]) - np.interp(times, at, black)
-    error = np.hypot([e[of] for _, e, _ in levels], np.interp(times, at, unsure))
-    clipped = np.array([share[of] > CLIPPED_SHARE for _, _, share in levels])
-    if _steady(times[~clipped], signal[~clipped], error[~clipped]):
-        lit = {e.name: e.exposure_time_s for e in flats}
-        return replace(
-            recording,
-            exposures=tuple(
-                replace(e, light=lit[e.name]) if e.name in lit else e for e in recording.exposures
-            ),
-        )
-    return recording
+    lit = [replace(e, light=e.exposure_time_s) if e.kind == "flat" else e
+           for e in recording.exposures]  # fmt: skip
+    return replace(recording, exposures=tuple(lit))
 
 
 def _steady(times: Array, signal: Array, error: Array) -> bool:
     """Return whether signals above black, with errors, are those of one light: (flat,) each."""
     if times.size < _LEAST or signal.min() <= 0:
         return False
-    ratio = signal / times
-    near = np.abs(ratio / np.median(ratio) - 1) < _NEAR
-    full = (times > times[near].max(initial=0.0)) & (ratio < np.median(ratio))
+    ratio = signal / times / np.median(signal / times)
+    near = np.abs(ratio - 1) < _NEAR
+    full = (times > times[near].max(initial=0.0)) & (ratio < 1)
     if not (near | full).all() or len(set(times[near].tolist())) < _LEAST:
         return False
-    ratio, x = ratio[near] / np.median(ratio), signal[near] / signal[near].max()
     wide = np.hypot(_SCATTER, error[near] / signal[near])
-    bends = np.vander(x, 1 + min(_BENT, ratio.size - 3)) / wide[:, np.newaxis]
-    rest = ratio / wide - bends @ np.linalg.lstsq(bends, ratio / wide, rcond=None)[0]
-    return bool(chi2.sf(rest @ rest, ratio.size - bends.shape[1]) > _CHANCE)
+    degree = min(_BENT, int(near.sum()) - 3)
+    bends = np.vander(signal[near] / signal[near].max(), 1 + degree) / wide[:, np.newaxis]
+    values = ratio[near] / wide
+    rest = values - bends @ np.linalg.lstsq(bends, values, rcond=None)[0]
+    return bool(chi2.sf(rest @ rest, values.size - bends.shape[1]) > _CHANCE)
+
+
+def _times(exposures: Sequence[RecordedExposure]) -> Array:
+    return np.array([e.exposure_time_s for e in exposures])
 
 
 def _levels(
-    recording: Recording, source: Source, exposure: RecordedExposure
+    recording: Recording, source: Source, exposures: Sequence[RecordedExposure]
 ) -> tuple[Array, Array, Array]:
-    """Return level, its error by the frames' scatter, and the share that is clipped, by channel."""
-    sensor, numbers = recording.sensor, range(min(len(exposure.frames), _READ))
+    """Return levels, their errors by the frames' scatter, and shares that are clipped.
+
+    (exposure, channel) each.
+    """
+    sensor = recording.sensor
     step = 1 if sensor.cfa is Cfa.MONO else 2
-    means, clipped = [], []
-    for frame in source.frames(exposure.name, numbers):
-        planes = [frame[y::step, x::step] for y, x in sites(sensor.cfa).values()]
-        means.append([float(plane.mean()) for plane in planes])
-        clipped.append([float((plane >= sensor.white_level).mean()) for plane in planes])
-    own = np.array(means)
-    error = own.std(0, ddof=1) if len(own) > 1 else np.full(own.shape[1], np.inf)
-    return own.mean(0), error / len(own) ** 0.5, np.array(clipped).mean(0)
+    found = []
+    for exposure in exposures:
+        numbers = range(min(len(exposure.frames), _READ))
+        own = np.array(
+            [
+                [(plane.mean(), (plane >= sensor.white_level).mean()) for plane in planes]
+                for frame in source.frames(exposure.name, numbers)
+                for planes in [[frame[y::step, x::step] for y, x in sites(sensor.cfa).values()]]
+            ]
+        )  # (frame, channel, number)
+        means = own[..., 0]
+        many = len(means) > 1
+        error = (
+            means.std(0, ddof=1) / len(means) ** 0.5 if many else np.full(means.shape[1], np.inf)
+        )
+        found.append((means.mean(0), error, own[..., 1].mean(0)))
+    level, error, clipped = (np.stack(parts) for parts in zip(*found, strict=True))
+    return level, error, clipped

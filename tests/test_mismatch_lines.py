@@ -7,7 +7,13 @@ import scipy.stats
 from numpy.typing import NDArray
 
 from analysis.mismatch.bank.coherent import SpectrumSums
-from analysis.mismatch.bank.lines import log_chance, separate, without_lines
+from analysis.mismatch.bank.lines import (
+    clearest_bin,
+    log_chance,
+    of_colour,
+    separate,
+    without_lines,
+)
 from analysis.mismatch.bank.scalars import score_of_log
 from analysis.mismatch.instance import same_line
 from dsis.cfa import Cfa
@@ -122,3 +128,29 @@ def test_a_smooth_spectrum_stays_as_it_is() -> None:
     assert np.mean(kept == power) > 0.999
     power[12, 9] *= 8
     assert without_lines(power, FRAMES)[12, 9] < 0.3 * power[12, 9]
+
+
+def test_a_line_in_coloured_noise_is_seen_and_colour_is_none() -> None:
+    """Powers of 60 frames, by 1 / f and by a Lorentzian; a line twice as large as what is around it."""
+    rng = np.random.default_rng(4)
+    bins = np.arange(1, 108)
+    for shape in (1 / bins, 1 / (1 + (bins / 20) ** 2), np.ones(107)):
+        scores, seen = [], []
+        for _ in range(60):
+            power = (0.3 + shape) * rng.gamma(60, 1 / 60, 107)
+            scores.append(of_colour(power, 60.0)[0])
+            power[70] *= 3
+            seen.append(of_colour(power, 60.0)[0])
+            assert clearest_bin(power, 60.0) == 70
+        assert np.mean(scores) < 0.6
+        assert np.std(scores) < 1.3
+        assert max(scores) < 4
+        assert min(seen) > 2
+        assert np.median(seen) > 4
+
+
+def test_the_largest_is_clearest_where_none_stands_out() -> None:
+    power = 1 / np.arange(1.0, 60.0)
+    assert clearest_bin(power, 40.0) == 0
+    assert clearest_bin(np.ones(5), 40.0) == 0  # too few to have neighbours
+    assert not np.isfinite(of_colour(np.ones(5), 40.0)[0])

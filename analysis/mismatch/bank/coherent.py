@@ -10,7 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import gammaincinv
 
-from analysis.mismatch.bank.lines import log_chance, separate, without_lines
+from analysis.mismatch.bank.lines import (
+    clearest_bin,
+    log_chance,
+    of_colour,
+    separate,
+    without_lines,
+)
 from analysis.mismatch.bank.rowlags import row_lags
 from analysis.mismatch.bank.scalars import UNKNOWN, Number, ratio_root, score_of_log
 from dsis.measures import Channel
@@ -117,6 +123,7 @@ class SpectrumSums:
             found["spectral_peak"] = _largest(inner, degrees, edge)
             found |= self._further(degrees)
             found["column_spectrum_peak"] = _largest(_line(self.columns), degrees)
+            found["column_spectrum_peak of colour"] = of_colour(_line(self.columns)[0], degrees)
             found |= self._lags()
             found |= self._corners(degrees)
         for key, label in (("", "row_spectrum_peak"), ("signal", "row_spectrum_peak of light")):
@@ -192,7 +199,7 @@ class SpectrumSums:
         if not total or m < 4:
             return None
         inner = _line(self.columns)[0] / total
-        place = int(inner.argmax())
+        place = clearest_bin(inner, self.degrees(""))
         across = place + 1 + _within_bin(inner, place)
         return Peak(frequency(across, m), 0.0, float(inner[place]))
 

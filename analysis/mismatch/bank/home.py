@@ -73,6 +73,7 @@ _POOLED = frozenset(
         ("spectral_peak", "all", ""),
         ("row_spectrum_peak", "all", ""),
         ("row_spectrum_peak", "all", "light"),
+        ("column_spectrum_peak", "all", "colour"),
         ("column_spectrum_peak", "all", ""),
         ("slow_row_variance", "all", ""),
         ("row_correlation", "all", "lag 1"),

@@ -8,7 +8,10 @@ from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import betainc, gammaincc, gammainccinv, gammaincinv, gammaln
+from scipy.special import betainc, gammaincc, gammainccinv, gammaincinv, gammaln, polygamma
+from scipy.stats import norm
+
+from analysis.mismatch.bank.scalars import UNKNOWN, Number, score_of_log
 
 Array = NDArray[np.float64]
 _AROUND = 9  # bins along each axis whose median says what is around
@@ -16,6 +19,8 @@ _LOOKED_AT = 1024  # highest bins: lines are among them
 _ALONE = -40.0  # ln of a chance, of which two bins in a spectrum are none
 _HELD = 1e-290  # chances that a float holds
 _ALMOST = 1 - 1e-12  # of a chance: its logarithm is finite
+_SURE = -7.0  # logarithm of a chance, 1 in 1000: below, a bin stands out of those near it
+_NEAR = range(2, 7)  # bins on either side that say what is around: a line leaks into the next
 _CHANCE = 0.01  # that any bin of a spectrum without lines is taken for one
 
 
@@ -89,6 +94,51 @@ def log_chance(power: float, rank: int, bins: int, degrees: float) -> float:
         return float(np.log(betainc(rank, bins - rank + 1, np.exp(single))))
     # The first term of the binomial sum: the next is as rare as one bin more.
     return float(rank * single + gammaln(bins + 1) - gammaln(rank + 1) - gammaln(bins - rank + 1))
+
+
+def beside_others(power: Array, degrees: float) -> Array:
+    """Return by how much each bin of a line's spectrum stands out of those near it: (bin,).
+
+    In standard deviations of the logarithm of Gamma(degrees), beside the mean of the logarithms of
+    `_NEAR` bins on either side: so a line is seen in noise of any smooth spectrum. Minus infinity
+    at both ends, whose neighbours lie on one side. Power that falls as a power of the frequency is
+    convex, and feigns no line.
+
+    Parameters
+    ----------
+    power
+        Of successive bins, (bin,), of any unit.
+    degrees
+        Independent frames in it.
+    """
+    found = np.full(power.size, -np.inf)
+    ends = _NEAR[-1]
+    if power.size <= 2 * ends or not power.min() > 0:
+        return found
+    logs = np.log(power)
+    own = np.arange(ends, power.size - ends)
+    beside = [logs[own + sign * k] for k in _NEAR for sign in (-1, 1)]
+    spread = np.sqrt(float(polygamma(1, degrees)) * (1 + 1 / len(beside)))
+    found[own] = (logs[own] - np.mean(beside, 0)) / spread
+    return found
+
+
+def chance_beside(standing_out: Array) -> float:
+    """Return the logarithm of the chance of the largest of such deviations in noise."""
+    known = standing_out[np.isfinite(standing_out)]
+    return any_of(float(norm.logsf(known.max())), known.size) if known.size else 0.0
+
+
+def of_colour(power: Array, degrees: float) -> Number:
+    """Return the normal score of the bin that stands out most of those near it."""
+    chance = chance_beside(beside_others(power, max(degrees, 1.0)))
+    return (score_of_log(chance), 1.0) if chance < 0 else UNKNOWN
+
+
+def clearest_bin(power: Array, degrees: float) -> int:
+    """Return the bin that stands out of those near it, if one does for sure; else the largest."""
+    beside = beside_others(power, max(degrees, 1.0))
+    return int((beside if chance_beside(beside) < _SURE else power).argmax())
 
 
 def any_of(log_least: float, count: int) -> float:

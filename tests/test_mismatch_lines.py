@@ -131,7 +131,7 @@ def test_a_smooth_spectrum_stays_as_it_is() -> None:
 
 
 def test_a_line_in_coloured_noise_is_seen_and_colour_is_none() -> None:
-    """Powers of 60 frames, by 1 / f and by a Lorentzian; a line twice as large as what is around it."""
+    """Powers of 60 frames, by 1 / f and a Lorentzian; a line twice as large as what is there."""
     rng = np.random.default_rng(4)
     bins = np.arange(1, 108)
     for shape in (1 / bins, 1 / (1 + (bins / 20) ** 2), np.ones(107)):

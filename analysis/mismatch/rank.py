@@ -53,7 +53,8 @@ _BY_DRAW = frozenset(
 )
 _BY_BIN = frozenset({"periodic_noise"})  # of few frames: the noise of one bin comes on top
 # That greens differ is seen; what amplifiers of even and odd rows make of red and blue is not.
-_SAYS_LESS = {"channel_imbalance": "tap_mismatch"}
+# Memory of a sample is that of a residue whose steps lie beyond the noise.
+_SAYS_LESS = {"channel_imbalance": "tap_mismatch", "readout_memory": "adc_memory"}
 _TWINS = {"tap_mismatch": "channel_imbalance", "readout_memory": "crosstalk",
           "heavy_tailed_read_noise": "read_noise_spread",
           "read_noise_spread": "heavy_tailed_read_noise"}  # fmt: skip

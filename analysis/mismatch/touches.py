@@ -34,7 +34,7 @@ _FOLLOWS = {
     "one_off_outliers": frozenset({"variance_spread", "kurtosis"}),
     "variance_persistence": frozenset({"variance_spread"}),
     "noisy_pixels": frozenset({"variance_spread"}),
-    "smooth_variance_spread": frozenset({"variance_spread"}),
+    "smooth_variance_spread": frozenset({"fixed_smooth_variance"}),  # where light falls off
     "outlying_pixels": frozenset({"fixed_pixel_variance"}),
     "line_correlation": _CORRELATIONS | _LINES,
     "carry_over": _CORRELATIONS,

@@ -157,11 +157,10 @@ def without_lines(powers: Sequence[Powers], size: Size) -> list[Powers]:
         if beyond.max() < norm.isf(_CHANCE / bands):
             break
         lines[int(beyond.argmax())] = True
-    cut = np.where(lines, np.exp((level - seen) / 2), 1.0)
-    products = cut[:, np.newaxis, np.newaxis] * np.ones((SLOW, SLOW))
-    products[:, 1:, 1:] = 1.0  # what rows have in common is the first
-    products[:, 0, 0] = cut**2
-    return [replace(own, slow=own.slow * products) for own in powers] if lines.any() else [*powers]
+    cut = np.ones((bands, SLOW))
+    cut[lines, 0] = np.exp((level - seen) / 2)[lines]  # what rows have in common is the first
+    products = cut[:, :, np.newaxis] * cut[:, np.newaxis]
+    return [replace(own, slow=own.slow * products) for own in powers]
 
 
 def powers_of(

@@ -118,7 +118,7 @@ def beside_others(power: Array, degrees: float) -> Array:
     logs = np.log(power)
     own = np.arange(ends, power.size - ends)
     beside = [logs[own + sign * k] for k in _NEAR for sign in (-1, 1)]
-    spread = np.sqrt(float(polygamma(1, degrees)) * (1 + 1 / len(beside)))
+    spread = np.sqrt(float(polygamma(1, max(degrees, 1.0))) * (1 + 1 / len(beside)))
     found[own] = (logs[own] - np.mean(beside, 0)) / spread
     return found
 
@@ -131,13 +131,13 @@ def chance_beside(standing_out: Array) -> float:
 
 def of_colour(power: Array, degrees: float) -> Number:
     """Return the normal score of the bin that stands out most of those near it."""
-    chance = chance_beside(beside_others(power, max(degrees, 1.0)))
+    chance = chance_beside(beside_others(power, degrees))
     return (score_of_log(chance), 1.0) if chance < 0 else UNKNOWN
 
 
 def clearest_bin(power: Array, degrees: float) -> int:
     """Return the bin that stands out of those near it, if one does for sure; else the largest."""
-    beside = beside_others(power, max(degrees, 1.0))
+    beside = beside_others(power, degrees)
     return int((beside if chance_beside(beside) < _SURE else power).argmax())
 
 

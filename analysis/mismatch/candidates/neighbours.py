@@ -61,9 +61,13 @@ def _brighter_fatter(clues: Clues) -> Sequence[Proposal]:
             found += proposals("brighter_fatter", ["per_dn"], per_dn=rate)
     if across + down > 0 and abs(across - down) > _TOLD * np.hypot(error, other):
         apart = float(np.clip((across - down) / (across + down), -0.95, 0.95))
-        names = ["per_dn", "anisotropy"]
-        start = dict(zip(names, ((across + down) / 2, apart), strict=True))
-        found += proposals("brighter_fatter", names, names[1:], **start)
+        found += proposals(
+            "brighter_fatter",
+            ["per_dn", "anisotropy"],
+            ["anisotropy"],
+            per_dn=(across + down) / 2,
+            anisotropy=apart,
+        )
     return found
 
 

@@ -3,8 +3,12 @@
 Measured without dsis's own measures; tolerances are five standard errors.
 """
 
+from typing import Any
+
 import numpy as np
 import pytest
+import scipy.signal
+from pydantic import ValidationError
 
 from dsis.cfa import Cfa
 from dsis.draw import Draw
@@ -96,6 +100,49 @@ def test_spatial_filtering_couples_sites_of_one_colour(cfa: Cfa) -> None:
         assert abs(correlation(made, dy, dx) - expected) < Z_MAX * CORRELATION_ERROR
     if step == 2:
         assert abs(correlation(made, 0, 1)) < Z_MAX * CORRELATION_ERROR
+
+
+@pytest.mark.parametrize("cfa", [Cfa.RGGB, Cfa.MONO])
+@pytest.mark.parametrize(("along", "apart"), [("rows", (0, 1)), ("columns", (1, 0))])
+def test_spatial_filtering_may_smooth_along_one_axis(
+    cfa: Cfa, along: str, apart: tuple[int, int]
+) -> None:
+    step = 1 if cfa is Cfa.MONO else 2
+    one = effect("spatial_filtering", fraction=0.06, along=along)
+    made = apply(one, white(mean=500), grid=PixelGrid(SIDE, SIDE, cfa))
+    own = 1 - 2 * 0.06
+    expected = 2 * own * 0.06 / (own**2 + 2 * 0.06**2)
+    for lag in ((0, 1), (1, 0)):
+        rho = expected if lag == apart else 0.0
+        assert abs(correlation(made, *(step * k for k in lag)) - rho) < Z_MAX * CORRELATION_ERROR
+    assert made.mean() == pytest.approx(white(mean=500).mean(), abs=1e-4)
+
+
+def test_spatial_filtering_with_its_diagonals_is_a_box() -> None:
+    point = np.zeros((9, 9))
+    point[4, 4] = 1000.0
+    box = np.zeros((9, 9))
+    box[3:6, 3:6] = 20.0
+    box[4, 4] = 840.0
+    made = apply(effect("spatial_filtering", fraction=0.02, diagonal=1.0), point)
+    np.testing.assert_allclose(made, box, atol=1e-3)
+    kernel = scipy.signal.correlate2d(box[3:6, 3:6], box[3:6, 3:6]) / 1000**2
+    made = apply(effect("spatial_filtering", fraction=0.02, diagonal=1.0), white(mean=500))
+    for lag in ((0, 1), (1, 1), (2, 0)):
+        rho = kernel[2 + lag[0], 2 + lag[1]] / kernel[2, 2]
+        assert abs(correlation(made, *lag) - rho) < Z_MAX * CORRELATION_ERROR
+
+
+@pytest.mark.parametrize(
+    ("parameters", "said"),
+    [
+        ({"fraction": 0.02, "along": "rows", "diagonal": 0.5}, "needs along = 'both', not 'rows'"),
+        ({"fraction": 0.15, "diagonal": 0.5}, "makes a pixel give away 0.9, above 0.8"),
+    ],
+)
+def test_kernels_of_spatial_filtering_that_are_none(parameters: dict[str, Any], said: str) -> None:
+    with pytest.raises(ValidationError, match=said):
+        effect("spatial_filtering", **parameters)
 
 
 @pytest.mark.parametrize(("along", "lag"), [("rows", (0, 4)), ("columns", (4, 0))])

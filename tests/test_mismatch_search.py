@@ -15,9 +15,10 @@ from analysis.mismatch.judge import Judge
 from analysis.mismatch.memory import _near
 from analysis.mismatch.name import Search
 from analysis.mismatch.named import Named
-from analysis.mismatch.rank import Ranked, alike, ties
+from analysis.mismatch.rank import Ranked, alike
 from analysis.mismatch.recalibrate import _moved
 from analysis.mismatch.resolved import explains
+from analysis.mismatch.ties import ties
 from dsis.effects import registry
 from mismatch_recordings import camera
 

@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from analysis.mismatch import rank
+from analysis.mismatch import ties
 from analysis.mismatch.memory import Memory
-from analysis.mismatch.rank import Ranked, bends_as_well, twin
+from analysis.mismatch.rank import Ranked
 from analysis.mismatch.segments import Path
+from analysis.mismatch.ties import bends_as_well, twin
 
 MEMORY = (5.0, 0.0)  # changes of two numbers, in standard deviations
 
@@ -40,9 +41,10 @@ def test_memory_is_not_told_from_exchange_that_explains_as_much(
 ) -> None:
     state = _state()
     other = _ranked("crosstalk", gain, mean)
-    monkeypatch.setattr(rank, "ranked", lambda *_: [other])
+    monkeypatch.setattr(ties, "ranked", lambda *_: [other])
     best = _ranked("readout_memory", 37.0, MEMORY)
-    assert twin(state, best, {"crosstalk"}, Memory(), lambda: None) is None  # a rival anyway
+    rivals = {"crosstalk", "spatial_filtering"}  # anyway
+    assert twin(state, best, rivals, Memory(), lambda: None) is None
     found = twin(state, best, {"readout_memory"}, Memory(), lambda: None)
     assert found is (None if told else other)
 

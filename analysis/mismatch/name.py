@@ -25,17 +25,14 @@ from analysis.mismatch.rank import (
     SURE_GAIN,
     TOLD_APART,
     Ranked,
-    bends_as_well,
-    plainest,
     ranked,
     replicates_for,
-    ties,
-    twin,
 )
 from analysis.mismatch.resolved import calls_alone, differ, explains, gained, opened
 from analysis.mismatch.rowtold import as_shown, unlike_frames
 from analysis.mismatch.segments import Path, second_path, spiky
 from analysis.mismatch.state import State
+from analysis.mismatch.ties import bends_as_well, plainest, ties, twin
 from dsis.camera import Camera
 from dsis.effects import Effect
 

@@ -23,6 +23,7 @@ SHAPES = frozenset(
         "exponent",
         "seam",
         "anisotropy",
+        "diagonal",
         "extent",
     }
 )

@@ -1,6 +1,6 @@
 """Effects that could explain what is off, each with fitted parameters, the best first."""
 
-from collections.abc import Callable, Container, Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from math import log
@@ -13,16 +13,12 @@ from analysis.mismatch.credited import joined, together
 from analysis.mismatch.instance import (
     LINES,
     Frequency,
-    frequency_of,
     instance,
-    same_line,
     same_place,
 )
 from analysis.mismatch.memory import Memory, words
 from analysis.mismatch.model import side_by_side
 from analysis.mismatch.polish import Polished, needed, polish, stepped, with_effects
-from analysis.mismatch.segments import Path
-from analysis.mismatch.smooth import smooth_as_well
 from analysis.mismatch.state import Setting, State
 from dsis.effects import Effect
 
@@ -52,12 +48,6 @@ _BY_DRAW = frozenset(
     {"bistable_pattern", "hot_pixels", "line_flicker", "pink_noise", "row_banding", "smooth_prnu"}
 )
 _BY_BIN = frozenset({"periodic_noise"})  # of few frames: the noise of one bin comes on top
-# That greens differ is seen; what amplifiers of even and odd rows make of red and blue is not.
-# Memory of a sample is that of a residue whose steps lie beyond the noise.
-_SAYS_LESS = {"channel_imbalance": "tap_mismatch", "readout_memory": "adc_memory"}
-_TWINS = {"tap_mismatch": "channel_imbalance", "readout_memory": "crosstalk",
-          "heavy_tailed_read_noise": "read_noise_spread",
-          "read_noise_spread": "heavy_tailed_read_noise"}  # fmt: skip
 _FAR_OFF, _LITTLE = 8.0, 0.3  # departures, and the share of one that is little
 _STRONG = 30.0  # gain of log-likelihood beside which what gained little before needs no new trial
 _WORTH_IT = 0.3  # share of it
@@ -333,68 +323,3 @@ def alike(state: State, one: Array, other: Array) -> bool:
     )
     size = float(np.linalg.norm(a) * np.linalg.norm(b))
     return size > 0 and float(a @ b) / size > _COSINE
-
-
-def plainest(state: State, fitted: Sequence[Ranked]) -> list[Ranked]:
-    """Return ranked effects, before the best what says less and explains the same as well.
-
-    In a mosaic whose light is of unknown colour amplifiers of even and odd rows show in nothing
-    but the greens: that the greens differ holds whatever the cause; it is its alternative.
-    """
-    said = next((one for one in fitted[1:] if _SAYS_LESS.get(one.kind) == fitted[0].kind), None)
-    if said is None or not ties(state, fitted[0], said):
-        return list(fitted)
-    first = replace(said, gain=fitted[0].gain)
-    return [first, *(one for one in fitted if one is not said)]
-
-
-def ties(state: State, best: Ranked, other: Ranked) -> bool:
-    """Return whether another effect explains the same numbers nearly as well as the best.
-
-    What is seen in them, and no more, ties with nothing that says the same and more.
-    """
-    near = other.gain > best.gain - TOLD_APART and other.kind != best.kind
-    near |= smooth_as_well(state, best.mean, best.kind, other.kind)
-    if not near or _SAYS_LESS.get(best.kind) == other.kind or _other_line(state, best, other):
-        return False
-    return alike(state, best.polished.mean, other.polished.mean)
-
-
-def bends_as_well(state: State, best: Ranked, path: Path | None) -> Path | None:
-    """Return the second read-out path if neither it nor the best is told from the other."""
-    if path is None or abs(path.gain - best.gain) >= TOLD_APART:
-        return None
-    return path if alike(state, best.mean, path.mean) else None
-
-
-def twin(
-    state: State, best: Ranked, vocabulary: Container[str], memory: Memory, step: Callable[[], None]
-) -> Ranked | None:
-    """Return the effect that the best cannot be told from, though it must not be named itself.
-
-    Amplifiers of even and odd rows do nearly what greens that differ do to a mosaic whose light
-    is of unknown colour: only the noise of each channel tells. Correlations have no side: memory of
-    the sample before may be charge that neighbours exchange. Noise that differs from pixel to pixel
-    has heavy tails in all of them together. Where that explains more, and also what the best leaves
-    alone, so much the more.
-    """
-    other = _TWINS.get(best.kind)
-    if other is None or other in vocabulary:
-        return None
-    return next(
-        (
-            one
-            for one in ranked(state, [other], memory, step)
-            if ties(state, best, one) or one.gain > best.gain + TOLD_APART
-        ),
-        None,
-    )
-
-
-def _other_line(state: State, best: Ranked, other: Ranked) -> bool:
-    """Return whether two effects are lines of different frequencies: a sensor may have both."""
-    one, two = (frequency_of(ranked.proposal.effect) for ranked in (best, other))
-    if one is None or two is None:
-        return False
-    layout = state.setting.layout
-    return not same_line(one, two, layout.rows, layout.columns)

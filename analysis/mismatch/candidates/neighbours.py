@@ -10,6 +10,7 @@ from analysis.mismatch.candidates.candidate import Candidate, Proposal, proposal
 from analysis.mismatch.clues import Clues, alike
 
 _ALONG_ROWS, _ALONG_COLUMNS = "correlation_0_1", "correlation_1_0"
+_DIAGONAL = "correlation_1_1"
 _SEEN_STEPS = 100.0  # of chi-squared: ten standard deviations
 _AS_LIKELY = 4.6  # of chi-squared, odds of 10: of few levels, periods may be alike
 _TOLD = 2.0  # standard errors from which levels show an exchange
@@ -97,12 +98,25 @@ def _exchanged(clues: Clues) -> float:
 
 
 def _filtering(clues: Clues) -> Sequence[Proposal]:
+    """Propose a kernel of four neighbours, of two where axes differ, and with the diagonals."""
     mono = clues.layout.channels == ("MONO",)
     names = (_ALONG_ROWS, _ALONG_COLUMNS) if mono else ("correlation_0_2", "correlation_2_0")
-    rho = float(np.mean([clues.amplitude(name, alike)[0] for name in names]))
-    if rho <= 0:
-        return []
-    return proposals("spatial_filtering", ["fraction"], fraction=min(rho / 2, 0.15))
+    (across, error), (down, other) = (clues.amplitude(name, alike) for name in names)
+    near = (across + down) / 4
+    found: list[Proposal] = []
+    if near > 0:
+        found += proposals("spatial_filtering", ["fraction"], fraction=min(near, 0.15))
+    if abs(across - down) > _TOLD * np.hypot(error, other):
+        along, more = ("rows", across) if across > down else ("columns", down)
+        share = min(more / 2, 0.15)
+        found += proposals("spatial_filtering", ["fraction"], fraction=share, along=along)
+    askew, error = clues.amplitude(_DIAGONAL, alike) if mono else (0.0, np.inf)
+    if near > 0 and askew > _TOLD * error:
+        share = min(askew / (across + down), 1.0)
+        free = ["fraction", "diagonal"]
+        own = {"fraction": min(near, 0.1), "diagonal": share}
+        found += proposals("spatial_filtering", free, **own)
+    return found
 
 
 def _memory(clues: Clues) -> Sequence[Proposal]:

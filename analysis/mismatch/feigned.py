@@ -16,6 +16,8 @@ from analysis.mismatch.contradicted import Denial, rival
 from analysis.mismatch.displaced import displaced
 from analysis.mismatch.edged import STATISTIC, edged, single
 from analysis.mismatch.feignedtails import coded, lopsided
+from analysis.mismatch.grown import grown
+from analysis.mismatch.inpatches import in_patches
 from analysis.mismatch.jumped import jumped
 from analysis.mismatch.nofield import no_field
 from analysis.mismatch.persisting import persisting
@@ -54,8 +56,10 @@ def of_another(state: State, effect: Effect, without: Array) -> Denial | None:
     return (
         feigned(state, kind, without)
         or outlying(state, kind)
+        or in_patches(state, kind)
         or coloured(state, kind)
         or stepped(state, kind)
+        or grown(state, kind, without)
         or edged(state, kind)
         or single(state, effect)
         or rivalled(state, effect)

@@ -4,6 +4,7 @@ Dust throws shadows: few, round, and nothing between. A normal field has its pow
 are smooth, so that what neighbours have in common does not tell them apart; their likelihoods do.
 """
 
+from collections.abc import Iterator
 from math import log
 
 import numpy as np
@@ -71,11 +72,17 @@ def of_field(image: Array, length: float) -> float:
 
 
 def of_patches(image: Array) -> float:
-    """Return what round patches gain over white noise, nats: the best one after the other.
+    """Return what round patches gain over white noise, nats: see `patches_of`."""
+    return sum((gained for gained, _ in patches_of(image)), 0.0)
 
-    Each pays for where it lies, of all places that patches of its size have, and for its depth.
+
+def patches_of(image: Array) -> Iterator[tuple[float, Array]]:
+    """Yield what each round patch gains over white noise, nats, and the patch: (row, column).
+
+    The best one after the other. Each pays for where it lies, of all places that patches of its
+    size have, and for its depth.
     """
-    white, rest, gained = white_of(image), image - image.mean(), 0.0
+    white, rest = white_of(image), image - image.mean()
     shapes = [_patch(image.shape, radius) for radius in _RADII]
     waves = [np.conj(fft.rfft2(one)) for one in shapes]
     prices = [log(2 * len(_RADII) * max(image.size / r**2, 1.0)) + _LEAST for r in _RADII]
@@ -85,11 +92,19 @@ def of_patches(image: Array) -> float:
         tops = [float((one**2).max()) / (2 * white) for one in along]
         best = int(np.argmax(np.subtract(tops, prices)))
         if tops[best] <= prices[best]:
-            break
-        gained += tops[best] - prices[best]
+            return
         y, x = np.unravel_index(int((along[best] ** 2).argmax()), image.shape)
-        rest = rest - along[best][y, x] * np.roll(shapes[best], (y, x), (0, 1))
-    return gained
+        patch = along[best][y, x] * np.roll(shapes[best], (y, x), (0, 1))
+        yield tops[best] - prices[best], patch
+        rest = rest - patch
+
+
+def in_squares(image: Array) -> tuple[Array, int]:
+    """Return an image in means over squares, if it is large, and their side in pixels."""
+    side = max(min(image.shape) // _MOST_LINES, 1)
+    rows, columns = image.shape[0] // side, image.shape[1] // side
+    squares = image[: rows * side, : columns * side].reshape(rows, side, columns, side)
+    return squares.mean((1, 3)), side
 
 
 def _plane(state: State) -> tuple[Array, int] | None:
@@ -110,11 +125,8 @@ def _plane(state: State) -> tuple[Array, int] | None:
         beyond = scale * image - had(clues, channel).reshape(image.shape)
         total += weight * beyond[:rows, :columns]
         weights += weight
-    plane, side = total / weights, max(min(rows, columns) // _MOST_LINES, 1)
-    rows, columns = rows // side, columns // side
-    squares = plane[: rows * side, : columns * side].reshape(rows, side, columns, side)
-    plane = squares.mean((1, 3))
-    smooth = Smooth.of(rows, columns)
+    plane, side = in_squares(total / weights)
+    smooth = Smooth.of(*plane.shape)
     found = smooth.coefficients(plane)
     order = np.arange(len(found))[:, np.newaxis] + np.arange(len(found))
     step = 1 if len(images) == 1 else 2

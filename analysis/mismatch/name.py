@@ -32,7 +32,7 @@ from analysis.mismatch.resolved import calls_alone, differ, explains, gained, op
 from analysis.mismatch.rowtold import as_shown, unlike_frames
 from analysis.mismatch.segments import Path, second_path, spiky
 from analysis.mismatch.state import State
-from analysis.mismatch.ties import bends_as_well, plainest, ties, twin
+from analysis.mismatch.ties import bends_as_well, by_numbers, plainest, ties, twin
 from dsis.camera import Camera
 from dsis.effects import Effect
 
@@ -304,6 +304,8 @@ class Search(Fitted):
             rival = rival or twin(state, fitted[0], self.vocabulary, self.memory, self.step)
             if rival is None:
                 return fitted
+            if (told := by_numbers(state, self.camera.noise, fitted, rival)) is not None:
+                return told
             self.ties.append((fitted[0], rival))
             self.tied |= {fitted[0].kind: rival, rival.kind: fitted[0]}
 

@@ -3,12 +3,14 @@
 from collections.abc import Callable, Container, Sequence
 from dataclasses import replace
 
+from analysis.mismatch.basenumbers import hold_with
 from analysis.mismatch.instance import frequency_of, same_line
 from analysis.mismatch.memory import Memory
 from analysis.mismatch.rank import TOLD_APART, Ranked, alike, ranked
 from analysis.mismatch.segments import Path
 from analysis.mismatch.smooth import smooth_as_well
 from analysis.mismatch.state import State
+from dsis.camera import BaseNoise
 
 # That greens differ is seen; what amplifiers of even and odd rows make of red and blue is not.
 # Memory of a sample is that of a residue whose steps lie beyond the noise.
@@ -76,6 +78,21 @@ def twin(
         ),
         None,
     )
+
+
+def by_numbers(
+    state: State, users: BaseNoise, fitted: Sequence[Ranked], rival: Ranked | Path
+) -> list[Ranked] | None:
+    """Return effects, first that of two that tie with which the user's numbers hold; None: none."""
+    if not isinstance(rival, Ranked):
+        return None
+    best, *others = fitted
+    if hold_with(state, users, best, rival):
+        return list(fitted)
+    behind = [one for one in others if one is not rival]
+    if len(behind) < len(others) and hold_with(state, users, rival, best):
+        return [replace(rival, gain=best.gain), best, *behind]
+    return None
 
 
 def _other_line(state: State, best: Ranked, other: Ranked) -> bool:

@@ -29,7 +29,7 @@ class SpatialFiltering(Effect):
     kind: Literal["spatial_filtering"] = "spatial_filtering"
     fraction: Annotated[float, Field(ge=0, le=0.2, examples=[0.02])]
     along: Annotated[Literal["both", "rows", "columns"], Field(exclude_if=_BOTH.__eq__)] = _BOTH
-    diagonal: Annotated[float, Field(ge=0, le=1, exclude_if=not_)] = 0.0
+    diagonal: Annotated[float, Field(ge=0, le=2, exclude_if=not_)] = 0.0
 
     stage: ClassVar[Stage] = Stage.CODE
     rank: ClassVar[int] = -50

@@ -112,10 +112,12 @@ def _filtering(clues: Clues) -> Sequence[Proposal]:
         found += proposals("spatial_filtering", ["fraction"], fraction=share, along=along)
     askew, error = clues.amplitude(_DIAGONAL, alike) if mono else (0.0, np.inf)
     if near > 0 and askew > _TOLD * error:
-        share = min(askew / (across + down), 1.0)
-        free = ["fraction", "diagonal"]
-        own = {"fraction": min(near, 0.1), "diagonal": share}
-        found += proposals("spatial_filtering", free, **own)
+        found += proposals(
+            "spatial_filtering",
+            ["fraction", "diagonal"],
+            fraction=min(near, 0.1),
+            diagonal=min(askew / (across + down), 1.0),
+        )
     return found
 
 

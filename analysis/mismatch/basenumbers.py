@@ -1,0 +1,50 @@
+"""Whether the numbers of a camera's base model hold beside an effect."""
+
+from math import isfinite
+
+from scipy.stats import chi2
+
+from analysis.mismatch.credited import joined
+from analysis.mismatch.rank import Ranked
+from analysis.mismatch.recalibrate import Calibrated
+from analysis.mismatch.state import State
+from dsis.camera import BaseNoise
+
+_HOLD, _WRONG = 0.01, 1e-4  # chance of numbers that are farther off
+
+
+def hold_with(state: State, users: BaseNoise, one: Ranked, other: Ranked) -> bool:
+    """Return whether the user's numbers speak for one effect, and against another that ties.
+
+    Two effects may explain the same but for what one does to the variance of all pixels, which a
+    model of another slope does as well. Where a camera model says that slope, wrongly as it seems
+    without either, and rightly beside one of them alone, the other needs a wrong number besides,
+    wrong by as much as the first one says. That numbers hold without either says nothing: they may
+    have been measured in such frames.
+    """
+    if _chance(users, state.calibrated) > _WRONG:
+        return False
+    with_one, with_other = (_beside(state, users, ranked) for ranked in (one, other))
+    return with_one > _HOLD and with_other < _WRONG
+
+
+def _beside(state: State, users: BaseNoise, ranked: Ranked) -> float:
+    """Return the chance of the user's numbers beside an effect as it was fitted."""
+    camera = joined(state.camera, ranked.polished.effects, state.setting.given)
+    if camera is None:
+        return 0.0
+    return _chance(users, state.setting.calibrated(camera, state.calibrated))
+
+
+def _chance(users: BaseNoise, calibrated: Calibrated) -> float:
+    """Return the chance that numbers fitted again are farther from the user's."""
+    square, count = 0.0, 0
+    for piece, segment in zip(calibrated.fit.pieces, users.segment, strict=False):
+        for own, error, said, known in (
+            (piece.slope, piece.slope_error, segment.slope, segment.slope_se),
+            (piece.intercept, piece.intercept_error, segment.intercept, segment.intercept_se),
+        ):
+            if isfinite(error):
+                square += (own - said) ** 2 / (error**2 + (known or 0.0) ** 2)
+                count += 1
+    return float(chi2.sf(square, count))

@@ -14,6 +14,7 @@ _DIAGONAL = "correlation_1_1"
 _SEEN_STEPS = 100.0  # of chi-squared: ten standard deviations
 _AS_LIKELY = 4.6  # of chi-squared, odds of 10: of few levels, periods may be alike
 _TOLD = 2.0  # standard errors from which levels show an exchange
+_CLEAR = 3.0  # and from which there are diagonals
 _LEAST_FLATS = 2  # of one, colours may be the light's
 _BESIDE = {"R": ("Gr", "Gb"), "Gr": ("R", "B"), "Gb": ("B", "R"), "B": ("Gb", "Gr")}
 _NEAR = (_ALONG_ROWS, _ALONG_COLUMNS, "line_correlation", "pixel_variance")
@@ -111,18 +112,19 @@ def _filtering(clues: Clues) -> Sequence[Proposal]:
         share = min(more / 2, 0.15)
         found += proposals("spatial_filtering", ["fraction"], fraction=share, along=along)
     askew, error = clues.amplitude(_DIAGONAL, alike) if mono else (0.0, np.inf)
-    if near > 0 and askew > _TOLD * error:
+    askew -= 2 * near**2  # which the nearest neighbours have in common
+    if near > 0 and askew > _CLEAR * error:
         found += proposals(
             "spatial_filtering",
             ["fraction", "diagonal"],
             fraction=min(near, 0.1),
-            diagonal=min(askew / (across + down), 1.0),
+            diagonal=min(askew / (2 * near), 1.0),
         )
     return found
 
 
 def _memory(clues: Clues) -> Sequence[Proposal]:
-    """Propose the lags along lines that stand out most."""
+    """Propose the lags along lines that stand out most, of so many."""
     step = 1 if clues.layout.channels == ("MONO",) else 2
     departures: dict[tuple[str, int], list[float]] = {}
     for i, key in enumerate(clues.vector.keys):
@@ -142,7 +144,7 @@ def _memory(clues: Clues) -> Sequence[Proposal]:
     best = sorted(means, key=lambda key: -abs(means[key]))[:2]
     found: list[Proposal] = []
     for axis, lag in best:
-        found += proposals(
+        start = proposals(
             "readout_memory",
             ["fraction"],
             ["fraction"],
@@ -150,6 +152,7 @@ def _memory(clues: Clues) -> Sequence[Proposal]:
             lag_pixels=lag,
             along=axis,
         )
+        found += [replace(one, best_of=len(means)) for one in start]
     return found
 
 

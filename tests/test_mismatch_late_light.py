@@ -19,7 +19,13 @@ KINDS = ("shading", "smooth_prnu", "tap_mismatch", "line_settling")
 DOWN = np.linspace(-1, 1, ROWS)[:, np.newaxis] * np.ones(COLUMNS)
 
 
-def _state(change: Any, times: tuple[float, ...] = TIMES_S, seed: int = 1) -> Any:
+def _state(
+    change: Any,
+    times: tuple[float, ...] = TIMES_S,
+    seed: int = 1,
+    *,
+    beside: tuple[str, ...] = (),
+) -> Any:
     """Return the state of darks and flats; `change(signal, time)` is added to a mean frame, DN."""
     rng = np.random.default_rng(seed)
     surfaces, signals, exposures = {}, {}, []
@@ -36,6 +42,7 @@ def _state(change: Any, times: tuple[float, ...] = TIMES_S, seed: int = 1) -> An
         surfaces[name, "MONO"] = leaning(sums.result().channels["MONO"], FRAMES)
         signals[name, "MONO"] = signal
     return SimpleNamespace(
+        camera=SimpleNamespace(effect=[SimpleNamespace(kind=kind) for kind in beside]),
         setting=SimpleNamespace(
             layout=SimpleNamespace(uniform=exposures, channels=("MONO",)),
             seen=SimpleNamespace(surfaces=surfaces),
@@ -82,3 +89,21 @@ def test_chance_and_other_effects_deny_nothing() -> None:
         state = _state(lambda s, t: 0.5 * _shaded(s, t), seed=seed)
         assert of_late_light(state, "shading") is None
     assert of_late_light(_state(_late), "row_fpn") is None
+
+
+def _glowing(signal: float, time: float) -> NDArray[np.float64]:
+    return _shaded(signal, time) + 40.0 * time * DOWN
+
+
+def test_a_glow_beside_uneven_gains_is_believed_even_where_all_flats_take_as_long() -> None:
+    alone = (0.01,) * len(TIMES_S)
+    state = _state(_glowing, alone, beside=("shading", "amp_glow"))
+    assert of_late_light(state, "amp_glow") is None
+    assert of_late_light(state, "shading") is None
+
+
+def test_late_light_beside_uneven_gains_is_no_glow() -> None:
+    def both(signal: float, time: float) -> NDArray[np.float64]:
+        return _shaded(signal, time) + _late(signal, time)
+
+    assert of_late_light(_state(both, beside=("shading",)), "amp_glow") is not None

@@ -171,6 +171,17 @@ def test_what_draws_nothing_must_exceed_its_own_errors(error: float, clear: bool
     assert unclear(few) == ""  # of few frames, and certain
 
 
+def test_a_bend_at_full_scale_is_known_no_better_than_its_exponent() -> None:
+    bend = registry()["nonlinearity"](percent_full_scale=0.4, exponent=4.0)
+    errors = {"percent_full_scale": 0.2, "exponent": 1.0}
+    for free, clear in (
+        (("percent_full_scale", "exponent"), True),
+        (("percent_full_scale",), False),
+    ):
+        named = Named("nonlinearity", Proposal(bend, free), errors, 34.0, ())
+        assert (unclear(named) == "") == clear
+
+
 def test_an_effect_within_its_errors_is_dropped_and_what_it_hid_is_looked_for() -> None:
     search: Any = Proving([_named("kept", x=1.0), _named("found")])
     search.named = [_decay(0.3, 0.2), _named("kept", x=1.0)]

@@ -32,9 +32,10 @@ def gain_of_bands(layout: Layout, frames_of: FramesOf, cycles: float) -> float:
 
     Of all places where bands could be as likely, these take the share to which frames tell it:
     sqrt(2 pi) times its error, of the bins of a column (Laplace). Noise is, in each exposure,
-    white, or what its rows have in common, or what slow waves leave beside the place. Minus
-    infinity where neighbours are raised as well, where there are none on both sides (of 1/f noise
-    the slowest waves stand out), or where there is too little to tell.
+    white, or what its rows have in common, or what slow waves leave beside the place. Where there
+    are no neighbours on both sides only a phase that moves on steadily says anything: of 1/f noise
+    the slowest waves stand out, too. Minus infinity where neighbours are raised as well, or where
+    there is too little to tell.
 
     Parameters
     ----------
@@ -49,7 +50,7 @@ def gain_of_bands(layout: Layout, frames_of: FramesOf, cycles: float) -> float:
     if bands is None:
         return -np.inf
     share = min(np.sqrt(2 * np.pi) * bands.bins, 1.0)
-    return odds_of(bands.parts) - float(np.log(layout.rows / 2 / share))
+    return bands.odds(bands.parts) - float(np.log(layout.rows / 2 / share))
 
 
 def place_of_bands(
@@ -141,28 +142,32 @@ def foretold(
     others = tuple(
         own[some] - own[some].mean(0) for own, some in zip(found.power.found, rest, strict=True)
     )
-    known = _Found(replace(found.power, found=others), found.near, found.far)
+    known = replace(found, power=replace(found.power, found=others))
     bands = _bands(known, [n[some] for n, some in zip(numbers, rest, strict=True)])
     if bands is None:
         return np.zeros(0)
     parts, gains = bands.parts, []
-    odds = odds_of(parts)
+    odds = bands.odds(parts)
     for i, (own, noise) in enumerate(zip(found.power.found, bands.noise, strict=True)):
         if rest[i].all():
             continue
         parts[i] = bands.part(i, own[:, bands.place] / np.sqrt(noise), numbers[i])
-        gains.append(odds_of(parts) - odds)
+        gains.append(bands.odds(parts) - odds)
         odds += gains[-1]
     return np.array(gains)
 
 
 @dataclass(frozen=True)
 class _Found:
-    """Projections at the places tried, at their neighbours, far away: bands in DN of signal 1."""
+    """Projections at the places tried, at their neighbours, far away: bands in DN of signal 1.
+
+    `amid`: there are neighbours on both sides.
+    """
 
     power: Power
     near: slice
     far: slice
+    amid: bool
 
 
 @dataclass(frozen=True)
@@ -174,6 +179,7 @@ class _Bands:
     place: int
     noise: Sequence[float]
     numbers: Sequence[NDArray[np.float64]]
+    amid: bool
 
     @property
     def bins(self) -> float:
@@ -182,7 +188,7 @@ class _Bands:
 
     @property
     def parts(self) -> list[Part]:
-        """What each exposure says of them, see `odds_of`."""
+        """What each exposure says of them, see `odds`."""
         pairs = zip(self.seen.found, self.numbers, strict=True)
         return [self.part(i, own[:, 0], number) for i, (own, number) in enumerate(pairs)]
 
@@ -192,14 +198,17 @@ class _Bands:
         free = there_in(own, amplitude, kept=False, real=False)
         return free, moving_on_in(own, number, amplitude)
 
+    def odds(self, parts: Sequence[Part]) -> float:
+        """Return the log-likelihood of bands in projections of all exposures, less that of noise.
 
-def odds_of(parts: Sequence[Part]) -> float:
-    """Return the log-likelihood of bands in projections of all exposures, less that of noise.
-
-    Their phase is another in each frame, or moves on steadily: as likely beforehand.
-    """
-    free, steady = (of_exposures(own) for own in zip(*parts, strict=True))
-    return float(np.logaddexp(free, steady) - np.log(2))
+        Their phase is another in each frame, or moves on steadily: as likely beforehand. Where
+        there are no neighbours on both sides slow noise may be there, whose phase is free: then
+        only what a steady one gains over that says anything.
+        """
+        free, steady = (of_exposures(own) for own in zip(*parts, strict=True))
+        if self.amid:
+            return float(np.logaddexp(free, steady) - np.log(2))
+        return steady - max(free, 0.0)
 
 
 def _found(layout: Layout, frames_of: FramesOf, cycles: float) -> _Found | None:
@@ -208,13 +217,14 @@ def _found(layout: Layout, frames_of: FramesOf, cycles: float) -> _Found | None:
     tried = [cycles + k for k in _BETWEEN]
     near = [cycles + k for k in _NEAR if _LOWEST <= cycles + k <= rows / 2]
     far = [cycles + k for k in _FAR if _LOWEST <= cycles + k <= rows / 2]
-    if len(near) < len(_NEAR) or not far:
+    if not near or not far:
         return None
     places = [*tried, *near, *far]
     found = tuple(projections(layout, frames_of, [(0.0, own / rows) for own in places]))
     power = Power(found, tuple(_light(layout) ** 2))
     beside = slice(len(tried), len(tried) + len(near))
-    return _Found(power, beside, slice(-len(far), None)) if any(power.weights) else None
+    amid = len(near) == len(_NEAR)
+    return _Found(power, beside, slice(-len(far), None), amid) if any(power.weights) else None
 
 
 def _bands(found: _Found, numbers: Sequence[NDArray[np.float64]]) -> _Bands | None:
@@ -228,7 +238,7 @@ def _bands(found: _Found, numbers: Sequence[NDArray[np.float64]]) -> _Bands | No
     power = float(seen.excess[best])
     if not power > 0 or seen.crowded(range(found.near.start, found.near.stop), power):
         return None
-    return _Bands(seen.at([best]), power, best, noise, numbers)
+    return _Bands(seen.at([best]), power, best, noise, numbers, found.amid)
 
 
 def _light(layout: Layout) -> NDArray[np.float64]:

@@ -1,5 +1,7 @@
 """Uneven gains and glows that uneven exposure times feign: a shutter is slower at one side."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,12 +19,16 @@ def of_late_light(state: State, kind: str) -> Denial | None:
 
     A gain is uneven in proportion to the signal, a glow to the exposure time. Where pixels are
     exposed for longer by the same time always, they collect more by their signal over the exposure
-    time. Asked is how much each exposure leans and bows, beside what all have alike: where that law
-    is likelier at odds of 20, nothing else of these is there for certain. Exposures of one time do
-    not tell, nor need they: what is uneven is then so by the same share at every level.
+    time. Asked is how much each exposure leans and bows, beside what all have alike, and beside a
+    glow or an uneven gain that is there as well: where that law is likelier at odds of 20, nothing
+    else of these is there for certain. Exposures of one time do not tell, nor need they: what is
+    uneven is then so by the same share at every level.
     """
     if kind not in _OF_SIGNAL | _OF_TIME:
         return None
+    others = {own.kind for own in state.camera.effect} & (
+        _OF_SIGNAL if kind in _OF_TIME else _OF_TIME
+    )
     signals, behind = state.calibrated.fit.signal_dn, 0.0
     times = {e.name: float(e.exposure_time_s) for e in state.setting.layout.uniform}
     for channel in state.setting.layout.channels:
@@ -34,18 +40,21 @@ def of_late_light(state: State, kind: str) -> Denial | None:
         own = [state.setting.seen.surfaces[name, channel] for name in names]
         values = np.stack([one.coefficients for one in own])
         weights = np.array([1 / max(one.noise_dn2, 1e-9) for one in own])
-        law = time if kind in _OF_TIME else signal
-        behind += (_left(law, values, weights) - _left(signal / time, values, weights)) / 2
+        law, other = (time, signal) if kind in _OF_TIME else (signal, time)
+        beside = [np.ones_like(time), *([other] if others else [])]
+        late = _left([*beside, signal / time], values, weights)
+        behind += (_left([*beside, law], values, weights) - late) / 2
     if behind <= TOLD_APART:
         return None
     why = "it is uneven as light is that some pixels see for longer, the same time in each exposure"
     return rival(behind, why)
 
 
-def _left(law: Array, values: Array, weights: Array) -> float:
-    """Return chi-squared of values (exposure, shape) about multiples of a law, and a constant."""
+def _left(laws: Sequence[Array], values: Array, weights: Array) -> float:
+    """Return chi-squared of values (exposure, shape) about multiples of laws, by exposure."""
     root = np.sqrt(weights)[:, np.newaxis]
-    design = np.stack([np.ones_like(law), law / max(float(law.max()), 1e-30)], 1) * root
+    scaled = [law / max(float(law.max()), 1e-30) for law in laws]
+    design = np.stack(scaled, 1) * root
     rest = values * root
     rest = rest - design @ np.linalg.lstsq(design, rest, rcond=None)[0]
     return float((rest**2).sum())

@@ -27,6 +27,8 @@ SHAPES = frozenset(
         "extent",
     }
 )
+# A bend is named by its size at full scale: levels below know that no better than its exponent.
+_FAR_FROM_LEVELS = {"percent_full_scale": "exponent"}
 
 
 @dataclass(frozen=True)
@@ -75,15 +77,16 @@ def unclear(named: Named) -> str:
     """Return why an effect is not told from none by its own size; empty: it is.
 
     Asked of what draws nothing at random, whose size is known as a mean is. Where an error is
-    unknown, nothing is said.
+    unknown, or is that of a shape, nothing is said.
     """
     effect = None if named.proposal is None else named.proposal.effect
     if named.proposal is None or effect is None or effect.draws:
         return ""
+    free = named.proposal.free
     sizes = {
         name: (float(getattr(effect, name)), named.errors.get(name, inf))
-        for name in named.proposal.free
-        if name not in SHAPES
+        for name in free
+        if name not in SHAPES and _FAR_FROM_LEVELS.get(name) not in free
     }
     if not sizes or any(
         not isfinite(error) or abs(value) > _CLEAR * error for value, error in sizes.values()

@@ -16,6 +16,7 @@ from analysis.mismatch.bank.key import Key
 from analysis.mismatch.evidence import Curve, Evidence, Histogram, Map, Series, Shown
 from analysis.mismatch.files import write_finding
 from analysis.mismatch.finding import Finding, FittedParameter, Gain, Where
+from analysis.mismatch.model import processes
 from analysis.mismatch.report.figures import MOST, curves, pictures, series
 from analysis.mismatch.report.figures.spectra import folded
 from analysis.mismatch.report.numbers import measured
@@ -23,6 +24,7 @@ from analysis.mismatch.report.sentences import numbers_in_short, parameters
 from analysis.mismatch.says import sentence
 from analysis.mismatch.words import effect_says, effect_words
 from dsis.effects import registry
+from folder_bytes import every_byte
 from mismatch_findings import FOUND, LINE, NAMED, NAN, NOTHING, ROWS, evidence
 
 
@@ -46,6 +48,14 @@ class Page(HTMLParser):
     @property
     def text(self) -> str:
         return re.sub(r"\s+", " ", " ".join(self.words))
+
+
+def test_processes_draw_the_same_bytes(tmp_path: Path) -> None:
+    finding = replace(FOUND, evidence=evidence())
+    write_finding(finding, tmp_path / "one")
+    with processes(2):
+        write_finding(finding, tmp_path / "other")
+    assert every_byte(tmp_path / "one") == every_byte(tmp_path / "other")
 
 
 @pytest.mark.parametrize("finding", [replace(FOUND, evidence=evidence()), FOUND, NOTHING])

@@ -1,6 +1,7 @@
 """Simulations that are made ahead, side by side: the same as one by one, and each made once."""
 
 import os
+import threading
 import time
 from functools import partial
 from types import SimpleNamespace
@@ -10,7 +11,7 @@ import numpy as np
 import pytest
 
 import analysis.mismatch.simulations as module
-from analysis.mismatch.model import Model, both, each, in_turn, processes
+from analysis.mismatch.model import Model, apart, both, each, in_turn, processes
 from analysis.mismatch.simulations import Simulations
 from dsis.cfa import Cfa
 from mismatch_recordings import camera
@@ -69,13 +70,25 @@ def _twice(offset: int, item: int) -> tuple[int, int]:
 def test_processes_give_the_results_in_order_and_only_where_they_are_asked_for() -> None:
     work = partial(_twice, 5)
     with processes(2):
-        apart = each(work, range(6), 2)
+        beside = each(work, range(6), 2)
         alone = each(work, [3], 2)
     after = each(work, range(6), 2)
-    assert [value for _, value in apart] == [5, 7, 9, 11, 13, 15]
-    assert os.getpid() not in {own for own, _ in apart}
+    assert [value for _, value in beside] == [5, 7, 9, 11, 13, 15]
+    assert os.getpid() not in {own for own, _ in beside}
     assert alone == [(os.getpid(), 11)]
-    assert after == [(os.getpid(), value) for _, value in apart]
+    assert after == [(os.getpid(), value) for _, value in beside]
+
+
+def _thread(_item: int) -> tuple[int, int]:
+    return os.getpid(), threading.get_ident()
+
+
+def test_what_threads_must_not_do_is_done_by_processes_or_in_turn() -> None:
+    with processes(2), processes(3):  # the outer ones
+        beside = {own for own, _ in apart(_thread, range(4))}
+    assert os.getpid() not in beside
+    assert len(beside) <= 2
+    assert set(apart(_thread, range(4))) == {_thread(0)}
 
 
 def _failing(item: int) -> float:
@@ -107,7 +120,7 @@ def test_results_come_one_by_one() -> None:
 def test_two_calls_beside_one_another_may_ask_for_processes() -> None:
     work = partial(_twice, 1)
     with processes(2):
-        apart, here = both(partial(each, work, [1], 2), os.getpid, 2)
-    assert apart[0][0] != here == os.getpid()
-    assert apart[0][1] == 3
+        made, here = both(partial(each, work, [1], 2), os.getpid, 2)
+    assert made[0][0] != here == os.getpid()
+    assert made[0][1] == 3
     assert both(partial(each, work, [1], 2), os.getpid, 1) == ([(here, 3)], here)

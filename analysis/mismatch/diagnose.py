@@ -82,12 +82,17 @@ def find_mismatch(
             progress(done, done + 1, what)
 
     words = VOCABULARY if vocabulary is None else vocabulary & VOCABULARY
-    samples = sum(len(e.frames) for e in recording.exposures) * recording.rows * recording.columns
-    jobs = jobs if samples > _SMALL else 1  # processes take longer to start
+    jobs = processes_for(recording, jobs)
     keep_freed()
     one_thread()
     with processes(jobs):
         return _found(camera, recording, (seed, jobs), words, step)
+
+
+def processes_for(recording: Recording, jobs: int) -> int:
+    """Return how many of so many processes a recording is worth: they take longer to start."""
+    samples = sum(len(e.frames) for e in recording.exposures) * recording.rows * recording.columns
+    return jobs if samples > _SMALL else 1
 
 
 def _found(

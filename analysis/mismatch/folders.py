@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from analysis.mismatch.diagnose import VOCABULARY, find_mismatch
+from analysis.mismatch.diagnose import VOCABULARY, find_mismatch, processes_for
 from analysis.mismatch.files import MARK, fill, finding_folder
 from analysis.mismatch.finding import Finding
+from analysis.mismatch.model import processes
 from dsis.camera import Camera, read_camera
 from dsis.cfa import Cfa
 from dsis.errors import Fault, InputError
@@ -116,12 +117,11 @@ def _found(
             def step(done: int, total: int, doing: str, of: str = name) -> None:
                 tell(done, total, doing if len(recordings) == 1 else f"{of}: {doing}")
 
-            yield (
-                name,
-                find_mismatch(
+            with processes(processes_for(recording, jobs)):  # until the caller has drawn it
+                finding = find_mismatch(
                     camera, recording, seed=seed, jobs=jobs, vocabulary=allowed, progress=step
-                ),
-            )
+                )
+                yield name, finding
         return
     tell(0, len(recordings), "diagnosing")
     one = partial(_finding, camera, seed, allowed)

@@ -150,8 +150,11 @@ def simulated(
 
 @contextmanager
 def processes(jobs: int) -> Iterator[None]:
-    """Let `each` use so many processes; with one job there are none, nor where none may start."""
-    if jobs <= 1 or multiprocessing.current_process().daemon:
+    """Let `each` use so many processes; with one job there are none, nor where none may start.
+
+    Within such a context there are those of the outer one.
+    """
+    if jobs <= 1 or _pool.get() is not None or multiprocessing.current_process().daemon:
         yield
         return
     with workers(jobs, kind="processes") as pool:
@@ -190,6 +193,15 @@ def in_turn(work: Callable[[T], R], items: Sequence[T], jobs: int) -> Iterator[R
     finally:
         for one in running:
             one.cancel()
+
+
+def apart(work: Callable[[T], R], items: Sequence[T]) -> list[R]:
+    """Return `work` of each item, in order, by the processes there are, else one by one.
+
+    For what threads must not do at once.
+    """
+    pool = _pool.get()
+    return [work(item) for item in items] if pool is None else each(work, items, pool.count)
 
 
 def side_by_side(work: Callable[[T], R], items: Sequence[T], jobs: int) -> list[R]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from analysis.mismatch.evidence import Evidence
 from analysis.mismatch.finding import Finding, Mismatch
+from analysis.mismatch.model import apart
 from analysis.mismatch.report.figures import Picture, ladder_picture, pictures, save
 from analysis.mismatch.report.numbers import interval, measured, plain
 from analysis.mismatch.report.sentences import (
@@ -72,10 +74,10 @@ def write_page(finding: Finding, folder: Path, origin: str = "") -> None:
     """
     figures = folder / "figures"
     figures.mkdir(exist_ok=True)
-    ladder = ladder_picture(finding)
-    ladder_svg = "" if ladder is None else _embedded(ladder, figures)
-    shown = [_shown(picture, figures) for picture in pictures(finding)]
-    page = render(finding, shown, ladder_svg, origin)
+    ladder, some = ladder_picture(finding), pictures(finding)
+    drawn = apart(partial(save, folder=figures), [*some, *([] if ladder is None else [ladder])])
+    shown = [_shown(picture, svg) for picture, svg in zip(some, drawn, strict=False)]
+    page = render(finding, shown, "" if ladder is None else embedded(drawn[-1]), origin)
     (folder / "report.html").write_text(page, encoding="utf-8", newline="")
 
 
@@ -163,7 +165,7 @@ def _locked(finding: Finding) -> list[tuple[str, str]]:
     ]
 
 
-def _shown(picture: Picture, figures: Path) -> dict[str, Any]:
+def _shown(picture: Picture, svg: bytes) -> dict[str, Any]:
     explained = dict.fromkeys(m.explained_by for m in picture.mismatches)
     names = [effect_words(name) if name else "nothing yet" for name in explained]
     return {
@@ -171,9 +173,5 @@ def _shown(picture: Picture, figures: Path) -> dict[str, Any]:
         "title": picture.title[0].upper() + picture.title[1:],
         "says": list(dict.fromkeys(m.says for m in picture.mismatches))[:_SAID],
         "explained": joined(names),
-        "svg": _embedded(picture, figures),
+        "svg": embedded(svg),
     }
-
-
-def _embedded(picture: Picture, figures: Path) -> str:
-    return embedded(save(picture, figures))

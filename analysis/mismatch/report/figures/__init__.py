@@ -96,7 +96,7 @@ def save(picture: Picture, folder: Path) -> bytes:
         svg, png = (folder / f"{picture.name}.{end}" for end in ("svg", "png"))
         title = picture.title
         figure.savefig(svg, metadata={"Date": None, "Creator": "dsis", "Title": title}, dpi=200)
-        figure.set_layout_engine("none")  # it is laid out
+        figure.set_layout_engine(None)  # it is laid out: with one it would be drawn twice again
         figure.savefig(png, metadata={"Software": "dsis", "Title": title}, dpi=200)
     return svg.read_bytes()
 

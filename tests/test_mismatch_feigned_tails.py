@@ -9,7 +9,7 @@ import pytest
 from scipy.stats import norm
 
 from analysis.mismatch.bank.key import Key
-from analysis.mismatch.feignedtails import coded, lopsided
+from analysis.mismatch.feignedtails import coded, lopsided, placed
 from dsis.effects.adc_dnl import AdcDnl
 
 TAILS = "heavy_tailed_read_noise"
@@ -121,3 +121,25 @@ def _leaning(skewness: float, expected: float, sd: float) -> Any:
 def test_heavy_tails_lean_to_no_side(skewness: float, sd: float, denied: bool) -> None:
     assert (lopsided(_leaning(skewness, 0.0, sd), TAILS) is not None) == denied
     assert lopsided(_leaning(skewness, 0.0, sd), "impulse") is None
+
+
+@pytest.mark.parametrize(
+    ("within", "left", "told"),
+    [
+        (0.0, "smooth_variance_spread", False),
+        (0.05, "smooth_variance_spread", True),  # five errors: pixels have tails of their own
+        (0.0, "kurtosis", True),
+    ],
+)
+def test_noise_that_has_its_place_is_no_tails(within: float, left: str, *, told: bool) -> None:
+    names = ("kurtosis", "kurtosis_within_pixels")
+    keys = tuple(Key(s, "exposure", "dark", "MONO", "") for s in names)
+    state: Any = SimpleNamespace(
+        mismatches=[SimpleNamespace(statistic=left)],
+        vector=SimpleNamespace(keys=keys, values=np.array([0.06, within])),
+        null=SimpleNamespace(
+            mean=np.full(2, 0.06), sd=np.full(2, 0.01), known=np.ones(2, np.bool_)
+        ),
+    )
+    assert (placed(state, TAILS, WITHOUT) is None) == told
+    assert placed(state, "read_noise_spread", WITHOUT) is None

@@ -15,8 +15,9 @@ from analysis.mismatch.bank.standing import NAME as FIXED_WAVE
 from analysis.mismatch.contradicted import Denial, rival
 from analysis.mismatch.displaced import displaced
 from analysis.mismatch.edged import STATISTIC, edged, single
-from analysis.mismatch.feignedtails import coded, lopsided
+from analysis.mismatch.feignedtails import coded, lopsided, placed
 from analysis.mismatch.grown import grown
+from analysis.mismatch.halves import halved
 from analysis.mismatch.inpatches import in_patches
 from analysis.mismatch.jumped import jumped
 from analysis.mismatch.nofield import no_field
@@ -25,6 +26,7 @@ from analysis.mismatch.rivalled import rivalled
 from analysis.mismatch.state import State
 from analysis.mismatch.unequal import unequal
 from analysis.mismatch.uneven import uneven
+from analysis.mismatch.waved import waved
 from analysis.mismatch.wholeframes import of_pink_noise
 from dsis.effects import Effect
 from dsis.effects.black_level_drift import BlackLevelDrift
@@ -60,6 +62,8 @@ def of_another(state: State, effect: Effect, without: Array) -> Denial | None:
         or coloured(state, kind)
         or stepped(state, kind)
         or grown(state, kind, without)
+        or waved(state, kind)
+        or halved(state, effect)
         or edged(state, kind)
         or single(state, effect)
         or rivalled(state, effect)
@@ -71,6 +75,7 @@ def of_another(state: State, effect: Effect, without: Array) -> Denial | None:
         or uneven(state, effect)
         or coded(state, kind, without)
         or lopsided(state, kind)
+        or placed(state, kind, without)
         or persisting(state, kind, without)
         or carried(state, effect)
         or no_field(state, effect)

@@ -1,12 +1,13 @@
-"""Tails that something else feigns: codes of unequal width, noise that leans to one side."""
+"""Tails that something else feigns: codes of unequal width, noise that leans, or has its place."""
 
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.mismatch.bank.persistent import SURFACE
 from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.layout import Place
 from analysis.mismatch.recalibrate import code_step
-from analysis.mismatch.resolved import FAR_OFF
+from analysis.mismatch.resolved import CLEAR, FAR_OFF
 from analysis.mismatch.state import State
 from dsis.effects.adc_dnl import AdcDnl
 
@@ -86,3 +87,24 @@ def lopsided(state: State, kind: str) -> Denial | None:
         if leans
         else None
     )
+
+
+def placed(state: State, kind: str, without: Array) -> Denial | None:
+    """Return how heavy tails are denied by noise that differs from place to place; None: not.
+
+    Pixels of different noise have heavy tails in all of them together, and none by themselves.
+    Where noise that varies smoothly is left unexplained, tails must show within single pixels.
+    """
+    surface = any(m.statistic == SURFACE for m in state.mismatches)
+    if kind != "heavy_tailed_read_noise" or not surface:
+        return None
+    own = np.array([key.statistic == "kurtosis_within_pixels" for key in state.vector.keys])
+    own &= state.null.known & np.isfinite(without)
+    change = (state.null.mean - without)[own] / state.null.sd[own]
+    seen = (state.vector.values - without)[own] / state.null.sd[own]
+    size = float(np.linalg.norm(change))
+    shown = float(change @ seen) / size if size > 0 else 0.0
+    if shown >= CLEAR:
+        return None
+    why = f"noise differs from place to place, and single pixels show tails by {shown:.1f} errors"
+    return Denial(0.0, why)

@@ -23,8 +23,9 @@ def gathered(state: State) -> Denial | None:
 
     Relative variances of pixels, summed over exposures, have a mean square beyond chance, e. Of
     pixels that are drawn one by one the mean over m of them has e / m. Where whole blocks, rows or
-    columns have half of e or more, for certain, noise is a matter of place. What follows their
-    gain is that of light which falls unevenly, and counts for nothing.
+    columns have half of e or more, for certain, noise is a matter of place; where e, which is known
+    less well than that, is none, too. What follows their gain is that of light which falls
+    unevenly, and counts for nothing.
     """
     images = state.setting.seen.images
     both = [
@@ -37,8 +38,8 @@ def gathered(state: State) -> Denial | None:
         for total, noise, gain in both:
             own = _of_parts(total, noise, None if gain is None else gain[0], size)
             whole, shared, error = whole + own[0], shared + own[1], error + own[2]
-        if whole > 0 and shared > _MOST * whole and shared > _SURE * error**0.5:
-            return Denial(max(1 - shared / whole, 0.0), why)
+        if shared > _MOST * whole and shared > _SURE * error**0.5:
+            return Denial(max(1 - shared / max(whole, shared), 0.0), why)
     return None
 
 

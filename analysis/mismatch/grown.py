@@ -1,4 +1,4 @@
-"""Patterns of offsets that grow with exposure time, as no offset does."""
+"""Offsets of pixels, lines or frames that grow with exposure time, as no offset does."""
 
 from math import exp
 
@@ -11,16 +11,16 @@ from analysis.mismatch.rank import TOLD_APART
 from analysis.mismatch.state import State
 
 Array = NDArray[np.float64]
-_OFFSETS = frozenset({"dsnu", "row_fpn", "column_fpn"})
+_OFFSETS = frozenset({"dsnu", "row_fpn", "column_fpn", "black_level_drift"})
 _LEAST_NUMBER = 0.5  # of a cube root of a variance: below, its error is another's
 
 
 def grown(state: State, kind: str, without: Array) -> Denial | None:
-    """Return how a pattern of offsets is denied by exposure times; None: it is not.
+    """Return how offsets are denied by exposure times; None: they are not.
 
-    Offsets are the same at all times. Where what pixels or lines differ by in single exposures goes
-    with the square of the times instead, at odds of 20, something that needs time makes them
-    differ: trails of pixels that overflow, say.
+    Offsets are the same at all times. Where what pixels, lines or frames differ by in single
+    exposures goes with the square of the times instead, at odds of 20, something that needs time
+    makes them differ: trails of pixels that overflow, say, or a sensor that warms up.
 
     Parameters
     ----------
@@ -35,8 +35,9 @@ def grown(state: State, kind: str, without: Array) -> Denial | None:
         return None
     times = {e.name: e.exposure_time_s for e in state.setting.layout.exposures}
     changes, excess, errors, time_s = [], [], [], []
+    calls = set(CANDIDATES[kind].calls) - {"level"}
     for i, key in enumerate(state.vector.keys):
-        if key.statistic not in CANDIDATES[kind].calls or key.exposure not in times:
+        if key.statistic not in calls or key.exposure not in times:
             continue
         if not state.null.known[i]:
             continue

@@ -1,0 +1,81 @@
+"""Bands of rows or halves of a frame that move: which of them the parts of frames show."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.mismatch.bank.linemeans import PARTS
+from analysis.mismatch.contradicted import Denial, rival
+from analysis.mismatch.state import State
+from dsis.effects import Effect
+from dsis.effects.row_banding import RowBanding
+
+Array = NDArray[np.float64]
+_SIZES = np.geomspace(0.1, 3.0, 16)  # of the scatter of parts that is seen
+_WHOLE = (0.0, 0.3, 1.0)  # of it, by which frames may move as a whole besides
+_LENGTHS = np.geomspace(1 / 24, 2.0, 10)  # of a frame, over which bands last
+
+
+@dataclass(frozen=True)
+class _Moved:
+    """How parts of the frames of an exposure move: covariance (part, part), DN^2.
+
+    `noise` is that of one part, `free` the degrees of freedom.
+    """
+
+    covariance: Array
+    noise: float
+    free: int
+
+
+def halved(state: State, effect: Effect) -> Denial | None:
+    """Return how bands of rows are denied by halves that move; None: they are not.
+
+    Where two amplifiers read a frame, or one that is reset in its middle, rows are as alike as in a
+    band that lasts for half of a frame, but for the step between them. Asked are the means of parts
+    of each frame, by the likelihood of normal ones: where halves that move, each as a whole, are as
+    likely as bands of any length, frames besides, there may be none.
+    """
+    if not isinstance(effect, RowBanding):
+        return None
+    moved = list(_moving(state))
+    if not moved:
+        return None
+    unit = max(float(np.trace(own.covariance)) / PARTS for own in moved)
+    half = np.where(np.arange(PARTS) < PARTS / 2, 1.0, -1.0)
+    apart = np.abs(np.subtract.outer(np.arange(PARTS), np.arange(PARTS))) / PARTS
+    halves = _likeliest(moved, unit, [np.outer(half, half)])
+    bands = _likeliest(moved, unit, [np.exp(-apart / length) for length in _LENGTHS])
+    return rival(halves - bands, "halves of a frame move against each other as wholes")
+
+
+def _moving(state: State) -> Iterator[_Moved]:
+    for exposure in state.setting.layout.uniform:
+        own = state.setting.seen.lines.get((exposure.name, "row"))
+        if own is None or own.frames < 2 or own.fixed.size < PARTS:
+            continue
+        moved = own.parts - own.parts.mean(0)
+        noise = own.noise_dn2 * PARTS / own.fixed.size
+        free = own.frames - 1
+        yield _Moved(moved.T @ moved / free, noise, free)
+
+
+def _likeliest(moved: Sequence[_Moved], unit: float, shapes: Sequence[Array]) -> float:
+    """Return the largest log-likelihood of covariances of some shape and size, DN^2.
+
+    Beside noise, and what frames move by as a whole.
+    """
+    best = -np.inf
+    for shape in shapes:
+        for whole in _WHOLE:
+            made = unit * (_SIZES[:, np.newaxis, np.newaxis] ** 2 * shape + whole**2)
+            total: Array = np.zeros(_SIZES.size)
+            for own in moved:
+                expected = made + own.noise * np.eye(PARTS)
+                _, logs = np.linalg.slogdet(expected)
+                fits = np.linalg.solve(expected, np.broadcast_to(own.covariance, expected.shape))
+                total -= own.free / 2 * (logs + np.trace(fits, axis1=1, axis2=2))
+            best = max(best, float(total.max()))
+    return best

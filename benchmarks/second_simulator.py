@@ -3,7 +3,7 @@
 Writes recordings and a sealed key with a simulator that was written from the contract alone,
 apart from the project and from `concealed.py`'s; prints the key's SHA-256, runs the diagnosis on
 the files alone, opens the key and prints what was found. Resumable: everything lies in --work,
-one line of JSON a case. The seeds 101, 202 and so on to 909 have been used to better the
+one line of JSON a case. The seeds 101, 202 and so on to 1111 have been used to better the
 diagnosis: what they say is no proof any more.
 """
 

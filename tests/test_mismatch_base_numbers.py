@@ -34,9 +34,13 @@ def told(monkeypatch: pytest.MonkeyPatch) -> Any:
     """Return the order of two that tie, by what slope fits without them, and what was given."""
     monkeypatch.setattr(basenumbers, "joined", lambda _camera, effects, _given: effects[0])
 
-    def order(alone: float, *, given: BaseNoise = GIVEN, twin: bool = False) -> list[str] | None:
+    def order(
+        alone: float, *, given: BaseNoise = GIVEN, twin: bool = False, there: tuple[Any, ...] = ()
+    ) -> list[str] | None:
         setting = SimpleNamespace(given=0, calibrated=lambda kind, _near: _calibrated(BESIDE[kind]))
-        state: Any = SimpleNamespace(camera=None, setting=setting, calibrated=_calibrated(alone))
+        state: Any = SimpleNamespace(
+            camera=SimpleNamespace(effect=there), setting=setting, calibrated=_calibrated(alone)
+        )
         best, rival = _ranked("readout_memory", 40.0), _ranked("spatial_filtering", 39.5)
         found = by_numbers(state, given, [best] if twin else [best, rival], rival)
         assert found is None or found[0].gain == 40.0
@@ -66,3 +70,7 @@ def test_what_may_not_be_named_leaves_a_tie(told: Any) -> None:
 def test_numbers_with_errors_of_their_own_say_less(told: Any) -> None:
     unsure = BaseNoise(segment=(Segment(slope=0.40, intercept=5.0, slope_se=0.01),))
     assert told(0.3923, given=unsure) is None
+
+
+def test_of_a_rival_that_is_named_already_nothing_is_said(told: Any) -> None:
+    assert told(0.3923, there=(SimpleNamespace(kind="spatial_filtering"),)) is None

@@ -143,3 +143,17 @@ def test_noise_that_has_its_place_is_no_tails(within: float, left: str, *, told:
     )
     assert (placed(state, TAILS, WITHOUT) is None) == told
     assert placed(state, "read_noise_spread", WITHOUT) is None
+
+
+def test_tails_that_single_pixels_cannot_show_are_not_denied() -> None:
+    """Of three frames no kurtosis within pixels is known."""
+    state: Any = SimpleNamespace(
+        mismatches=[SimpleNamespace(statistic="smooth_variance_spread")],
+        vector=SimpleNamespace(
+            keys=(Key("kurtosis", "exposure", "dark", "MONO", ""),), values=np.array([0.06])
+        ),
+        null=SimpleNamespace(
+            mean=np.array([0.06]), sd=np.array([0.01]), known=np.ones(1, np.bool_)
+        ),
+    )
+    assert placed(state, TAILS, np.zeros(1)) is None

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from analysis.mismatch.bank.key import Key
+from analysis.mismatch.bank.key import MOSAIC, Key
 from analysis.mismatch.grown import grown
 
 TIMES = {"dark_0": 0.02, "dark_1": 0.12, "flat_0": 0.02, "flat_1": 0.05}
@@ -14,11 +14,16 @@ OFFSET = 0.25  # variance of the offsets, relative to noise of lines
 SD = 0.04
 
 
-def _state(of_time: np.ndarray, statistic: str, seed: int) -> Any:
+def _state(
+    of_time: np.ndarray, statistic: str, seed: int, *, sd: float = SD, channels: int = 1
+) -> Any:
     """Return a state whose lines differ by offsets, or by what goes with time; it says offsets."""
-    keys = [Key(statistic, "exposure", name, "MONO", "") for name in TIMES]
+    keys = [Key(statistic, "exposure", name, str(c), "") for c in range(channels) for name in TIMES]
     rng = np.random.default_rng(seed)
-    values = np.cbrt(1 + of_time) + rng.normal(0, SD, len(keys))
+    if channels > 1:  # the same in all, and what they have in common besides
+        keys += [Key(statistic, MOSAIC, name, "", "") for name in TIMES]
+    drawn = np.cbrt(1 + of_time) + rng.normal(0, sd, len(TIMES))
+    values = np.tile(drawn, len(keys) // len(TIMES))
     return SimpleNamespace(
         setting=SimpleNamespace(
             layout=SimpleNamespace(
@@ -28,7 +33,7 @@ def _state(of_time: np.ndarray, statistic: str, seed: int) -> Any:
         vector=SimpleNamespace(keys=tuple(keys), values=values),
         null=SimpleNamespace(
             mean=np.full(len(keys), np.cbrt(1 + OFFSET)),
-            sd=np.full(len(keys), SD),
+            sd=np.full(len(keys), sd),
             known=np.ones(len(keys), bool),
         ),
     )
@@ -53,6 +58,25 @@ def test_what_grows_with_time_is_no_offset(kind: str, statistic: str) -> None:
         assert "grows with exposure time" in said.why
         still = np.full(len(TIMES), OFFSET)
         assert grown(_state(still, statistic, seed), kind, without) is None
+
+
+def test_offsets_beside_what_grows_are_believed() -> None:
+    time_s, without = np.array(list(TIMES.values())), np.ones(len(TIMES))
+    both = OFFSET + 1.5 * (time_s / time_s.max()) ** 2
+    for seed in range(10):
+        state = _state(both, "fixed_row_variance", seed, sd=0.01)
+        assert grown(state, "row_fpn", without) is None
+
+
+def test_what_moves_a_frame_counts_once_in_a_mosaic() -> None:
+    """Whatever one exposure has of a drift, its channels have."""
+    without, denied = np.ones(5 * len(TIMES)), 0
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        drift = OFFSET * rng.chisquare(3, len(TIMES)) / 3
+        state = _state(drift, "frame_variance", seed, sd=0.09, channels=4)
+        denied += grown(state, "black_level_drift", without) is not None
+    assert denied <= 2
 
 
 def test_one_exposure_time_tells_nothing(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -66,5 +66,11 @@ def test_bands_are_believed_however_long(length: float, seed: int) -> None:
     assert halved(_state(_bands(length), seed), BANDS) is None
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_bands_are_believed_beside_frames_that_move_far(seed: int) -> None:
+    bands = _bands(20.0)
+    assert halved(_state(lambda rng: bands(rng) + 300.0 * rng.normal(), seed), BANDS) is None
+
+
 def test_other_effects_are_not_asked() -> None:
     assert halved(_state(_halves, 0), registry()["row_noise"](sigma_dn=1.0)) is None

@@ -58,6 +58,12 @@ def test_a_pattern_beside_a_blot_is_believed(channels: tuple[str, ...], seed: in
     assert in_patches(_state(channels, 0.006, 0.001, seed=seed), "prnu") is None
 
 
+@pytest.mark.parametrize(("depth", "pattern"), [(0.02, 0.001), (0.05, 0.001), (0.2, 0.005)])
+@pytest.mark.parametrize("seed", range(2))
+def test_however_deep_a_blot_the_other_pixels_say(depth: float, pattern: float, seed: int) -> None:
+    assert in_patches(_state(MONO, depth, pattern, seed=seed), "prnu") is None
+
+
 def test_a_blot_of_a_large_sensor_is_found_in_squares() -> None:
     large = _state(MONO, 0.02, 0.0, size=(600, 700))
     assert in_patches(large, "prnu") is not None

@@ -180,6 +180,8 @@ def test_a_bend_at_full_scale_is_known_no_better_than_its_exponent() -> None:
     ):
         named = Named("nonlinearity", Proposal(bend, free), errors, 34.0, ())
         assert (unclear(named) == "") == clear
+        unknown = Named("nonlinearity", Proposal(bend, free), {**errors, "exponent": 5.0}, 34.0, ())
+        assert "percent full scale" in unclear(unknown)
 
 
 def test_an_effect_within_its_errors_is_dropped_and_what_it_hid_is_looked_for() -> None:

@@ -1,6 +1,6 @@
 """Whether the numbers of a camera's base model hold beside an effect."""
 
-from math import isfinite
+from math import isfinite, nan
 
 from scipy.stats import chi2
 
@@ -22,7 +22,7 @@ def hold_with(state: State, users: BaseNoise, one: Ranked, other: Ranked) -> boo
     wrong by as much as the first one says. That numbers hold without either says nothing: they may
     have been measured in such frames.
     """
-    if _chance(users, state.calibrated) > _WRONG:
+    if not _chance(users, state.calibrated) < _WRONG:
         return False
     with_one, with_other = (_beside(state, users, ranked) for ranked in (one, other))
     return with_one > _HOLD and with_other < _WRONG
@@ -32,19 +32,18 @@ def _beside(state: State, users: BaseNoise, ranked: Ranked) -> float:
     """Return the chance of the user's numbers beside an effect as it was fitted."""
     camera = joined(state.camera, ranked.polished.effects, state.setting.given)
     if camera is None:
-        return 0.0
+        return nan
     return _chance(users, state.setting.calibrated(camera, state.calibrated))
 
 
 def _chance(users: BaseNoise, calibrated: Calibrated) -> float:
-    """Return the chance that numbers fitted again are farther from the user's."""
-    square, count = 0.0, 0
-    for piece, segment in zip(calibrated.fit.pieces, users.segment, strict=False):
-        for own, error, said, known in (
-            (piece.slope, piece.slope_error, segment.slope, segment.slope_se),
-            (piece.intercept, piece.intercept_error, segment.intercept, segment.intercept_se),
-        ):
-            if isfinite(error):
-                square += (own - said) ** 2 / (error**2 + (known or 0.0) ** 2)
-                count += 1
-    return float(chi2.sf(square, count))
+    """Return the chance that slopes fitted again are farther from the user's."""
+    pieces = calibrated.fit.pieces
+    if len(pieces) != len(users.segment):
+        return nan
+    squares = [
+        (piece.slope - own.slope) ** 2 / (piece.slope_error**2 + (own.slope_se or 0.0) ** 2)
+        for piece, own in zip(pieces, users.segment, strict=True)
+        if isfinite(piece.slope_error)
+    ]
+    return float(chi2.sf(sum(squares), len(squares))) if squares else nan

@@ -16,7 +16,7 @@ from analysis.mismatch.contradicted import Denial, rival
 from analysis.mismatch.displaced import displaced
 from analysis.mismatch.edged import STATISTIC, edged, single
 from analysis.mismatch.feignedtails import coded, lopsided, placed
-from analysis.mismatch.grown import grown
+from analysis.mismatch.grown import LEAST_NUMBER, grown
 from analysis.mismatch.halves import halved
 from analysis.mismatch.inpatches import in_patches
 from analysis.mismatch.jumped import jumped
@@ -42,7 +42,6 @@ _MAPS = {
 _AXES = {"row_fpn": "rows", "column_fpn": "columns", "row_prnu": "rows", "column_prnu": "columns"}
 _GROWING = frozenset({"row_prnu", "column_prnu"})
 _CLEAR = 5.0  # standard errors of what stands out
-_LEAST_NUMBER = 0.5  # of a cube root of a variance: below, its error is another's
 _SHAPED = frozenset({"half_seam", "parity", STATISTIC})
 _NEIGHBOURS = frozenset({"fixed_correlation_0_1", "fixed_correlation_1_0", "fixed_patch_variance"})
 _MOST = 0.5  # of a pattern's variance, or of tails, that something else may feign
@@ -126,7 +125,7 @@ def feigned(state: State, kind: str, without: Array) -> Denial | None:
             alike = _in_maps(state, left, numbers, kind, key.channel)
         else:
             continue
-        unit = 3 * max(without[i], _LEAST_NUMBER) ** 2 * sd
+        unit = 3 * max(without[i], LEAST_NUMBER) ** 2 * sd
         clear |= explained > _CLEAR * unit
         rest |= explained - alike > _CLEAR * unit
     if fake <= _MOST * seen and (rest or not clear):

@@ -93,7 +93,8 @@ def placed(state: State, kind: str, without: Array) -> Denial | None:
     """Return how heavy tails are denied by noise that differs from place to place; None: not.
 
     Pixels of different noise have heavy tails in all of them together, and none by themselves.
-    Where noise that varies smoothly is left unexplained, tails must show within single pixels.
+    Where noise that varies smoothly is left unexplained, tails must show within single pixels,
+    surely and by half, if these tell.
     """
     surface = any(m.statistic == SURFACE for m in state.mismatches)
     if kind != "heavy_tailed_read_noise" or not surface:
@@ -103,8 +104,10 @@ def placed(state: State, kind: str, without: Array) -> Denial | None:
     change = (state.null.mean - without)[own] / state.null.sd[own]
     seen = (state.vector.values - without)[own] / state.null.sd[own]
     size = float(np.linalg.norm(change))
-    shown = float(change @ seen) / size if size > 0 else 0.0
-    if shown >= CLEAR:
+    if size < CLEAR:
+        return None
+    shown = float(change @ seen) / size
+    if shown >= max(CLEAR, _MOST * size):
         return None
     why = f"noise differs from place to place, and single pixels show tails by {shown:.1f} errors"
     return Denial(0.0, why)

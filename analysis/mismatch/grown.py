@@ -4,23 +4,31 @@ from math import exp
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import nnls
 
-from analysis.mismatch.candidates import CANDIDATES
+from analysis.mismatch.bank.key import MOSAIC
 from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.rank import TOLD_APART
 from analysis.mismatch.state import State
 
 Array = NDArray[np.float64]
-_OFFSETS = frozenset({"dsnu", "row_fpn", "column_fpn", "black_level_drift"})
-_LEAST_NUMBER = 0.5  # of a cube root of a variance: below, its error is another's
+_OFFSETS = {
+    "dsnu": "fixed_pixel_variance",
+    "row_fpn": "fixed_row_variance",
+    "column_fpn": "fixed_column_variance",
+    "black_level_drift": "frame_variance",
+}
+LEAST_NUMBER = 0.5  # of a cube root of a variance: below, its error is another's
 
 
 def grown(state: State, kind: str, without: Array) -> Denial | None:
     """Return how offsets are denied by exposure times; None: they are not.
 
     Offsets are the same at all times. Where what pixels, lines or frames differ by in single
-    exposures goes with the square of the times instead, at odds of 20, something that needs time
-    makes them differ: trails of pixels that overflow, say, or a sensor that warms up.
+    exposures goes with the square of the times instead, at odds of 20, and offsets beside that gain
+    nothing at such odds, something that needs time makes them differ: trails of pixels that
+    overflow, say, or a sensor that warms up. What moves a frame moves all of its channels: of a
+    mosaic one number an exposure says so.
 
     Parameters
     ----------
@@ -34,31 +42,30 @@ def grown(state: State, kind: str, without: Array) -> Denial | None:
     if kind not in _OFFSETS:
         return None
     times = {e.name: e.exposure_time_s for e in state.setting.layout.exposures}
-    changes, excess, errors, time_s = [], [], [], []
-    calls = set(CANDIDATES[kind].calls) - {"level"}
-    for i, key in enumerate(state.vector.keys):
-        if key.statistic not in calls or key.exposure not in times:
-            continue
-        if not state.null.known[i]:
-            continue
-        # Numbers are cube roots of variances relative to noise.
-        mean = float(state.null.mean[i])
-        changes.append(mean**3 - float(without[i]) ** 3)
-        excess.append(float(state.vector.values[i]) ** 3 - float(without[i]) ** 3)
-        errors.append(3 * max(mean, _LEAST_NUMBER) ** 2 * float(state.null.sd[i]))
-        time_s.append(times[key.exposure])
-    error, shape = np.array(errors), np.array(changes)
-    seen, alike = np.array(excess) / error, shape / error
-    growing = alike * np.square(time_s)
+    asked = [(i, key) for i, key in enumerate(state.vector.keys)
+             if key.statistic == _OFFSETS[kind] and key.exposure in times and not key.detail
+             and state.null.known[i] and np.isfinite(without[i])]  # fmt: skip
+    common = kind == "black_level_drift" and any(key.scope == MOSAIC for _, key in asked)
+    asked = [(i, key) for i, key in asked if key.scope == (MOSAIC if common else "exposure")]
+    if not asked:
+        return None
+    places = [i for i, _ in asked]
+    # Numbers are cube roots of variances relative to noise.
+    mean, before = state.null.mean[places], without[places]
+    error = 3 * np.maximum(mean, LEAST_NUMBER) ** 2 * state.null.sd[places]
+    seen = (state.vector.values[places] ** 3 - before**3) / error
+    alike = (mean**3 - before**3) / error
+    growing = alike * np.square([times[key.exposure] for _, key in asked])
     behind = (_left(seen, alike) - _left(seen, growing)) / 2
-    if not behind > TOLD_APART:
+    beside = (_left(seen, growing) - _left(seen, growing, alike)) / 2
+    if not behind > TOLD_APART >= beside:
         return None
     why = "it grows with exposure time, as no offset does"
     return Denial(1 / (1 + exp(min(behind, 700.0))), why)
 
 
-def _left(seen: Array, shape: Array) -> float:
-    """Return the square sum that a shape of the best size, if any, leaves."""
-    square = float(shape @ shape)
-    size = max(float(seen @ shape) / square, 0.0) if square > 0 else 0.0
-    return float(np.square(seen - size * shape).sum())
+def _left(seen: Array, *shapes: Array) -> float:
+    """Return the square sum that shapes of the best sizes, none below 0, leave."""
+    largest = [max(float(np.abs(shape).max()), 1e-300) for shape in shapes]
+    design = np.stack([shape / size for shape, size in zip(shapes, largest, strict=True)], 1)
+    return float(nnls(design, seen)[1]) ** 2

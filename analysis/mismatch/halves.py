@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import helmert
 
 from analysis.mismatch.bank.linemeans import PARTS
 from analysis.mismatch.contradicted import Denial, rival
@@ -14,13 +15,13 @@ from dsis.effects.row_banding import RowBanding
 
 Array = NDArray[np.float64]
 _SIZES = np.geomspace(0.1, 3.0, 16)  # of the scatter of parts that is seen
-_WHOLE = (0.0, 0.3, 1.0)  # of it, by which frames may move as a whole besides
+_CONTRASTS = helmert(PARTS)  # (contrast, part): orthonormal, of what is left without the mean
 _LENGTHS = np.geomspace(1 / 24, 2.0, 10)  # of a frame, over which bands last
 
 
 @dataclass(frozen=True)
 class _Moved:
-    """How parts of the frames of an exposure move: covariance (part, part), DN^2.
+    """How parts of the frames of an exposure move: covariance (contrast, contrast), DN^2.
 
     `noise` is that of one part, `free` the degrees of freedom.
     """
@@ -35,15 +36,15 @@ def halved(state: State, effect: Effect) -> Denial | None:
 
     Where two amplifiers read a frame, or one that is reset in its middle, rows are as alike as in a
     band that lasts for half of a frame, but for the step between them. Asked are the means of parts
-    of each frame, by the likelihood of normal ones: where halves that move, each as a whole, are as
-    likely as bands of any length, frames besides, there may be none.
+    of each frame less that of the frame, by the likelihood of normal ones: where halves that move,
+    each as a whole, are as likely as bands of any length, there may be none.
     """
     if not isinstance(effect, RowBanding):
         return None
     moved = list(_moving(state))
     if not moved:
         return None
-    unit = max(float(np.trace(own.covariance)) / PARTS for own in moved)
+    unit = max(float(np.trace(own.covariance)) / len(own.covariance) for own in moved)
     half = np.where(np.arange(PARTS) < PARTS / 2, 1.0, -1.0)
     apart = np.abs(np.subtract.outer(np.arange(PARTS), np.arange(PARTS))) / PARTS
     halves = _likeliest(moved, unit, [np.outer(half, half)])
@@ -54,28 +55,27 @@ def halved(state: State, effect: Effect) -> Denial | None:
 def _moving(state: State) -> Iterator[_Moved]:
     for exposure in state.setting.layout.uniform:
         own = state.setting.seen.lines.get((exposure.name, "row"))
-        if own is None or own.frames < 2 or own.fixed.size < PARTS:
+        if own is None or own.frames < 2 or own.fixed.size < PARTS or not own.noise_dn2 > 0:
             continue
-        moved = own.parts - own.parts.mean(0)
+        moved = (own.parts - own.parts.mean(0)) @ _CONTRASTS.T
         noise = own.noise_dn2 * PARTS / own.fixed.size
         free = own.frames - 1
         yield _Moved(moved.T @ moved / free, noise, free)
 
 
 def _likeliest(moved: Sequence[_Moved], unit: float, shapes: Sequence[Array]) -> float:
-    """Return the largest log-likelihood of covariances of some shape and size, DN^2.
+    """Return the largest log-likelihood of covariances (part, part) of some shape and size, DN^2.
 
-    Beside noise, and what frames move by as a whole.
+    Beside noise.
     """
-    best = -np.inf
+    best, white = -np.inf, np.eye(len(_CONTRASTS))
     for shape in shapes:
-        for whole in _WHOLE:
-            made = unit * (_SIZES[:, np.newaxis, np.newaxis] ** 2 * shape + whole**2)
-            total: Array = np.zeros(_SIZES.size)
-            for own in moved:
-                expected = made + own.noise * np.eye(PARTS)
-                _, logs = np.linalg.slogdet(expected)
-                fits = np.linalg.solve(expected, np.broadcast_to(own.covariance, expected.shape))
-                total -= own.free / 2 * (logs + np.trace(fits, axis1=1, axis2=2))
-            best = max(best, float(total.max()))
+        made = unit * _SIZES[:, np.newaxis, np.newaxis] ** 2 * (_CONTRASTS @ shape @ _CONTRASTS.T)
+        total: Array = np.zeros(_SIZES.size)
+        for own in moved:
+            expected = made + own.noise * white
+            _, logs = np.linalg.slogdet(expected)
+            fits = np.linalg.solve(expected, np.broadcast_to(own.covariance, expected.shape))
+            total -= own.free / 2 * (logs + np.trace(fits, axis1=1, axis2=2))
+        best = max(best, float(total.max()))
     return best

@@ -13,13 +13,15 @@ _MAPS = {"dsnu": "offset", "prnu": "gain"}
 _CALL = "fixed_patch_variance"
 _INSIDE = 0.5  # of a patch's depth, up to which pixels belong to it
 _MOST = 0.5  # of a pattern's variance, that patches may make
+_SURE = 4.0  # standard errors of the variance of the other pixels, from which there is a pattern
 
 
 def in_patches(state: State, kind: str) -> Denial | None:
     """Return how a pattern of all pixels is denied by few patches; None: it is not.
 
     Where pixels that lie together are left alike, and outside of the patches that a map shows half
-    of its variance beyond noise is left, or less, all pixels may be alike but for them.
+    of its variance beyond noise is left, or less, and not for sure, all pixels may be alike but for
+    them.
     """
     if kind not in _MAPS or all(m.statistic != _CALL for m in state.mismatches):
         return None
@@ -38,7 +40,8 @@ def in_patches(state: State, kind: str) -> Denial | None:
         return None
     square = np.square(part.pixels)
     whole, rest = part.square - 1, part.square * float(square[~covered].mean() / square.mean()) - 1
-    if whole <= 0 or rest >= _MOST * whole:
+    sure = _SURE * (2 / np.count_nonzero(~covered)) ** 0.5
+    if whole <= 0 or rest >= min(_MOST * whole, sure):
         return None
     return Denial(max(rest / whole, 0.0), "few patches make most of what it would explain")
 

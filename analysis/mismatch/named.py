@@ -77,7 +77,7 @@ def unclear(named: Named) -> str:
     """Return why an effect is not told from none by its own size; empty: it is.
 
     Asked of what draws nothing at random, whose size is known as a mean is. Where an error is
-    unknown, or is that of a shape, nothing is said.
+    unknown, or is that of a shape which is sure itself, nothing is said.
     """
     effect = None if named.proposal is None else named.proposal.effect
     if named.proposal is None or effect is None or effect.draws:
@@ -86,7 +86,7 @@ def unclear(named: Named) -> str:
     sizes = {
         name: (float(getattr(effect, name)), named.errors.get(name, inf))
         for name in free
-        if name not in SHAPES and _FAR_FROM_LEVELS.get(name) not in free
+        if name not in SHAPES and not _sure(named, effect, _FAR_FROM_LEVELS.get(name, ""))
     }
     if not sizes or any(
         not isfinite(error) or abs(value) > _CLEAR * error for value, error in sizes.values()
@@ -97,6 +97,12 @@ def unclear(named: Named) -> str:
         for name, (value, error) in sizes.items()
     )
     return f"its size is less than {_CLEAR:g} of its standard errors ({said})"
+
+
+def _sure(named: Named, effect: Effect, shape: str) -> bool:
+    """Return whether a shape was fitted, and is known."""
+    fitted = named.proposal is not None and shape in named.proposal.free
+    return fitted and abs(float(getattr(effect, shape))) > _CLEAR * named.errors.get(shape, inf)
 
 
 def renewed(named: Named, proposal: Proposal, effect: Effect, errors: dict[str, float]) -> Named:

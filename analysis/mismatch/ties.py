@@ -83,8 +83,12 @@ def twin(
 def by_numbers(
     state: State, users: BaseNoise, fitted: Sequence[Ranked], rival: Ranked | Path
 ) -> list[Ranked] | None:
-    """Return effects, first that of two that tie with which the user's numbers hold; None: none."""
-    if not isinstance(rival, Ranked):
+    """Return effects, first that of two that tie with which the user's numbers hold; None: none.
+
+    Nothing is said of a rival that is named already.
+    """
+    named = {own.kind for own in state.camera.effect}
+    if not isinstance(rival, Ranked) or rival.kind in named:
         return None
     best, *others = fitted
     if hold_with(state, users, best, rival):

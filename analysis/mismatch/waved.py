@@ -1,6 +1,6 @@
 """Lines that differ as a wave that stands still makes them."""
 
-from math import hypot, log
+from math import exp, log
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +13,10 @@ from analysis.mismatch.state import State
 Array = NDArray[np.float64]
 _AXES = {"row_fpn": 1, "row_prnu": 1, "column_fpn": 0, "column_prnu": 0}
 _GAINS = frozenset({"row_prnu", "column_prnu"})
-_BESIDE = 1  # bins to each side that a wave between them is seen in
+_BESIDE = 2  # bins to each side that a wave between them is seen in
 _LEAST_BINS = 16
-_LITTLE, _SURE = 0.1, 3.0  # of what lines differ by, that no wave makes; standard errors
+_SURE = 3.0  # standard errors of what no wave makes
+_CHANCE = 0.01  # that a bin of equal ones stands out so far
 
 
 def waved(state: State, kind: str) -> Denial | None:
@@ -23,13 +24,13 @@ def waved(state: State, kind: str) -> Denial | None:
 
     Offsets and gains that are drawn for each line have the same power at all frequencies. A wave
     nearly along an axis, as a display throws it on a sensor, is left in the means of lines too:
-    where one is left unexplained, and without the highest bin of these means and those beside it
-    little is surely left of what they differ by, lines may be alike but for it.
+    where one is left unexplained, a bin of these means stands out for sure, and without it and
+    those beside it nothing is surely left of what they differ by, lines may be alike but for it.
     """
     if kind not in _AXES or all(m.statistic != NAME for m in state.mismatches):
         return None
-    name, whole, rest = "gain" if kind in _GAINS else "offset", 0.0, 0.0
-    error = 0.0
+    name = "gain" if kind in _GAINS else "offset"
+    levels, errors, clear = [], [], False
     images = state.setting.seen.images
     for channel in sorted({channel for channel, _ in images}):
         own = images.get((channel, f"{name} alone"), images.get((channel, name)))
@@ -44,11 +45,10 @@ def waved(state: State, kind: str) -> Denial | None:
         top = int(power.argmax())
         left = np.delete(power, slice(max(top - _BESIDE, 0), top + _BESIDE + 1))
         # What is left of n exponential variates without the highest and some others.
-        expected = left.size + 1 - log(power.size) - np.euler_gamma
-        whole += float(power.mean()) - 1
-        level = float(left.sum()) / expected
-        rest += level - 1
-        error = hypot(error, level / left.size**0.5)
-    if whole <= 0 or rest - _SURE * error > _LITTLE * whole:
+        level = float(left.sum()) / (left.size + 1 - log(power.size) - np.euler_gamma)
+        clear |= power.size * exp(-float(power[top]) / max(level, 1.0)) < _CHANCE
+        levels.append(level - 1)
+        errors.append(left.size**-0.5)
+    if not clear or sum(levels) > _SURE * float(np.linalg.norm(errors)):
         return None
-    return Denial(max(rest / whole, 0.0), "a wave that stands still makes most of it")
+    return Denial(0.0, "a wave that stands still makes most of it")

@@ -99,7 +99,10 @@ def _exchanged(clues: Clues) -> float:
 
 
 def _filtering(clues: Clues) -> Sequence[Proposal]:
-    """Propose a kernel of four neighbours, of two where axes differ, and with the diagonals."""
+    """Propose a kernel of four neighbours, of two where axes differ, and with the diagonals.
+
+    Of a mosaic no number says how alike diagonal neighbours of one colour are: there are none.
+    """
     mono = clues.layout.channels == ("MONO",)
     names = (_ALONG_ROWS, _ALONG_COLUMNS) if mono else ("correlation_0_2", "correlation_2_0")
     (across, error), (down, other) = (clues.amplitude(name, alike) for name in names)
@@ -152,7 +155,8 @@ def _memory(clues: Clues) -> Sequence[Proposal]:
             lag_pixels=lag,
             along=axis,
         )
-        found += [replace(one, best_of=len(means)) for one in start]
+        # Its size, and which of so many lags it is.
+        found += [replace(one, best_of=len(means), errors={"lag_pixels": 0.0}) for one in start]
     return found
 
 

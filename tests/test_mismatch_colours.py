@@ -24,8 +24,18 @@ def _shared(charge: Array, axis: int, fraction: float) -> Array:
     return here + fraction * (np.roll(charge, 1, axis) + np.roll(charge, -1, axis))
 
 
-def _state(model: Any, *, axis: int = 2, fraction: float = 0.0, greens: float = 0.0) -> Any:
-    """Return a state of a mosaic under light of three colours; `greens` differ by that share."""
+def _state(
+    model: Any,
+    *,
+    axis: int = 2,
+    fraction: float = 0.0,
+    greens: float = 0.0,
+    memory: float = 0.0,
+) -> Any:
+    """Return a state of a mosaic under light of three colours; `greens` differ by that share.
+
+    `memory`: share of the sample three before along the axis that is read once more, light and all.
+    """
     recording = recorded(camera(cfa="RGGB"), 5, levels=LEVELS, lit=False)
     assert recording.stacks is not None
     rng = np.random.default_rng(8)
@@ -37,13 +47,15 @@ def _state(model: Any, *, axis: int = 2, fraction: float = 0.0, greens: float = 
             mean[:, y::2, x::2] = level * COLOURS[site[0]] * own
         charge = mean + (SLOPE * mean) ** 0.5 * rng.standard_normal(frames.shape)
         read = READ**0.5 * rng.standard_normal(frames.shape)
-        made = BLACK + _shared(charge, axis, fraction) + read
+        made = _shared(charge, axis, fraction) + read
+        made += BLACK + memory * np.roll(made, 3, axis)
         recording.stacks[name] = np.rint(made).clip(0, 4095).astype(np.uint16)
     return state_of(recording, camera(*model, cfa="RGGB"))
 
 
 def _said(state: Any) -> Any:
-    without = state.camera.model_copy(update={"effect": ()})
+    others = tuple(e for e in state.camera.effect if e.kind != "channel_imbalance")
+    without = state.camera.model_copy(update={"effect": others})
     return displaced(state, "channel_imbalance", state.null.mean, state.predictor(8).mean(without))
 
 
@@ -57,6 +69,26 @@ def test_what_colours_share_makes_the_greens_differ(axis: int, sign: int) -> Non
     assert denial is not None
     assert denial.share < 0.4
     assert "other colours" in denial.why
+
+
+@pytest.mark.parametrize(("axis", "along", "sign"), [(2, "rows", 1), (1, "columns", -1)])
+def test_what_samples_remember_of_other_colours_makes_the_greens_differ(
+    axis: int, along: str, sign: int
+) -> None:
+    share = -0.03
+    percent = 100 * share * sign * (COLOURS["R"] - COLOURS["B"])
+    greens = registry()["channel_imbalance"](gain_percent=percent)
+    own = {"fraction": share, "lag_pixels": 3, "along": along}
+    memory = registry()["readout_memory"](**own)
+    denial = _said(_state([memory, greens], axis=axis, memory=share))
+    assert denial is not None
+    assert denial.share < 0.4
+    assert "remember" in denial.why
+    # Four before is of the same colour, and greens that differ by more do so by themselves.
+    even = registry()["readout_memory"](**{**own, "lag_pixels": 4})
+    assert _said(_state([even, greens], axis=axis, greens=percent / 100)) is None
+    strong = registry()["channel_imbalance"](gain_percent=5 * percent)
+    assert _said(_state([memory, strong], axis=axis, greens=percent / 20)) is None
 
 
 def test_greens_that_differ_by_themselves_are_not_denied() -> None:

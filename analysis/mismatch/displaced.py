@@ -29,6 +29,7 @@ from analysis.mismatch.state import State
 from analysis.mismatch.straight import curves, misfit, misfits, upwards
 from analysis.mismatch.wholeframes import of_moving_parts
 from analysis.mismatch.wholelines import of_parts
+from dsis.effects.readout_memory import ReadoutMemory
 
 Array = NDArray[np.float64]
 _BENDS = frozenset({"nonlinearity", "dual_gain", "dual_gain_mismatch"})
@@ -80,8 +81,11 @@ def displaced(state: State, kind: str, mean: Array, without: Array | None = None
     if kind in _SAID:
         denial = of_few_lines(state, kind, without) or _SAID[kind](state)
         return denial or of_alike_samples(state, kind, mean, without)
-    denial = _of_colours(state, mean - without) if kind in _GREENS else None
-    denial = denial or of_moving_parts(state, kind, without)
+    if kind in _GREENS:
+        denial = _of_colours(state, mean - without) or _of_memory(state, mean - without)
+        if denial is not None:
+            return denial
+    denial = of_moving_parts(state, kind, without)
     denial = denial or of_late_light(state, kind) or shared_otherwise(state, kind, without)
     return denial or no_brighter_alike(state, kind, without)
 
@@ -220,9 +224,46 @@ def _of_colours(state: State, change: Array) -> Denial | None:
     noise has a correlation r share about r / 2: along rows Gr / Gb departs by r (R - B) / G, along
     columns by as much the other way. `change` is what the effect makes of the numbers.
     """
-    left, keys = left_open(state, ("correlation_0_1", "correlation_1_0")), state.vector.keys
-    if not left or set(_BESIDE) != set(state.setting.layout.channels):
+    left = left_open(state, _ADJACENT)
+    if not left:
         return None
+
+    def shared(exposure: str) -> float:
+        rows, columns = (
+            np.mean([left.get(((exposure, c), name), (0.0, 0.0))[0] for c in _BESIDE])
+            for name in _ADJACENT
+        )
+        return float(rows - columns)
+
+    why = "neighbours of other colours are alike, and what they share makes the greens differ"
+    return _greens(state, change, shared, why)
+
+
+def _of_memory(state: State, change: Array) -> Denial | None:
+    """Return how greens that differ are denied by memory of other colours; None: they are not.
+
+    A read-out may remember light as it does noise: of a share f of a sample that is an odd number
+    of pixels before, along rows, Gr has f R and Gb has f B; along columns the other way round.
+    """
+    share = sum(
+        own.fraction if own.along == "rows" else -own.fraction
+        for own in state.camera.effect
+        if isinstance(own, ReadoutMemory) and own.lag_pixels % 2
+    )
+    if not share:
+        return None
+    why = "samples remember those of another colour, which makes the greens differ"
+    return _greens(state, change, lambda _: share, why)
+
+
+def _greens(state: State, change: Array, shared: Callable[[str], float], why: str) -> Denial | None:
+    """Return how greens that differ are denied by what Gr has of red and Gb of blue; None: not.
+
+    `shared` gives the share by the exposure's name; see `_of_colours`.
+    """
+    if set(_BESIDE) != set(state.setting.layout.channels):
+        return None
+    keys = state.vector.keys
     clear = np.where(state.null.known & np.isfinite(change), change, 0.0) / state.null.sd
     of_halves = np.array([key.statistic in ("parity", "half_seam") for key in keys])
     halves = float((clear[of_halves] ** 2).sum())
@@ -231,17 +272,12 @@ def _of_colours(state: State, change: Array) -> Denial | None:
         if key.statistic != "channel_ratio" or key.scope != "exposure" or not clear[i]:
             continue
         red, *greens, blue = (max(signals[key.exposure, c], 0.0) for c in _BESIDE)
-        rows, columns = (
-            np.mean([left.get(((key.exposure, c), name), (0.0, 0.0))[0] for c in _BESIDE])
-            for name in ("correlation_0_1", "correlation_1_0")
-        )
         if sum(greens) > 0:
-            made = float(rows - columns) * (red - blue) * 2 / sum(greens)
+            made = shared(key.exposure) * (red - blue) * 2 / sum(greens)
             seen += float(clear[i]) ** 2
             fake += float(clear[i]) * made / float(state.null.sd[i])
     if fake <= _MOST * seen or seen <= halves:  # which tell amplifiers by more
         return None
-    why = "neighbours of other colours are alike, and what they share makes the greens differ"
     return Denial(max(1 - fake / seen, 0.0), why)
 
 

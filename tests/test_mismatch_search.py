@@ -28,6 +28,7 @@ STATE: Any = SimpleNamespace(
     vector=SimpleNamespace(keys=(), values=()),
     predictor=lambda _: None,
     mismatches=(),
+    camera=SimpleNamespace(effect=()),
     calibrated=SimpleNamespace(fit=SimpleNamespace(signal_dn={})),
     setting=SimpleNamespace(
         layout=SimpleNamespace(rows=64, columns=96, uniform=(), channels=()),
@@ -59,7 +60,7 @@ def _search(**values: Any) -> Search:
     )
     bare: dict[str, Any] = {
         "setting": SimpleNamespace(nulls=16, drafts=16, layout=None, large=False, given=0),
-        "camera": SimpleNamespace(effect=()),
+        "camera": SimpleNamespace(effect=(), noise=None),
         "base": None,
         "vocabulary": vocabulary,
         "step": lambda: None,

@@ -13,8 +13,8 @@ from dsis.camera import BaseNoise
 _HOLD, _WRONG = 0.01, 1e-4  # chance of numbers that are farther off
 
 
-def hold_with(state: State, users: BaseNoise, one: Ranked, other: Ranked) -> bool:
-    """Return whether the user's numbers speak for one effect, and against another that ties.
+def preferred(state: State, users: BaseNoise, one: Ranked, other: Ranked) -> Ranked | None:
+    """Return the one of two effects that tie which the user's numbers speak for; None: neither.
 
     Two effects may explain the same but for what one does to the variance of all pixels, which a
     model of another slope does as well. Where a camera model says that slope, wrongly as it seems
@@ -23,9 +23,12 @@ def hold_with(state: State, users: BaseNoise, one: Ranked, other: Ranked) -> boo
     have been measured in such frames.
     """
     if not _chance(users, state.calibrated) < _WRONG:
-        return False
-    with_one, with_other = (_beside(state, users, ranked) for ranked in (one, other))
-    return with_one > _HOLD and with_other < _WRONG
+        return None
+    chances = [(_beside(state, users, ranked), ranked) for ranked in (one, other)]
+    for (chance, ranked), (against, _) in (chances, chances[::-1]):
+        if chance > _HOLD and against < _WRONG:
+            return ranked
+    return None
 
 
 def _beside(state: State, users: BaseNoise, ranked: Ranked) -> float:

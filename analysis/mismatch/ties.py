@@ -3,7 +3,7 @@
 from collections.abc import Callable, Container, Sequence
 from dataclasses import replace
 
-from analysis.mismatch.basenumbers import hold_with
+from analysis.mismatch.basenumbers import preferred
 from analysis.mismatch.instance import frequency_of, same_line
 from analysis.mismatch.memory import Memory
 from analysis.mismatch.rank import TOLD_APART, Ranked, alike, ranked
@@ -91,10 +91,11 @@ def by_numbers(
     if not isinstance(rival, Ranked) or rival.kind in named:
         return None
     best, *others = fitted
-    if hold_with(state, users, best, rival):
+    first = preferred(state, users, best, rival)
+    if first is best:
         return list(fitted)
     behind = [one for one in others if one is not rival]
-    if len(behind) < len(others) and hold_with(state, users, rival, best):
+    if first is rival and len(behind) < len(others):
         return [replace(rival, gain=best.gain), best, *behind]
     return None
 

@@ -185,6 +185,34 @@ def test_readout_memory_remembers_a_shifted_mean() -> None:
     assert abs(stack[:, :, :2].mean() - 900) < Z_MAX * 2.1 / np.sqrt(stack[:, :, :2].size)
 
 
+@pytest.mark.parametrize(("along", "lag"), [("rows", (0, 3)), ("columns", (3, 0))])
+@pytest.mark.parametrize("fraction", [0.2, -0.2])
+def test_a_memory_of_the_signal_is_a_kernel_on_one_side(
+    along: str, lag: tuple[int, int], fraction: float
+) -> None:
+    """Foreign oracle: scipy's causal filter (1 - f, 0, 0, f), but for the first samples."""
+    own = {"fraction": fraction, "lag_pixels": 3, "along": along, "remembers": "signal"}
+    image = white(mean=700.0)
+    made = apply(effect("readout_memory", **own), image, expected=0.0)  # whatever was expected
+    axis = 1 if along == "rows" else 0
+    by_scipy = scipy.signal.lfilter([1 - fraction, 0, 0, fraction], [1], image, axis=axis)
+    first = np.s_[:, :3] if axis else np.s_[:3]
+    by_scipy[first] = image[first]
+    np.testing.assert_allclose(made, by_scipy, rtol=2e-6)
+    kernel = (1 - fraction) ** 2 + fraction**2
+    assert abs(made.var() / image.var() - kernel) < Z_MAX * np.sqrt(2) / SIDE
+    rho = fraction * (1 - fraction) / kernel
+    assert abs(correlation(made, *lag) - rho) < Z_MAX * CORRELATION_ERROR
+
+
+def test_a_memory_of_the_signal_mixes_colours_where_its_lag_is_odd() -> None:
+    light = np.tile([[400.0, 100.0], [100.0, 50.0]], (8, 8))
+    for lag, expected in ((1, [[370.0, 130.0], [95.0, 55.0]]), (2, light[:2, :2])):
+        own = {"fraction": 0.1, "lag_pixels": lag, "remembers": "signal"}
+        made = apply(effect("readout_memory", **own), light)
+        np.testing.assert_allclose(made[:2, lag + lag % 2 :][:, :2], expected, rtol=1e-6)
+
+
 def _of_a_sawtooth(mean: float, sd: float, period: float, at: float) -> tuple[float, float, float]:
     """Return mean, mean square and mean slope of frac((c - at) / period) - 1/2 of normal codes c.
 

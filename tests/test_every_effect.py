@@ -55,7 +55,12 @@ STRONG: dict[str, tuple[dict[str, object], ...]] = {
         {"step_dn": 6.0, "phase_dn": 5},
         {"step_dn": 30.0, "phase_dn": 17},
     ),
-    "readout_memory": ({"fraction": 0.8}, {"fraction": 0.8, "lag_pixels": 1, "along": "columns"}),
+    "readout_memory": (
+        {"fraction": 0.8},
+        {"fraction": 0.8, "lag_pixels": 1, "along": "columns"},
+        {"fraction": 0.1, "remembers": "signal"},
+        {"fraction": -0.1, "lag_pixels": 1, "along": "columns", "remembers": "signal"},
+    ),
     "row_banding": ({"sigma_dn": 20.0}, {"sigma_dn": 20.0, "length_rows": 20.0}),
     "rts": (
         {"amplitude_dn": 60.0, "pixel_fraction": 0.5, "switch_probability": 0.02},

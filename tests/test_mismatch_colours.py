@@ -87,6 +87,9 @@ def test_what_samples_remember_of_other_colours_makes_the_greens_differ(
     # Four before is of the same colour, and greens that differ by more do so by themselves.
     even = registry()["readout_memory"](**{**own, "lag_pixels": 4})
     assert _said(_state([even, greens], axis=axis, greens=percent / 100)) is None
+    # Memory of the signal has its part in what is predicted already.
+    whole = registry()["readout_memory"](**own, remembers="signal")
+    assert _said(_state([whole, greens], axis=axis, greens=percent / 100)) is None
     strong = registry()["channel_imbalance"](gain_percent=5 * percent)
     assert _said(_state([memory, strong], axis=axis, greens=percent / 20)) is None
 

@@ -1,5 +1,7 @@
 """Whether the numbers of a camera's base model hold beside an effect."""
 
+from collections.abc import Sequence
+from dataclasses import replace
 from math import isfinite, nan
 
 from scipy.stats import chi2
@@ -9,8 +11,10 @@ from analysis.mismatch.rank import Ranked
 from analysis.mismatch.recalibrate import Calibrated
 from analysis.mismatch.state import State
 from dsis.camera import BaseNoise
+from dsis.effects.readout_memory import ReadoutMemory
 
 _HOLD, _WRONG = 0.01, 1e-4  # chance of numbers that are farther off
+_SMALL = 0.5  # share of noise beyond which there is no such share of the signal
 
 
 def preferred(state: State, users: BaseNoise, one: Ranked, other: Ranked) -> Ranked | None:
@@ -29,6 +33,35 @@ def preferred(state: State, users: BaseNoise, one: Ranked, other: Ranked) -> Ran
         if chance > _HOLD and against < _WRONG:
             return ranked
     return None
+
+
+def of_what(state: State, users: BaseNoise, fitted: Sequence[Ranked]) -> list[Ranked]:
+    """Return ranked effects; a memory is of the signal where the user's numbers say so.
+
+    What is remembered of the noise alone adds to variances; a share of the signal that takes the
+    place of as much of it lessens them, and correlates the same. Of samples of one colour nothing
+    else tells the two apart: where numbers are wrong beside the first and hold beside the second,
+    it is that. Of the nearest sample of a colour a filter says so, see `preferred`.
+    """
+    return [_of_signal(state, users, one) for one in fitted]
+
+
+def _of_signal(state: State, users: BaseNoise, ranked: Ranked) -> Ranked:
+    (effect, *others), layout = ranked.polished.effects, state.setting.layout
+    if not isinstance(effect, ReadoutMemory) or effect.remembers != "noise":
+        return ranked
+    apart = 1 if layout.channels == ("MONO",) else 2
+    mixed, filtered = effect.lag_pixels % apart, effect.lag_pixels == apart and effect.fraction > 0
+    if mixed or filtered or abs(effect.fraction) >= _SMALL:
+        return ranked
+    if not _chance(users, state.calibrated) < _WRONG:
+        return ranked
+    share = effect.fraction / (1 + effect.fraction)  # of (1 - s, s), in proportion 1 to f
+    signal = effect.model_copy(update={"fraction": share, "remembers": "signal"})
+    polished = replace(ranked.polished, effects=(signal, *others))
+    other = replace(ranked, polished=polished)
+    wrong = _beside(state, users, ranked) < _WRONG
+    return other if wrong and _beside(state, users, other) > _HOLD else ranked
 
 
 def _beside(state: State, users: BaseNoise, ranked: Ranked) -> float:

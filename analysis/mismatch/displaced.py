@@ -248,7 +248,7 @@ def _of_memory(state: State, change: Array) -> Denial | None:
     share = sum(
         own.fraction if own.along == "rows" else -own.fraction
         for own in state.camera.effect
-        if isinstance(own, ReadoutMemory) and own.lag_pixels % 2
+        if isinstance(own, ReadoutMemory) and own.remembers == "noise" and own.lag_pixels % 2
     )
     if not share:
         return None

@@ -7,6 +7,7 @@ from math import log
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.mismatch.basenumbers import of_what
 from analysis.mismatch.candidates import CANDIDATES, measured
 from analysis.mismatch.contradicted import refuted
 from analysis.mismatch.credited import joined, kept_up
@@ -291,7 +292,8 @@ class Search(Fitted):
             if len(self.settled) > len(settled):
                 continue  # a line was refused: behind it another may be
             before = len(self.doubted)
-            fitted = as_shown(state, self.lines, plainest(state, fitted))
+            fitted = of_what(state, self.camera.noise, plainest(state, fitted))
+            fitted = as_shown(state, self.lines, fitted)
             fitted = self._undoubted(state, fitted)
             if len(self.doubted) > before:
                 continue  # all that was fitted of a kind is denied: others were too far behind it

@@ -9,22 +9,30 @@ from pydantic import Field
 from dsis.compiled import kernel
 from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, Stage
 
+_NOISE: Literal["noise"] = "noise"
+
 
 class ReadoutMemory(Effect):
-    """The noise of the sample read some pixels earlier along a line is seen once more.
+    """Of the sample read some pixels earlier along a line a share is seen once more.
 
-    v'(i) = v(i) + f n(i - lag), n = v - S the deviation from the expected signal, which the clamp,
-    the correlated double sampling or the converter bank has in common. A negative fraction takes
-    noise away. Correlation f / (1 + f^2) at that lag and at no other; the first samples of a line
-    have nothing to remember. S is what the light alone gives: where charge is bent, exchanged or
-    cut (nonlinearity, crosstalk, saturation) or offsets are fixed, v - S has a mean, of which f is
-    remembered like the noise, and the level shifts.
+    Of its noise, v'(i) = v(i) + f n(i - lag), n = v - S the deviation from the expected signal,
+    which the clamp, the correlated double sampling or the converter bank has in common. A negative
+    fraction takes noise away. Correlation f / (1 + f^2) at that lag and at no other; the first
+    samples of a line have nothing to remember. S is what the light alone gives: where charge is
+    bent, exchanged or cut (nonlinearity, crosstalk, saturation) or offsets are fixed, v - S has a
+    mean, of which f is remembered like the noise, and the level shifts.
+
+    Or, where it `remembers` the signal, of all of it: v'(i) = v(i) + f (v(i - lag) - v(i)), as of
+    an amplifier that has not settled, or of charge that stays behind. A flat of one colour keeps
+    its level; colours mix where the lag is odd, edges blur. Correlation f (1 - f) / ((1 - f)^2 +
+    f^2), variance times (1 - f)^2 + f^2.
     """
 
     kind: Literal["readout_memory"] = "readout_memory"
     fraction: Annotated[float, Field(gt=-1, lt=1, examples=[0.1])]
     lag_pixels: Annotated[int, Field(ge=1, examples=[2])]
     along: Literal["rows", "columns"] = "rows"
+    remembers: Annotated[Literal["noise", "signal"], Field(exclude_if=_NOISE.__eq__)] = _NOISE
 
     stage: ClassVar[Stage] = Stage.READ_OUT
     rank: ClassVar[int] = 50
@@ -35,7 +43,7 @@ class ReadoutMemory(Effect):
     )
     measures: ClassVar[frozenset[str]] = frozenset(
         {
-            "level",  # where other effects moved the mean from the expected signal
+            "level",  # where other effects moved the mean from the expected signal, or colours mix
             "pixel_variance",
             "row_variance",
             "column_variance",
@@ -56,7 +64,9 @@ class ReadoutMemory(Effect):
     )
 
     def apply(self, image: Image, exposure: Exposure) -> Image:
-        """Add the remembered noise."""
+        """Add what is remembered."""
+        if self.remembers == "signal":
+            return self._mixed(image)
         along_rows, rows = self.along == "rows", len(image)
         lag = self.lag_pixels * (image[0, 0].size if along_rows else 1)
         return _remembering(
@@ -66,16 +76,29 @@ class ReadoutMemory(Effect):
             (0, lag) if along_rows else (lag, 0),
         ).reshape(image.shape)
 
+    def _mixed(self, image: Image) -> Image:
+        k, made = self.lag_pixels, image.copy()
+        here, before = np.s_[k:], np.s_[:-k]
+        if self.along == "rows":
+            here, before = np.s_[:, k:], np.s_[:, :-k]
+        made[here] += np.float32(self.fraction) * (image[before] - image[here])
+        return made
+
     def reach_pixels(self) -> int:
         """Return how far away a pixel may matter."""
         return self.lag_pixels
 
     def contributions(self, point: OperatingPoint) -> Mapping[str, float]:
-        """Return f^2 V for the variance and f V for the covariance at the lag."""
+        """Return f^2 V for the variance and f V for the covariance at the lag; of all, a kernel's.
+
+        Under light alike for all colours.
+        """
         v = point.shot_variance_dn2 + point.read_variance_dn2
         f, k = self.fraction, self.lag_pixels
         across = point.columns if self.along == "rows" else point.rows
         lag = (0, k) if self.along == "rows" else (k, 0)
+        if self.remembers == "signal":
+            return point.filtered(v, {(0, 0): 1 - f, lag: f}) | {"level": 0.0}
         noise = point.coupled({(0, 0): v * f**2 * max(across - k, 0) / across, lag: v * f})
         return noise | {"level": 0.0}  # of the effect alone
 

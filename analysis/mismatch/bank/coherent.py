@@ -122,8 +122,9 @@ class SpectrumSums:
             inner = self.power[1:, 1 : (m + 1) // 2]
             found["spectral_peak"] = _largest(inner, degrees, edge)
             found |= self._further(degrees)
-            found["column_spectrum_peak"] = _largest(_line(self.columns), degrees)
-            found["column_spectrum_peak of colour"] = of_colour(_line(self.columns)[0], degrees)
+            columns = _line(self.columns, m)
+            found["column_spectrum_peak"] = _largest(columns, degrees)
+            found["column_spectrum_peak of colour"] = of_colour(columns[0], degrees)
             found |= self._lags()
             found |= self._corners(degrees)
         for key, label in (("", "row_spectrum_peak"), ("signal", "row_spectrum_peak of light")):
@@ -198,7 +199,7 @@ class SpectrumSums:
         total, m = self.weight[""][0], self.shape[1]
         if not total or m < 4:
             return None
-        inner = _line(self.columns)[0] / total
+        inner = _line(self.columns, m)[0] / total
         place = clearest_bin(inner, self.degrees(""))
         across = place + 1 + _within_bin(inner, place)
         return Peak(frequency(across, m), 0.0, float(inner[place]))
@@ -275,9 +276,12 @@ def _rank(rank: int) -> str:
     return f"rank {rank}"
 
 
-def _line(power: Array) -> Array:
-    """Return the bins of a line's spectrum that are complex, as (1, bin)."""
-    return power[np.newaxis, 1 : power.size - 1]
+def _line(power: Array, samples: int) -> Array:
+    """Return the bins of the spectrum of a line of samples that are complex, as (1, bin).
+
+    The last one is real where their number is even.
+    """
+    return power[np.newaxis, 1 : (samples + 1) // 2]
 
 
 def _half_bins(channel: Channel, seen: int) -> Array:

@@ -127,7 +127,10 @@ def _filtering(clues: Clues) -> Sequence[Proposal]:
 
 
 def _memory(clues: Clues) -> Sequence[Proposal]:
-    """Propose the lags along lines that stand out most, of so many."""
+    """Propose the lags along lines that stand out most, of so many.
+
+    Of the noise; of samples of another colour that of the signal too, which levels tell from it.
+    """
     step = 1 if clues.layout.channels == ("MONO",) else 2
     departures: dict[tuple[str, int], list[float]] = {}
     for i, key in enumerate(clues.vector.keys):
@@ -147,16 +150,18 @@ def _memory(clues: Clues) -> Sequence[Proposal]:
     best = sorted(means, key=lambda key: -abs(means[key]))[:2]
     found: list[Proposal] = []
     for axis, lag in best:
-        start = proposals(
-            "readout_memory",
-            ["fraction"],
-            ["fraction"],
-            fraction=float(np.clip(means[axis, lag], -0.6, 0.6)),
-            lag_pixels=lag,
-            along=axis,
-        )
-        # Its size, and which of so many lags it is.
-        found += [replace(one, best_of=len(means), errors={"lag_pixels": 0.0}) for one in start]
+        for remembers in ("noise", "signal") if step == 2 and lag % 2 else ("noise",):
+            start = proposals(
+                "readout_memory",
+                ["fraction"],
+                ["fraction"],
+                fraction=float(np.clip(means[axis, lag], -0.6, 0.6)),
+                lag_pixels=lag,
+                along=axis,
+                remembers=remembers,
+            )
+            # Its size, and which of so many lags it is.
+            found += [replace(one, best_of=len(means), errors={"lag_pixels": 0.0}) for one in start]
     return found
 
 

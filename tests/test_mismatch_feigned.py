@@ -223,3 +223,14 @@ def test_what_neighbours_have_in_common_is_no_pattern_of_single_pixels(
     )
     assert (coloured(state, "dsnu") is not None) == denied
     assert coloured(state, "prnu") is None
+
+
+@pytest.mark.parametrize(("scope", "denied"), [("time", True), ("offset", False)])
+def test_hot_pixels_are_denied_by_those_that_grow_with_time(scope: str, denied: bool) -> None:
+    """Few pixels that jump stand out of offsets and gains, too: they are no hot ones."""
+    state = _lines(0.0, "time alone", "outlying_pixels")
+    image, _ = state.setting.seen.images["MONO", "time alone"]
+    image[::16, ::16] += 40
+    state.vector = SimpleNamespace(keys=(Key("outlying_pixels", scope, "", "MONO"),))
+    state.null = SimpleNamespace(departures=lambda _: np.array([30.0]))
+    assert (outlying(state, "hot_pixels") is not None) == denied

@@ -212,13 +212,17 @@ def heated(state: State, kind: str) -> Denial | None:
     """
     if kind != "rts":
         return None
+    why = "pixels that stand out with exposure time are left, whose dark current is noisy too"
+    return Denial(0.0, why) if _hot(state) else None
+
+
+def _hot(state: State) -> bool:
+    """Return whether pixels that stand out with exposure time are left."""
     left = state.null.departures(state.vector)
-    hot = any(
+    return any(
         z > _CLEAR and key.statistic == "outlying_pixels" and key.scope == "time"
         for key, z in zip(state.vector.keys, left, strict=False)
     )
-    why = "pixels that stand out with exposure time are left, whose dark current is noisy too"
-    return Denial(0.0, why) if hot else None
 
 
 def wandering(state: State, effect: Effect) -> Denial | None:
@@ -287,9 +291,12 @@ def outlying(state: State, kind: str) -> Denial | None:
     """Return how a pattern of all pixels is denied by few that stand far out; None: not.
 
     Where pixels that stand out are left unexplained, and make half of the map's variance beyond its
-    noise, the others may be alike: quartiles know of the many.
+    noise, the others may be alike: quartiles know of the many. Hot pixels are few, and stand out:
+    asked is whether those are left that do so with exposure time.
     """
     if kind not in _MAPS or all(m.statistic != "outlying_pixels" for m in state.mismatches):
+        return None
+    if kind == "hot_pixels" and not _hot(state):
         return None
     plain, most = 0.0, 0.0
     for image, noise in _maps(state, kind):

@@ -234,3 +234,16 @@ def test_hot_pixels_are_denied_by_those_that_grow_with_time(scope: str, denied: 
     state.vector = SimpleNamespace(keys=(Key("outlying_pixels", scope, "", "MONO"),))
     state.null = SimpleNamespace(departures=lambda _: np.array([30.0]))
     assert (outlying(state, "hot_pixels") is not None) == denied
+
+
+@pytest.mark.parametrize(("spread", "denied"), [(0.0, True), (0.5, False)])
+def test_few_pixels_are_found_in_the_map_that_shows_them(spread: float, denied: bool) -> None:
+    """Offsets that jump stand out of the gains where no offsets are taken off, and are no PRNU."""
+    rng = np.random.default_rng(7)
+    state = _lines(0.0, "gain", "outlying_pixels")
+    pattern = rng.normal(0, spread, (ROWS, COLUMNS))
+    few = np.where(rng.random(pattern.shape) < 0.002, 20.0, 0.0)
+    images = state.setting.seen.images
+    images["MONO", "gain"] = (pattern + rng.normal(0, 1, pattern.shape), 1.0)
+    images["MONO", "gain alone"] = (2 * pattern + few + rng.normal(0, 1, pattern.shape), 1.0)
+    assert (outlying(state, "prnu") is not None) == denied

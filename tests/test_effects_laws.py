@@ -100,6 +100,22 @@ def test_rts_pixels_jump_between_two_levels() -> None:
     assert abs(filled - 0.5) < Z_MAX * 0.5 / np.sqrt(pixels.size * w)  # runs of 1 / w frames
 
 
+@pytest.mark.parametrize(("levels", "below"), [("above", 0.0), ("either", 0.5)])
+def test_rts_pixels_at_rest_are_as_any_other(levels: str, below: float) -> None:
+    """Of the same jumps, height for height: those of `about`, from the signal on."""
+    own = {"pixel_fraction": 0.2, "amplitude_dn": 40.0}
+    about, one = effect("rts", **own), effect("rts", **own, levels=levels)
+    stacks = [np.stack([apply(e, flat(0, 64), t) for t in range(60)]) for e in (about, one)]
+    hit = np.ptp(stacks[0], 0) > 0
+    heights = np.ptp(stacks[0], 0)[hit]
+    np.testing.assert_allclose(np.ptp(stacks[1], 0)[hit], heights, rtol=1e-5)
+    assert not stacks[1][:, ~hit].any()
+    middle = (stacks[1].max(0) + stacks[1].min(0))[hit] / 2
+    np.testing.assert_allclose(np.abs(middle), heights / 2, rtol=1e-5)
+    n = middle.size
+    assert abs((middle < 0).mean() - below) <= Z_MAX * np.sqrt(below * (1 - below) / n)
+
+
 def test_flicker_and_drift_move_whole_frames() -> None:
     light = np.array(
         [apply(effect("flicker", sigma_percent=2.0), flat(500, 2), t)[0, 0] for t in range(2000)]

@@ -65,6 +65,8 @@ STRONG: dict[str, tuple[dict[str, object], ...]] = {
     "rts": (
         {"amplitude_dn": 60.0, "pixel_fraction": 0.5, "switch_probability": 0.02},
         {"amplitude_dn": 110.0, "pixel_fraction": 0.5, "switch_probability": 0.02},
+        {"amplitude_dn": 60.0, "pixel_fraction": 0.3, "levels": "above"},
+        {"amplitude_dn": 60.0, "pixel_fraction": 0.3, "levels": "either"},
     ),
     "shading": (
         {"falloff_percent": 90.0},

@@ -7,11 +7,9 @@ import numpy as np
 import pytest
 
 from analysis.mismatch import basenumbers
-from analysis.mismatch.polish import Polished
 from analysis.mismatch.rank import Ranked
 from analysis.mismatch.ties import by_numbers
 from dsis.camera import BaseNoise, Segment
-from dsis.effects import registry
 
 GIVEN = BaseNoise(segment=(Segment(slope=0.40, intercept=5.0),))
 BESIDE = {"spatial_filtering": 0.4002, "readout_memory": 0.3923}
@@ -76,62 +74,3 @@ def test_numbers_with_errors_of_their_own_say_less(told: Any) -> None:
 
 def test_of_a_rival_that_is_named_already_nothing_is_said(told: Any) -> None:
     assert told(0.3923, there=(SimpleNamespace(kind="spatial_filtering"),)) is None
-
-
-REMEMBERED = {"fraction": 0.05, "lag_pixels": 3}
-
-
-@pytest.fixture
-def of_what(monkeypatch: pytest.MonkeyPatch) -> Any:
-    """Return what a memory is of, by the slope beside that of the noise and that of the signal."""
-    monkeypatch.setattr(basenumbers, "joined", lambda _camera, effects, _given: effects[0])
-
-    def remembers(
-        slopes: tuple[float, float], alone: float = 0.36, cfa: str = "MONO", **own: Any
-    ) -> dict[str, Any]:
-        slope = dict(zip(("noise", "signal"), slopes, strict=True))
-        setting = SimpleNamespace(
-            given=0,
-            layout=SimpleNamespace(channels=(cfa,)),
-            calibrated=lambda memory, _near: _calibrated(slope[memory.remembers]),
-        )
-        state: Any = SimpleNamespace(
-            camera=SimpleNamespace(), setting=setting, calibrated=_calibrated(alone)
-        )
-        effect = registry()["readout_memory"](**{**REMEMBERED, **own})
-        polished = Polished((effect,), 0.0, np.zeros(2), ({},))
-        proposal: Any = SimpleNamespace(effect=effect)
-        ranked = Ranked(40.0, "readout_memory", proposal, polished)
-        (found,) = basenumbers.of_what(state, GIVEN, [ranked])
-        values: dict[str, Any] = dict(found.polished.effects[0])
-        return {"remembers": values["remembers"], "fraction": values["fraction"]}
-
-    return remembers
-
-
-def test_memory_is_of_the_signal_where_numbers_hold_beside_that_alone(of_what: Any) -> None:
-    """Kernels (1, f) and (1 - s, s) correlate the same where s / (1 - s) = f."""
-    found = of_what((0.36, 0.3998))
-    assert found["remembers"] == "signal"
-    assert found["fraction"] / (1 - found["fraction"]) == pytest.approx(REMEMBERED["fraction"])
-
-
-@pytest.mark.parametrize(
-    ("slopes", "own"),
-    [
-        ((0.4001, 0.44), {}),
-        ((0.36, 0.38), {}),  # wrong beside either
-        ((0.36, 0.3998), {"alone": 0.4}),  # measured in such frames
-        ((0.36, 0.3998), {"lag_pixels": 1}),  # as a filter does
-        ((0.36, 0.3998), {"cfa": "R"}),  # whose colours tell
-    ],
-)
-def test_memory_stays_one_of_the_noise(
-    of_what: Any, slopes: tuple[float, float], own: dict[str, Any]
-) -> None:
-    assert of_what(slopes, **own) == {"remembers": "noise", "fraction": REMEMBERED["fraction"]}
-
-
-def test_no_filter_takes_away_what_neighbours_have_in_common(of_what: Any) -> None:
-    found = of_what((0.43, 0.3998), lag_pixels=1, fraction=-0.05)
-    assert found["remembers"] == "signal"

@@ -7,12 +7,12 @@ from math import log
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.mismatch.basenumbers import of_what
 from analysis.mismatch.candidates import CANDIDATES, measured
 from analysis.mismatch.contradicted import refuted
 from analysis.mismatch.credited import joined, kept_up
 from analysis.mismatch.displaced import displaced
 from analysis.mismatch.fitted import WEAK, Fitted
+from analysis.mismatch.forms import in_form
 from analysis.mismatch.instance import LINES, Frequency, frequency_of, instance
 from analysis.mismatch.instep import in_step
 from analysis.mismatch.judge import INSTEAD, LITTLE, NEEDLESS, NOTHING, Judge
@@ -292,7 +292,7 @@ class Search(Fitted):
             if len(self.settled) > len(settled):
                 continue  # a line was refused: behind it another may be
             before = len(self.doubted)
-            fitted = of_what(state, self.camera.noise, plainest(state, fitted))
+            fitted = in_form(state, self.camera.noise, plainest(state, fitted))
             fitted = as_shown(state, self.lines, fitted)
             fitted = self._undoubted(state, fitted)
             if len(self.doubted) > before:

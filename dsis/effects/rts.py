@@ -10,19 +10,24 @@ from scipy.special import ndtr, ndtri
 
 from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, Stage
 
+_ABOUT: Literal["about"] = "about"
+
 
 class Rts(Effect):
     """A share of the pixels carries a trap that is empty or filled: two levels, equally long.
 
     v(t, p) = S(p) + a(p) (b(t, p) - 1/2), a ~ Exp(amplitude) with probability q, else 0; b a Markov
     chain of 0 and 1 that switches with probability w per frame: variance a^2 / 4, correlation
-    (1 - 2 w)^k over k frames.
+    (1 - 2 w)^k over k frames. So where the `levels` lie about the signal. Else a pixel whose trap
+    is empty is as any other, and jumps are all `above` it, S + a b, or above in one pixel and
+    below in the next, `either`: then these pixels stand out of fixed patterns by a / 2.
     """
 
     kind: Literal["rts"] = "rts"
     pixel_fraction: Annotated[float, Field(ge=0, le=0.5, examples=[0.05])]
     amplitude_dn: Annotated[float, Field(ge=0, examples=[8.0])]
     switch_probability: Annotated[float, Field(gt=0, le=0.5)] = 0.2
+    levels: Annotated[Literal["about", "above", "either"], Field(exclude_if=_ABOUT.__eq__)] = _ABOUT
 
     stage: ClassVar[Stage] = Stage.READ_OUT
     reference: ClassVar[str] = (
@@ -31,6 +36,7 @@ class Rts(Effect):
     )
     measures: ClassVar[frozenset[str]] = frozenset(
         {
+            "level",  # where all jump one way
             "pixel_variance",
             "kurtosis",
             "variance_spread",
@@ -55,8 +61,12 @@ class Rts(Effect):
         # Below the threshold the normal law's tail is uniform: it gives the height as well.
         tail = ndtr(deviates[places].astype(np.float64)) / self.pixel_fraction
         filled = self._filled(places, exposure)
+        height = -self.amplitude_dn * np.log(tail)
+        if self.levels == "either":
+            signs = exposure.sensor.fixed("rts signs", exposure.grid, threads=exposure.threads)
+            height *= np.where(signs[places] < 0, -1, 1)
         made = image.copy()
-        made[places] -= self.amplitude_dn * np.log(tail) * (filled - 0.5)
+        made[places] += height * (filled - (0.5 if self.levels == _ABOUT else 0.0))
         return made
 
     def _filled(self, places: tuple[NDArray[np.intp], ...], exposure: Exposure) -> Any:
@@ -80,12 +90,19 @@ class Rts(Effect):
         return filled
 
     def contributions(self, point: OperatingPoint) -> Mapping[str, float]:
-        """Return q a^2 / 2; what correlated frames have in common goes to the fixed pattern."""
+        """Return q a^2 / 2; what correlated frames have in common goes to the fixed pattern.
+
+        As much goes there of levels that do not lie about the signal, less the square of their mean
+        where all lie above.
+        """
         variance = self.pixel_fraction * self.amplitude_dn**2 / 2
         rho, frames = 1 - 2 * self.switch_probability, point.frames
         k = np.arange(1, frames)
         pairs = 2 * float(((frames - k) * rho**k).sum()) / (frames * (frames - 1))
+        level = self.pixel_fraction * self.amplitude_dn / 2 if self.levels == "above" else 0.0
+        fixed = 0.0 if self.levels == _ABOUT else variance - level**2
         return {
             "pixel_variance": variance * (1 - pairs),
-            "fixed_pixel_variance": variance * pairs,
+            "fixed_pixel_variance": variance * pairs + fixed,
+            "level": level,
         }

@@ -1,0 +1,114 @@
+"""Of one kind there are forms: memory of noise or of the signal, levels about which pixels jump."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from analysis.mismatch import basenumbers, forms
+from analysis.mismatch.forms import in_form
+from analysis.mismatch.polish import Polished
+from analysis.mismatch.rank import Ranked
+from dsis.camera import BaseNoise, Segment
+from dsis.effects import registry
+
+GIVEN = BaseNoise(segment=(Segment(slope=0.40, intercept=5.0),))
+ERROR = 0.0005
+
+
+def _calibrated(slope: float) -> Any:
+    piece = SimpleNamespace(
+        slope=slope, slope_error=ERROR, intercept=5.0, intercept_error=float("nan")
+    )
+    return SimpleNamespace(fit=SimpleNamespace(pieces=[piece]))
+
+
+REMEMBERED = {"fraction": 0.05, "lag_pixels": 3}
+
+
+@pytest.fixture
+def of_what(monkeypatch: pytest.MonkeyPatch) -> Any:
+    """Return what a memory is of, by the slope beside that of the noise and that of the signal."""
+    monkeypatch.setattr(basenumbers, "joined", lambda _camera, effects, _given: effects[0])
+
+    def remembers(
+        slopes: tuple[float, float], alone: float = 0.36, cfa: str = "MONO", **own: Any
+    ) -> dict[str, Any]:
+        slope = dict(zip(("noise", "signal"), slopes, strict=True))
+        setting = SimpleNamespace(
+            given=0,
+            layout=SimpleNamespace(channels=(cfa,)),
+            calibrated=lambda memory, _near: _calibrated(slope[memory.remembers]),
+        )
+        state: Any = SimpleNamespace(
+            camera=SimpleNamespace(), setting=setting, calibrated=_calibrated(alone)
+        )
+        effect = registry()["readout_memory"](**{**REMEMBERED, **own})
+        polished = Polished((effect,), 0.0, np.zeros(2), ({},))
+        proposal: Any = SimpleNamespace(effect=effect)
+        ranked = Ranked(40.0, "readout_memory", proposal, polished)
+        (found,) = in_form(state, GIVEN, [ranked])
+        values: dict[str, Any] = dict(found.polished.effects[0])
+        return {"remembers": values["remembers"], "fraction": values["fraction"]}
+
+    return remembers
+
+
+def test_memory_is_of_the_signal_where_numbers_hold_beside_that_alone(of_what: Any) -> None:
+    """Kernels (1, f) and (1 - s, s) correlate the same where s / (1 - s) = f."""
+    found = of_what((0.36, 0.3998))
+    assert found["remembers"] == "signal"
+    assert found["fraction"] / (1 - found["fraction"]) == pytest.approx(REMEMBERED["fraction"])
+
+
+@pytest.mark.parametrize(
+    ("slopes", "own"),
+    [
+        ((0.4001, 0.44), {}),
+        ((0.36, 0.38), {}),  # wrong beside either
+        ((0.36, 0.3998), {"alone": 0.4}),  # measured in such frames
+        ((0.36, 0.3998), {"lag_pixels": 1}),  # as a filter does
+        ((0.36, 0.3998), {"cfa": "R"}),  # whose colours tell
+    ],
+)
+def test_memory_stays_one_of_the_noise(
+    of_what: Any, slopes: tuple[float, float], own: dict[str, Any]
+) -> None:
+    assert of_what(slopes, **own) == {"remembers": "noise", "fraction": REMEMBERED["fraction"]}
+
+
+def test_no_filter_takes_away_what_neighbours_have_in_common(of_what: Any) -> None:
+    found = of_what((0.43, 0.3998), lag_pixels=1, fraction=-0.05)
+    assert found["remembers"] == "signal"
+
+
+@pytest.mark.parametrize(
+    ("gains", "levels"),
+    [
+        ({"about": 50.0, "above": 20.0, "either": 52.0}, "about"),  # odds below 20
+        ({"about": 50.0, "above": 20.0, "either": 60.0}, "either"),
+        ({"about": 50.0, "above": 70.0, "either": 60.0}, "above"),
+    ],
+)
+def test_pixels_jump_about_the_level_that_maps_show(
+    monkeypatch: pytest.MonkeyPatch, gains: dict[str, float], levels: str
+) -> None:
+    monkeypatch.setattr(forms, "joined", lambda _camera, effects, _given: effects[0])
+    monkeypatch.setattr(forms, "replicates_for", lambda _setting, _effects: 1)
+    predictor = SimpleNamespace(
+        mean=lambda effect: np.array([gains[effect.levels]]),
+        gain=lambda mean: float(mean[0]),
+        loglik=lambda mean: float(mean[0]),
+    )
+    state: Any = SimpleNamespace(
+        camera=None, setting=SimpleNamespace(given=0), predictor=lambda _count: predictor
+    )
+    effect = registry()["rts"](pixel_fraction=0.002, amplitude_dn=20.0)
+    proposal: Any = SimpleNamespace(effect=effect)
+    polished = Polished((effect,), 0.0, np.array([gains["about"]]), ({},))
+    fitted = [Ranked(90.0, "rts", proposal, polished), Ranked(40.0, "rts", proposal, polished)]
+    best, behind = in_form(state, GIVEN, fitted)
+    assert dict(best.polished.effects[0])["levels"] == levels
+    assert best.gain == 90.0 + gains[levels] - gains["about"]
+    assert behind is fitted[1]

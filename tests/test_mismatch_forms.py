@@ -14,6 +14,8 @@ from dsis.camera import BaseNoise, Segment
 from dsis.effects import registry
 
 GIVEN = BaseNoise(segment=(Segment(slope=0.40, intercept=5.0),))
+BLACK_DN = 64.0
+USERS: Any = SimpleNamespace(noise=GIVEN, black_level=BLACK_DN)
 ERROR = 0.0005
 
 
@@ -48,7 +50,7 @@ def of_what(monkeypatch: pytest.MonkeyPatch) -> Any:
         polished = Polished((effect,), 0.0, np.zeros(2), ({},))
         proposal: Any = SimpleNamespace(effect=effect)
         ranked = Ranked(40.0, "readout_memory", proposal, polished)
-        (found,) = in_form(state, GIVEN, [ranked])
+        (found,) = in_form(state, USERS, [ranked])
         values: dict[str, Any] = dict(found.polished.effects[0])
         return {"remembers": values["remembers"], "fraction": values["fraction"]}
 
@@ -84,31 +86,45 @@ def test_no_filter_takes_away_what_neighbours_have_in_common(of_what: Any) -> No
 
 
 @pytest.mark.parametrize(
-    ("gains", "levels"),
+    ("gains", "fitted_black", "levels"),
     [
-        ({"about": 50.0, "above": 20.0, "either": 52.0}, "about"),  # odds below 20
-        ({"about": 50.0, "above": 20.0, "either": 60.0}, "either"),
-        ({"about": 50.0, "above": 70.0, "either": 60.0}, "above"),
+        ({"above": 20.0, "either": 52.0}, {}, "about"),  # odds below 20
+        ({"above": 20.0, "either": 60.0}, {}, "either"),
+        ({"above": 70.0, "either": 60.0}, {}, "above"),
+        ({"above": 71.0, "either": 70.0}, {"above": 63.5}, "either"),
+        ({"above": 70.0, "either": 71.0}, {"either": 64.5}, "above"),
     ],
 )
 def test_pixels_jump_about_the_level_that_maps_show(
-    monkeypatch: pytest.MonkeyPatch, gains: dict[str, float], levels: str
+    monkeypatch: pytest.MonkeyPatch,
+    gains: dict[str, float],
+    fitted_black: dict[str, float],
+    levels: str,
 ) -> None:
     monkeypatch.setattr(forms, "joined", lambda _camera, effects, _given: effects[0])
     monkeypatch.setattr(forms, "replicates_for", lambda _setting, _effects: 1)
+    gains = {"about": 50.0, **gains}
     predictor = SimpleNamespace(
         mean=lambda effect: np.array([gains[effect.levels]]),
         gain=lambda mean: float(mean[0]),
         loglik=lambda mean: float(mean[0]),
     )
+
+    def calibrated(effect: Any, _near: Any) -> Any:
+        black = fitted_black.get(effect.levels, BLACK_DN)
+        return SimpleNamespace(model=SimpleNamespace(camera=SimpleNamespace(black_level=black)))
+
     state: Any = SimpleNamespace(
-        camera=None, setting=SimpleNamespace(given=0), predictor=lambda _count: predictor
+        camera=None,
+        calibrated=None,
+        setting=SimpleNamespace(given=0, calibrated=calibrated),
+        predictor=lambda _count: predictor,
     )
     effect = registry()["rts"](pixel_fraction=0.002, amplitude_dn=20.0)
     proposal: Any = SimpleNamespace(effect=effect)
-    polished = Polished((effect,), 0.0, np.array([gains["about"]]), ({},))
+    polished = Polished((effect,), 0.0, np.array([50.0]), ({},))
     fitted = [Ranked(90.0, "rts", proposal, polished), Ranked(40.0, "rts", proposal, polished)]
-    best, behind = in_form(state, GIVEN, fitted)
+    best, behind = in_form(state, USERS, fitted)
     assert dict(best.polished.effects[0])["levels"] == levels
-    assert best.gain == 90.0 + gains[levels] - gains["about"]
+    assert best.gain == 40.0 + gains[levels]
     assert behind is fitted[1]

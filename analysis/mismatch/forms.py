@@ -7,7 +7,7 @@ from analysis.mismatch.basenumbers import HOLD, WRONG, beside, chance
 from analysis.mismatch.credited import joined
 from analysis.mismatch.rank import TOLD_APART, Ranked, replicates_for
 from analysis.mismatch.state import State
-from dsis.camera import BaseNoise
+from dsis.camera import BaseNoise, Camera
 from dsis.effects.readout_memory import ReadoutMemory
 from dsis.effects.rts import Rts
 
@@ -15,7 +15,7 @@ _SMALL = 0.5  # share of noise beyond which there is no such share of the signal
 _LEVELS = ("above", "either")
 
 
-def in_form(state: State, users: BaseNoise, fitted: Sequence[Ranked]) -> list[Ranked]:
+def in_form(state: State, users: Camera, fitted: Sequence[Ranked]) -> list[Ranked]:
     """Return ranked effects, each in the form that the recording shows.
 
     A memory is of the signal where the user's numbers say so. What is remembered of the noise alone
@@ -25,10 +25,11 @@ def in_form(state: State, users: BaseNoise, fitted: Sequence[Ranked]) -> list[Ra
     colour a filter says so, see `basenumbers.preferred`.
 
     Pixels that jump do so about the signal unless fixed patterns show, at odds of 20, that those
-    which rest are as any other; asked where nothing explains more.
+    which rest are as any other; asked where nothing explains more. Of two ways to do so that
+    patterns do not tell apart it is that beside which the black level is nearer the user's.
     """
-    found = [_remembered(state, users, one) for one in fitted]
-    return [_jumping(state, one) for one in found[:1]] + found[1:]
+    found = [_remembered(state, users.noise, one) for one in fitted]
+    return [_jumping(state, users, one) for one in found[:1]] + found[1:]
 
 
 def _remembered(state: State, users: BaseNoise, ranked: Ranked) -> Ranked:
@@ -49,22 +50,27 @@ def _remembered(state: State, users: BaseNoise, ranked: Ranked) -> Ranked:
     return other if wrong and beside(state, users, other) > HOLD else ranked
 
 
-def _jumping(state: State, ranked: Ranked) -> Ranked:
+def _jumping(state: State, users: Camera, ranked: Ranked) -> Ranked:
     effect, *others = ranked.polished.effects
     if not isinstance(effect, Rts) or effect.levels != "about":
         return ranked
     predictor = state.predictor(replicates_for(state.setting, [effect]))
-    best, most = ranked, predictor.gain(ranked.mean) + TOLD_APART
+    before = predictor.gain(ranked.mean)
+    found: list[tuple[float, float, Ranked]] = []
     for levels in _LEVELS:
         effects = (effect.model_copy(update={"levels": levels}), *others)
         camera = joined(state.camera, effects, state.setting.given)
         if camera is None:
             continue
         mean = predictor.mean(camera)
-        if (gain := predictor.gain(mean)) > most:
+        more = predictor.gain(mean) - before
+        if more > TOLD_APART:
             polished = replace(
                 ranked.polished, effects=effects, mean=mean, loglik=predictor.loglik(mean)
             )
-            more = gain - predictor.gain(ranked.mean)
-            best, most = replace(ranked, gain=ranked.gain + more, polished=polished), gain
-    return best
+            black = state.setting.calibrated(camera, state.calibrated).model.camera.black_level
+            one = replace(ranked, gain=ranked.gain + more, polished=polished)
+            found.append((more, abs(black - users.black_level), one))
+    most = max((more for more, _, _ in found), default=0.0)
+    near = [one for one in found if one[0] > most - TOLD_APART]
+    return min(near, key=lambda one: one[1])[2] if near else ranked

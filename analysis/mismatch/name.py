@@ -292,7 +292,7 @@ class Search(Fitted):
             if len(self.settled) > len(settled):
                 continue  # a line was refused: behind it another may be
             before = len(self.doubted)
-            fitted = in_form(state, self.camera.noise, plainest(state, fitted))
+            fitted = in_form(state, self.camera, plainest(state, fitted))
             fitted = as_shown(state, self.lines, fitted)
             fitted = self._undoubted(state, fitted)
             if len(self.doubted) > before:

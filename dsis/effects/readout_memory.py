@@ -78,10 +78,9 @@ class ReadoutMemory(Effect):
 
     def _mixed(self, image: Image) -> Image:
         k, made = self.lag_pixels, image.copy()
-        here, before = np.s_[k:], np.s_[:-k]
-        if self.along == "rows":
-            here, before = np.s_[:, k:], np.s_[:, :-k]
-        made[here] += np.float32(self.fraction) * (image[before] - image[here])
+        axis = int(self.along == "rows")
+        own, into = np.moveaxis(image, axis, 0), np.moveaxis(made, axis, 0)
+        into[k:] += np.float32(self.fraction) * (own[:-k] - own[k:])
         return made
 
     def reach_pixels(self) -> int:

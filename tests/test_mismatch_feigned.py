@@ -9,7 +9,14 @@ import pytest
 from scipy.ndimage import gaussian_filter
 
 from analysis.mismatch.bank.key import Key
-from analysis.mismatch.feigned import coloured, feigned, heated, outlying, stepped
+from analysis.mismatch.feigned import (
+    coloured,
+    feigned,
+    heated,
+    outlying,
+    side_by_side,
+    stepped,
+)
 
 NUMBERS = (0, 1, 2, 4, 5, 6)  # of eight frames two are locked
 FRAMES, PIXELS = 6, 200_000
@@ -247,3 +254,32 @@ def test_few_pixels_are_found_in_the_map_that_shows_them(spread: float, denied: 
     images["MONO", "gain"] = (pattern + rng.normal(0, 1, pattern.shape), 1.0)
     images["MONO", "gain alone"] = (2 * pattern + few + rng.normal(0, 1, pattern.shape), 1.0)
     assert (outlying(state, "prnu") is not None) == denied
+
+
+def _warm(share: float, trail: int, seed: int) -> Any:
+    """Return a state whose map of what grows with time has hot pixels, and trails below them."""
+    rng = np.random.default_rng(seed)
+    state = _lines(0.0, "time alone", "outlying_pixels")
+    heights = np.where(rng.random((ROWS, COLUMNS)) < share, rng.exponential(60.0), 0.0)
+    image = rng.standard_normal(heights.shape)
+    for down in range(trail):
+        image[down:] += (heights * np.exp(-down / 5))[: ROWS - down]
+    state.setting.seen.images["MONO", "time alone"] = (image, 1.0)
+    return state
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(
+    ("share", "trail", "denied"), [(0.003, 1, False), (0.1, 1, False), (0.003, 12, True)]
+)
+def test_trails_are_no_hot_pixels(share: float, trail: int, denied: bool, seed: int) -> None:
+    state = _warm(share, trail, seed)
+    assert (side_by_side(state, "hot_pixels") is not None) == denied
+    assert side_by_side(state, "dsnu") is None
+
+
+def test_charge_that_hot_pixels_share_makes_no_clusters() -> None:
+    state = _warm(0.003, 1, 5)
+    image, _ = state.setting.seen.images["MONO", "time alone"]
+    image[1:] += 0.15 * image[:-1].clip(10) - 1.5
+    assert side_by_side(state, "hot_pixels") is None

@@ -5,6 +5,7 @@ from math import log
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import binom
 
 from analysis.mismatch.bank.coherent import white_level
 from analysis.mismatch.bank.edges import edge_shapes
@@ -44,6 +45,7 @@ _GROWING = frozenset({"row_prnu", "column_prnu"})
 _CLEAR = 5.0  # standard errors of what stands out
 _SHAPED = frozenset({"half_seam", "parity", STATISTIC})
 _NEIGHBOURS = frozenset({"fixed_correlation_0_1", "fixed_correlation_1_0", "fixed_patch_variance"})
+_LIKE, _RARE = 0.3, 1e-6  # a share of a height; the chance of as many neighbours
 _MOST = 0.5  # of a pattern's variance, or of tails, that something else may feign
 _OF_QUARTILES = 0.37  # efficiency of a normal variate's scale by its quartiles
 _LONGEST = 1 / 8  # of a frame's rows, over which bands are taken to last
@@ -58,6 +60,7 @@ def of_another(state: State, effect: Effect, without: Array) -> Denial | None:
     return (
         feigned(state, kind, without)
         or outlying(state, kind)
+        or side_by_side(state, kind)
         or in_patches(state, kind)
         or coloured(state, kind)
         or stepped(state, kind)
@@ -310,6 +313,35 @@ def outlying(state: State, kind: str) -> Denial | None:
     if share >= _MOST:
         return None
     return Denial(share, "few pixels that stand far out make most of what it would explain")
+
+
+def side_by_side(state: State, kind: str) -> Denial | None:
+    """Return how hot pixels are denied by warm ones that lie side by side; None: they do not.
+
+    Pixels that are hot are drawn one by one: f of them leave 1 - (1 - f)^8 of them a neighbour that
+    is. Where most of those that stand out of what grows with time have one, of a height like their
+    own, and far more than that leaves, they are trails or clusters.
+    """
+    if kind != "hot_pixels":
+        return None
+    out, with_one, by_chance = 0, 0, 0.0
+    for image, noise in _maps(state, kind):
+        low, middle, high = np.percentile(image, [25, 50, 75])
+        spread = max(variance_of_quartiles(float(low), float(high)) ** 0.5, noise)
+        height = (image - middle) / spread
+        warm = np.pad(np.where(height > _CLEAR, height, 0.0), 1)
+        own = warm[1:-1, 1:-1]
+        beside = np.lib.stride_tricks.sliding_window_view(warm, (3, 3)).reshape(*own.shape, 9)
+        alike = (beside > _LIKE * own[..., np.newaxis]) & (beside * _LIKE < own[..., np.newaxis])
+        alike[..., 4] = False  # itself
+        hot = own > 0
+        out += int(hot.sum())
+        with_one += int((hot & alike.any(-1)).sum())
+        by_chance += float(hot.sum() * (1 - (1 - hot.mean()) ** 8))
+    chance = float(binom.sf(with_one - 1, out, min(by_chance / out, 1.0))) if out else 1.0
+    if with_one <= _MOST * out or chance > _RARE:
+        return None
+    return Denial(1 - with_one / out, "pixels that stand out with exposure time lie side by side")
 
 
 def _of_many(state: State, name: str) -> tuple[float, float, float]:

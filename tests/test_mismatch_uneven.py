@@ -92,6 +92,20 @@ def test_a_dark_current_is_believed_beside_hot_pixels(seed: int) -> None:
     assert uneven(_state(growth, "time", hot, left=(0.0, 0.0), seed=seed), DARK_CURRENT) is None
 
 
+@pytest.mark.parametrize(("errors", "denied"), [(2.0, True), (6.0, False)])
+def test_beside_pixels_that_stand_out_most_must_grow_for_certain(
+    errors: float, denied: bool
+) -> None:
+    """Few may have all of the mean: two errors of the median are no dark current, six are."""
+    growth = errors * NOISE_DN * (np.pi / 2 / (2 * 64 * 96)) ** 0.5
+    weak = registry()["dark_current"](dn_per_s=growth / TIME_S)
+    for statistic, said in (("fixed_pixel_variance", False), ("outlying_pixels", denied)):
+        state = _state(growth, left=(9.0, 0.0))
+        state.null.keys = (Key(statistic, "time", "", "R"), Key("fixed_smooth_tilt", "time"))
+        found = uneven(state, weak)
+        assert (found is not None and "most pixels grow" in found.why) is said
+
+
 def test_another_effect_or_one_that_has_its_mean_denies_nothing() -> None:
     assert uneven(_state(_glow(0.1)), registry()["row_noise"](sigma_dn=1.0)) is None
     assert uneven(_state(_glow(0.1)), None) is None

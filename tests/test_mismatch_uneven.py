@@ -99,8 +99,9 @@ def test_beside_pixels_that_stand_out_most_must_grow_for_certain(
     """Few may have all of the mean: two errors of the median are no dark current, six are."""
     growth = errors * NOISE_DN * (np.pi / 2 / (2 * 64 * 96)) ** 0.5
     weak = registry()["dark_current"](dn_per_s=growth / TIME_S)
+    hot = registry()["hot_pixels"](pixel_fraction=1e-9, mean_dn_per_s=1.0)  # it is no glow
     for statistic, said in (("fixed_pixel_variance", False), ("outlying_pixels", denied)):
-        state = _state(growth, left=(9.0, 0.0))
+        state = _state(growth, "time", hot, left=(9.0, 0.0))
         state.null.keys = (Key(statistic, "time", "", "R"), Key("fixed_smooth_tilt", "time"))
         found = uneven(state, weak)
         assert (found is not None and "most pixels grow" in found.why) is said

@@ -32,10 +32,16 @@ REMEMBERED = {"fraction": 0.05, "lag_pixels": 3}
 @pytest.fixture
 def of_what(monkeypatch: pytest.MonkeyPatch) -> Any:
     """Return what a memory is of, by the slope beside that of the noise and that of the signal."""
-    monkeypatch.setattr(basenumbers, "joined", lambda _camera, effects, _given: effects[0])
+    for module in (basenumbers, forms):
+        monkeypatch.setattr(module, "joined", lambda _camera, effects, _given: effects[0])
+    monkeypatch.setattr(forms, "replicates_for", lambda _setting, _effects: 1)
 
     def remembers(
-        slopes: tuple[float, float], alone: float = 0.36, cfa: str = "MONO", **own: Any
+        slopes: tuple[float, float],
+        alone: float = 0.36,
+        cfa: str = "MONO",
+        ahead: float = 0.0,
+        **own: Any,
     ) -> dict[str, Any]:
         slope = dict(zip(("noise", "signal"), slopes, strict=True))
         setting = SimpleNamespace(
@@ -43,8 +49,16 @@ def of_what(monkeypatch: pytest.MonkeyPatch) -> Any:
             layout=SimpleNamespace(channels=(cfa,)),
             calibrated=lambda memory, _near: _calibrated(slope[memory.remembers]),
         )
+        predictor = SimpleNamespace(
+            mean=lambda memory: np.array([ahead * (memory.remembers == "signal")]),
+            gain=lambda mean: float(mean[0]),
+            loglik=lambda mean: float(mean[0]),
+        )
         state: Any = SimpleNamespace(
-            camera=SimpleNamespace(), setting=setting, calibrated=_calibrated(alone)
+            camera=SimpleNamespace(),
+            setting=setting,
+            calibrated=_calibrated(alone),
+            predictor=lambda _count: predictor,
         )
         effect = registry()["readout_memory"](**{**REMEMBERED, **own})
         polished = Polished((effect,), 0.0, np.zeros(2), ({},))
@@ -71,13 +85,24 @@ def test_memory_is_of_the_signal_where_numbers_hold_beside_that_alone(of_what: A
         ((0.36, 0.38), {}),  # wrong beside either
         ((0.36, 0.3998), {"alone": 0.4}),  # measured in such frames
         ((0.36, 0.3998), {"lag_pixels": 1}),  # as a filter does
-        ((0.36, 0.3998), {"cfa": "R"}),  # whose colours tell
+        ((0.36, 0.38), {"cfa": "R"}),
+        ((0.36, 0.3998), {"cfa": "R", "ahead": -9.0}),  # colours tell
     ],
 )
 def test_memory_stays_one_of_the_noise(
     of_what: Any, slopes: tuple[float, float], own: dict[str, Any]
 ) -> None:
     assert of_what(slopes, **own) == {"remembers": "noise", "fraction": REMEMBERED["fraction"]}
+
+
+@pytest.mark.parametrize(("ahead", "remembers"), [(9.0, "signal"), (0.5, "noise")])
+def test_colours_tell_what_a_memory_is_of_at_odds(
+    of_what: Any, ahead: float, remembers: str
+) -> None:
+    found = of_what((0.4001, 0.44), cfa="R", ahead=ahead)  # beside noise the numbers hold
+    assert found["remembers"] == remembers
+    again = {"remembers": "signal", "fraction": 0.05, "ahead": ahead}
+    assert of_what((0.4001, 0.44), cfa="R", **again)["remembers"] == remembers
 
 
 def test_no_filter_takes_away_what_neighbours_have_in_common(of_what: Any) -> None:
@@ -127,4 +152,5 @@ def test_pixels_jump_about_the_level_that_maps_show(
     best, behind = in_form(state, USERS, fitted)
     assert dict(best.polished.effects[0])["levels"] == levels
     assert best.gain == 40.0 + gains[levels]
-    assert behind is fitted[1]
+    assert dict(behind.polished.effects[0])["levels"] == levels
+    assert behind.gain == fitted[1].gain

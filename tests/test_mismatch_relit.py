@@ -16,6 +16,7 @@ from dsis.effects import Effect
 from dsis.effects.brighter_fatter import BrighterFatter
 from dsis.effects.crosstalk import Crosstalk
 from dsis.effects.dsnu import Dsnu
+from dsis.effects.readout_memory import ReadoutMemory
 from mismatch_recordings import camera
 
 
@@ -52,6 +53,21 @@ def by_matrix(effect: Crosstalk, levels: np.ndarray) -> np.ndarray:
     if effect.along != "rows":
         made += 2 * f * (levels[::-1] - levels)
     return made
+
+
+@pytest.mark.parametrize("along", ["rows", "columns"])
+@pytest.mark.parametrize("lag", [1, 4, 15])
+def test_a_memory_of_the_signal_mixes_the_colours_of_its_lag(along: str, lag: int) -> None:
+    own = {"kind": "readout_memory", "fraction": 0.1, "lag_pixels": lag, "along": along}
+    light = np.array([[400.0, 200.0], [100.0, 400.0]])
+    other = light[:, ::-1] if along == "rows" else light[::-1]
+    expected = 0.9 * light + 0.1 * (other if lag % 2 else light)
+    signal = ReadoutMemory.model_validate({**own, "remembers": "signal"})
+    np.testing.assert_allclose(exchanged([signal], light), expected, rtol=1e-6)
+    noise = ReadoutMemory.model_validate(own)
+    assert signal.exchanges
+    assert not noise.exchanges
+    np.testing.assert_array_equal(exchanged([noise], light), light)
 
 
 @given(

@@ -41,4 +41,4 @@ def shown_by_all(search: Search, final: State, named: Named, without: Camera, tr
 
 def once_a_frame(effect: Effect) -> bool:
     """Return whether an effect draws one number a frame: a level, a sign, a phase."""
-    return effect.measures == _OF_FRAMES or effect.kind in _ONE_PHASE
+    return effect.changes == _OF_FRAMES or effect.kind in _ONE_PHASE

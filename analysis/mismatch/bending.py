@@ -26,13 +26,13 @@ Pair = tuple[float, float]
 
 def bends(effects: Iterable[Effect]) -> bool:
     """Return whether effects change levels or variances; of coarse codes that is known exactly."""
-    return any(e.measures & _BENT for e in effects if not isinstance(e, Quantisation))
+    return any(e.changes & _BENT for e in effects if not isinstance(e, Quantisation))
 
 
 def bent_by(effects: Iterable[Effect], *, spiky: bool) -> tuple[Effect, ...]:
     """Return the effects that are simulated to know what they add; see `bending_offsets`."""
     bending = _BENT | {"kurtosis"} if spiky else _BENT
-    return tuple(e for e in effects if isinstance(e, Quantisation) or e.measures & bending)
+    return tuple(e for e in effects if isinstance(e, Quantisation) or e.changes & bending)
 
 
 def bending_offsets(

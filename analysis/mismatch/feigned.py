@@ -304,15 +304,19 @@ def outlying(state: State, kind: str) -> Denial | None:
     if kind == "hot_pixels" and not _hot(state):
         return None
     shares: list[float] = []
+    own = True
     for name in _MAPS[kind]:  # others' patterns are taken off the first, which is noisier
         plain, most, error = _of_many(state, name)
-        if plain > 0 and most >= _MOST * plain and most > _CLEAR * error:
+        if own and plain > 0 and most >= _MOST * plain and most > _CLEAR * error:
             return None
-        shares += [most / plain] if plain > 0 else []
+        shares += [most / plain] if plain > _CLEAR * error else []
+        own &= error == 0  # there is no such map
     share = min(shares, default=1.0)
     if share >= _MOST:
         return None
-    return Denial(share, "few pixels that stand far out make most of what it would explain")
+    return Denial(
+        max(share, 0.0), "few pixels that stand far out make most of what it would explain"
+    )
 
 
 def side_by_side(state: State, kind: str) -> Denial | None:

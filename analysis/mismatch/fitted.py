@@ -123,7 +123,7 @@ class Fitted:
         """
         camera = self.without(state, named)
         effect = None if named.proposal is None else named.proposal.effect
-        if effect is not None and not effect.measures & {"level", "pixel_variance"}:
+        if effect is not None and not effect.changes & {"level", "pixel_variance"}:
             return camera  # levels and variances know nothing of it
         return self.setting.calibrated(camera, state.calibrated).model.camera
 

@@ -11,43 +11,72 @@ from dsis.camera import BaseNoise, Camera
 from dsis.effects.readout_memory import ReadoutMemory
 from dsis.effects.rts import Rts
 
-_SMALL = 0.5  # share of noise beyond which there is no such share of the signal
+_MOST = 0.5  # of the signal; of the noise, less: beyond it there is no other form
 _LEVELS = ("above", "either")
 
 
 def in_form(state: State, users: Camera, fitted: Sequence[Ranked]) -> list[Ranked]:
     """Return ranked effects, each in the form that the recording shows.
 
-    A memory is of the signal where the user's numbers say so. What is remembered of the noise alone
-    adds to variances; a share of the signal that takes the place of as much of it lessens them, and
-    correlates the same. Of samples of one colour nothing else tells the two apart: where numbers
-    are wrong beside the first and hold beside the second, it is that. Of the nearest sample of a
-    colour a filter says so, see `basenumbers.preferred`.
+    What a memory keeps of the noise alone adds to variances; a share of the signal that takes the
+    place of as much of it lessens them, and correlates the same; samples of another colour mix. It
+    is of the one that the numbers of the recording tell at odds of 20, or else of the signal where
+    the user's numbers are wrong beside the first and hold beside the second. Of the nearest sample
+    of a colour a filter says so, see `basenumbers.preferred`.
 
     Pixels that jump do so about the signal unless fixed patterns show, at odds of 20, that those
-    which rest are as any other; asked where nothing explains more. Of two ways to do so that
-    patterns do not tell apart it is that beside which the black level is nearer the user's.
+    which rest are as any other. Of two ways to do so that patterns do not tell apart it is that
+    beside which the black level is nearer the user's. One that is not the best keeps its gain.
     """
-    found = [_remembered(state, users.noise, one) for one in fitted]
-    return [_jumping(state, users, one) for one in found[:1]] + found[1:]
+    found = [_jumping(state, users, _remembered(state, users.noise, one)) for one in fitted]
+    behind = zip(found[1:], fitted[1:], strict=True)
+    return found[:1] + [replace(one, gain=own.gain) for one, own in behind]
 
 
 def _remembered(state: State, users: BaseNoise, ranked: Ranked) -> Ranked:
     effect, *others = ranked.polished.effects
-    if not isinstance(effect, ReadoutMemory) or effect.remembers != "noise":
+    if not isinstance(effect, ReadoutMemory):
         return ranked
     apart = 1 if state.setting.layout.channels == ("MONO",) else 2
     mixed, filtered = effect.lag_pixels % apart, effect.lag_pixels == apart and effect.fraction > 0
-    if mixed or filtered or abs(effect.fraction) >= _SMALL:
+    other = _other(effect)
+    if other is None or filtered or (effect.exchanges and not mixed):
         return ranked
+    effects = (other, *others)
+    twin = replace(ranked, polished=replace(ranked.polished, effects=effects))
+    if mixed:
+        predictor = state.predictor(replicates_for(state.setting, [effect]))
+        means = [predictor.mean(_camera(state, own)) for own in (ranked, twin)]
+        ahead = predictor.gain(means[1]) - predictor.gain(means[0])
+        polished = replace(twin.polished, mean=means[1], loglik=predictor.loglik(means[1]))
+        twin = replace(twin, polished=polished, gain=ranked.gain + max(ahead, 0.0))
+        if abs(ahead) > TOLD_APART:
+            return twin if ahead > 0 else ranked
+    noise, signal = (twin, ranked) if effect.exchanges else (ranked, twin)
     if not chance(users, state.calibrated) < WRONG:
-        return ranked
-    share = effect.fraction / (1 + effect.fraction)  # of (1 - s, s), in proportion 1 to f
-    signal = effect.model_copy(update={"fraction": share, "remembers": "signal"})
-    polished = replace(ranked.polished, effects=(signal, *others))
-    other = replace(ranked, polished=polished)
-    wrong = beside(state, users, ranked) < WRONG
-    return other if wrong and beside(state, users, other) > HOLD else ranked
+        return noise
+    wrong = beside(state, users, noise) < WRONG
+    return signal if wrong and beside(state, users, signal) > HOLD else noise
+
+
+def _other(effect: ReadoutMemory) -> ReadoutMemory | None:
+    """Return the memory of the other form that correlates the same; None: there is none.
+
+    Kernels (1 - s, s) and (1, f) are in proportion where s = f / (1 + f).
+    """
+    share = effect.fraction
+    if effect.exchanges:
+        return _with(effect, share / (1 - share), "noise") if share < _MOST else None
+    return _with(effect, share / (1 + share), "signal") if share > -_MOST else None
+
+
+def _with(effect: ReadoutMemory, fraction: float, remembers: str) -> ReadoutMemory:
+    return effect.model_copy(update={"fraction": fraction, "remembers": remembers})
+
+
+def _camera(state: State, ranked: Ranked) -> Camera:
+    camera = joined(state.camera, ranked.polished.effects, state.setting.given)
+    return state.camera if camera is None else camera
 
 
 def _jumping(state: State, users: Camera, ranked: Ranked) -> Ranked:
@@ -55,22 +84,23 @@ def _jumping(state: State, users: Camera, ranked: Ranked) -> Ranked:
     if not isinstance(effect, Rts) or effect.levels != "about":
         return ranked
     predictor = state.predictor(replicates_for(state.setting, [effect]))
-    before = predictor.gain(ranked.mean)
-    found: list[tuple[float, float, Ranked]] = []
+    before = predictor.gain(predictor.mean(_camera(state, ranked)))
+    found: list[tuple[float, Ranked]] = []
     for levels in _LEVELS:
         effects = (effect.model_copy(update={"levels": levels}), *others)
-        camera = joined(state.camera, effects, state.setting.given)
-        if camera is None:
-            continue
-        mean = predictor.mean(camera)
+        one = replace(ranked, polished=replace(ranked.polished, effects=effects))
+        mean = predictor.mean(_camera(state, one))
         more = predictor.gain(mean) - before
-        if more > TOLD_APART:
-            polished = replace(
-                ranked.polished, effects=effects, mean=mean, loglik=predictor.loglik(mean)
-            )
-            black = state.setting.calibrated(camera, state.calibrated).model.camera.black_level
-            one = replace(ranked, gain=ranked.gain + more, polished=polished)
-            found.append((more, abs(black - users.black_level), one))
-    most = max((more for more, _, _ in found), default=0.0)
-    near = [one for one in found if one[0] > most - TOLD_APART]
-    return min(near, key=lambda one: one[1])[2] if near else ranked
+        polished = replace(one.polished, mean=mean, loglik=predictor.loglik(mean))
+        found.append((more, replace(one, gain=ranked.gain + more, polished=polished)))
+    most = max(more for more, _ in found)
+    if most <= TOLD_APART:
+        return ranked
+    near = [one for more, one in found if more > most - TOLD_APART]
+    return near[0] if len(near) == 1 else min(near, key=lambda one: _off_black(state, users, one))
+
+
+def _off_black(state: State, users: Camera, ranked: Ranked) -> float:
+    """Return how far the black level beside an effect is from the user's, DN."""
+    calibrated = state.setting.calibrated(_camera(state, ranked), state.calibrated)
+    return abs(calibrated.model.camera.black_level - users.black_level)

@@ -292,8 +292,8 @@ class Search(Fitted):
             if len(self.settled) > len(settled):
                 continue  # a line was refused: behind it another may be
             before = len(self.doubted)
-            fitted = in_form(state, self.camera, plainest(state, fitted))
-            fitted = as_shown(state, self.lines, fitted)
+            fitted = as_shown(state, self.lines, plainest(state, fitted))
+            fitted = in_form(state, self.camera, fitted)
             fitted = self._undoubted(state, fitted)
             if len(self.doubted) > before:
                 continue  # all that was fitted of a kind is denied: others were too far behind it

@@ -65,7 +65,7 @@ def replicates_for(setting: Setting, effects: Iterable[Effect]) -> int:
 
 def _sparse(setting: Setting, effect: Effect) -> bool:
     few = not setting.large and effect.kind in _BY_BIN
-    return few or effect.measures == _BY_FRAME or effect.kind in _BY_DRAW
+    return few or effect.changes == _BY_FRAME or effect.kind in _BY_DRAW
 
 
 @dataclass(frozen=True)

@@ -83,15 +83,17 @@ def exchanged(effects: Iterable[Effect], signal_dn: Sites) -> Sites:
     signal_dn
         For rows 0, 1 and columns 0, 1: (2, 2), DN above black.
     """
-    image = np.tile(signal_dn, (_TILES, _TILES)).astype(np.float32)
+    effects = list(effects)
+    start = _TILES + 2 * sum(effect.reach_pixels() for effect in effects)
+    image = np.tile(signal_dn, (start, start)).astype(np.float32)
     for effect in effects:
         image = effect.exchanged(image)
-    middle = slice(_TILES, _TILES + 2)
+    middle = slice(start, start + 2)
     return np.asarray(image[middle, middle], np.float64)
 
 
 def _exchanging(camera: Camera) -> list[Effect]:
-    return [e for e in camera.chain() if type(e).exchanged is not Effect.exchanged]
+    return [e for e in camera.chain() if e.exchanges]
 
 
 def _of_colours(levels: Array, cfa: Cfa) -> Array:

@@ -108,6 +108,6 @@ def _changed(names: Iterable[str], effects: Sequence[Effect]) -> set[str]:
     """Return which statistics some of the effects may change."""
     may: set[str] = set()
     for effect in effects:
-        own = {name for name in names if effect.measures & _FOLLOWS.get(name, frozenset({name}))}
+        own = {name for name in names if effect.changes & _FOLLOWS.get(name, frozenset({name}))}
         may |= own - _SIDED if effect.draws else own
     return may

@@ -258,6 +258,16 @@ class Effect(Model, ABC):
         del exposure
         return deviates
 
+    @property
+    def changes(self) -> frozenset[str]:
+        """The measures that this one may change: of `measures`, those of its form."""
+        return self.measures
+
+    @property
+    def exchanges(self) -> bool:
+        """Whether neighbouring sites exchange what they hold, as `exchanged` says."""
+        return type(self).exchanged is not Effect.exchanged
+
     def exchanged(self, image: Image) -> Image:
         """Return what becomes of charge that neighbours exchange, nothing else of the effect.
 

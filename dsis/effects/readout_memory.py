@@ -65,8 +65,8 @@ class ReadoutMemory(Effect):
 
     def apply(self, image: Image, exposure: Exposure) -> Image:
         """Add what is remembered."""
-        if self.remembers == "signal":
-            return self._mixed(image)
+        if self.exchanges:
+            return self.exchanged(image)
         along_rows, rows = self.along == "rows", len(image)
         lag = self.lag_pixels * (image[0, 0].size if along_rows else 1)
         return _remembering(
@@ -76,7 +76,15 @@ class ReadoutMemory(Effect):
             (0, lag) if along_rows else (lag, 0),
         ).reshape(image.shape)
 
-    def _mixed(self, image: Image) -> Image:
+    @property
+    def exchanges(self) -> bool:
+        """Whether samples of another colour are mixed in."""
+        return self.remembers == "signal"
+
+    def exchanged(self, image: Image) -> Image:
+        """Return an image with a share of the samples before; of the noise alone, as it is."""
+        if not self.exchanges:
+            return image
         k, made = self.lag_pixels, image.copy()
         axis = int(self.along == "rows")
         own, into = np.moveaxis(image, axis, 0), np.moveaxis(made, axis, 0)
@@ -96,7 +104,7 @@ class ReadoutMemory(Effect):
         f, k = self.fraction, self.lag_pixels
         across = point.columns if self.along == "rows" else point.rows
         lag = (0, k) if self.along == "rows" else (k, 0)
-        if self.remembers == "signal":
+        if self.exchanges:
             return point.filtered(v, {(0, 0): 1 - f, lag: f}) | {"level": 0.0}
         noise = point.coupled({(0, 0): v * f**2 * max(across - k, 0) / across, lag: v * f})
         return noise | {"level": 0.0}  # of the effect alone

@@ -19,8 +19,8 @@ class Rts(Effect):
     v(t, p) = S(p) + a(p) (b(t, p) - 1/2), a ~ Exp(amplitude) with probability q, else 0; b a Markov
     chain of 0 and 1 that switches with probability w per frame: variance a^2 / 4, correlation
     (1 - 2 w)^k over k frames. So where the `levels` lie about the signal. Else a pixel whose trap
-    is empty is as any other, and jumps are all `above` it, S + a b, or above in one pixel and
-    below in the next, `either`: then these pixels stand out of fixed patterns by a / 2.
+    is empty is as any other, and jumps are all `above` it, S + a b, or `either`, above or below,
+    as it is drawn for each pixel: then these pixels stand out of fixed patterns by a / 2.
     """
 
     kind: Literal["rts"] = "rts"
@@ -51,6 +51,11 @@ class Rts(Effect):
         "read_noise_spread is Gaussian in each pixel and white in time; impulse does not return; "
         "hot_pixels grow with time and do not jump."
     )
+
+    @property
+    def changes(self) -> frozenset[str]:
+        """The measures that it may change: levels only where all jump one way."""
+        return self.measures if self.levels == "above" else self.measures - {"level"}
 
     def apply(self, image: Image, exposure: Exposure) -> Image:
         """Add the state of each trap."""

@@ -127,7 +127,7 @@ class Imitation:
     @cached_property
     def _reshaping(self) -> Camera:
         """The camera with the effects that change a mean; noise of 1 DN dithers the codes."""
-        effects = tuple(e for e in self.camera.effect if "level" in e.measures)
+        effects = tuple(e for e in self.camera.effect if "level" in e.changes)
         segments = tuple(
             s.model_copy(update={"slope": 0.0, "intercept": 1.0}) for s in self.camera.noise.segment
         )

@@ -139,7 +139,7 @@ def without_spikes(camera: Camera) -> Camera:
 
 def _untied(camera: Camera) -> bool:
     """Return whether no effect of a camera ties samples, or leaves a mean pattern."""
-    return all(own.measures <= _UNTIED for own in camera.effect)
+    return all(own.changes <= _UNTIED for own in camera.effect)
 
 
 def _odd(law: Law) -> bool:

@@ -30,7 +30,7 @@ def in_form(state: State, users: Camera, fitted: Sequence[Ranked]) -> list[Ranke
     """
     found = [_jumping(state, users, _remembered(state, users.noise, one)) for one in fitted]
     behind = zip(found[1:], fitted[1:], strict=True)
-    return found[:1] + [replace(one, gain=own.gain) for one, own in behind]
+    return found[:1] + [own if one is own else replace(one, gain=own.gain) for one, own in behind]
 
 
 def _remembered(state: State, users: BaseNoise, ranked: Ranked) -> Ranked:

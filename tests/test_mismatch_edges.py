@@ -241,7 +241,7 @@ def test_without_its_word_nothing_else_is_named() -> None:
 
 
 def test_one_column_at_the_edge_is_no_decay() -> None:
-    stacks = recorded(camera(), 9)
+    stacks = recorded(camera(), 9, levels=FEW_LEVELS)
     assert stacks.stacks is not None
     for stack in stacks.stacks.values():
         stack[:, :, 0] += 5

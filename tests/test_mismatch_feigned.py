@@ -166,9 +166,9 @@ def test_columns_that_differ_one_by_one_are_believed(columns: Any) -> None:
 def test_hot_pixels_that_have_no_word_do_not_jump(
     kind: str, scope: str, z: float, denied: bool
 ) -> None:
+    keys = (Key("outlying_pixels", scope, "", "R"),)
     state: Any = SimpleNamespace(
-        vector=SimpleNamespace(keys=(Key("outlying_pixels", scope, "", "R"),)),
-        null=SimpleNamespace(departures=lambda _: np.array([z])),
+        vector=None, null=SimpleNamespace(keys=keys, departures=lambda _: np.array([z]))
     )
     assert (heated(state, kind) is not None) == denied
 
@@ -238,8 +238,9 @@ def test_hot_pixels_are_denied_by_those_that_grow_with_time(scope: str, denied: 
     state = _lines(0.0, "time alone", "outlying_pixels")
     image, _ = state.setting.seen.images["MONO", "time alone"]
     image[::16, ::16] += 40
-    state.vector = SimpleNamespace(keys=(Key("outlying_pixels", scope, "", "MONO"),))
-    state.null = SimpleNamespace(departures=lambda _: np.array([30.0]))
+    keys = (Key("outlying_pixels", scope, "", "MONO"),)
+    state.vector = None
+    state.null = SimpleNamespace(keys=keys, departures=lambda _: np.array([30.0]))
     assert (outlying(state, "hot_pixels") is not None) == denied
 
 

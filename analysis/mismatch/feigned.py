@@ -21,6 +21,7 @@ from analysis.mismatch.grown import LEAST_NUMBER, grown
 from analysis.mismatch.halves import halved
 from analysis.mismatch.inpatches import in_patches
 from analysis.mismatch.jumped import jumped
+from analysis.mismatch.leftopen import warm_left
 from analysis.mismatch.nofield import no_field
 from analysis.mismatch.persisting import persisting
 from analysis.mismatch.rivalled import rivalled
@@ -217,16 +218,7 @@ def heated(state: State, kind: str) -> Denial | None:
     if kind != "rts":
         return None
     why = "pixels that stand out with exposure time are left, whose dark current is noisy too"
-    return Denial(0.0, why) if _hot(state) else None
-
-
-def _hot(state: State) -> bool:
-    """Return whether pixels that stand out with exposure time are left."""
-    left = state.null.departures(state.vector)
-    return any(
-        z > _CLEAR and key.statistic == "outlying_pixels" and key.scope == "time"
-        for key, z in zip(state.vector.keys, left, strict=False)
-    )
+    return Denial(0.0, why) if warm_left(state) else None
 
 
 def wandering(state: State, effect: Effect) -> Denial | None:
@@ -301,7 +293,7 @@ def outlying(state: State, kind: str) -> Denial | None:
     """
     if kind not in _MAPS or all(m.statistic != "outlying_pixels" for m in state.mismatches):
         return None
-    if kind == "hot_pixels" and not _hot(state):
+    if kind == "hot_pixels" and not warm_left(state):
         return None
     shares: list[float] = []
     own = True

@@ -5,6 +5,7 @@ from collections.abc import Iterable
 from analysis.mismatch.layout import Place
 from analysis.mismatch.state import State
 
+_STAND_OUT = 5.0  # standard deviations
 Left = dict[tuple[Place, str], tuple[float, float]]
 """By place and statistic: what is left, and its standard deviation."""
 
@@ -23,3 +24,12 @@ def left_open(state: State, statistics: Iterable[str]) -> Left:
         )
         if known and key.statistic in certain and key.scope == "exposure"
     }
+
+
+def warm_left(state: State) -> bool:
+    """Return whether pixels that stand out with exposure time are left unexplained."""
+    left = state.null.departures(state.vector)
+    return any(
+        z > _STAND_OUT and key.statistic == "outlying_pixels" and key.scope == "time"
+        for key, z in zip(state.null.keys, left, strict=True)
+    )

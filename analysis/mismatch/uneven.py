@@ -10,6 +10,7 @@ from scipy.special import logsumexp
 from analysis.mismatch.bank.robust import drawn_in, typical_square
 from analysis.mismatch.candidates.patterns import EXTENTS, PLACES, glowing
 from analysis.mismatch.contradicted import Denial, rival
+from analysis.mismatch.leftopen import warm_left
 from analysis.mismatch.state import State
 from dsis.effects import Effect
 from dsis.effects.amp_glow import AmpGlow
@@ -22,7 +23,6 @@ _LEAST_SHARE = 0.5  # of a dark current, that every part of the sensor must show
 _SURE = 3.0  # standard errors: the least of sixteen
 _TAIL = 1 / 3  # of a glow's height, that it may have where it is least
 _SEEN = 3.5  # of a surface: chance has that among the map's few numbers in 1 % of recordings
-_OUT = 5.0  # standard deviations of pixels that stand out
 _SMOOTH = "fixed_smooth"
 
 
@@ -96,12 +96,7 @@ def _of_few(state: State, effect: DarkCurrent) -> Denial | None:
         return None
     share = float(np.mean(shares))
     error = float(np.sqrt(np.mean(np.square(errors)) / len(errors)))
-    left = state.null.departures(state.vector)
-    stand_out = any(
-        z > _OUT and key.scope == "time" and key.statistic == "outlying_pixels"
-        for key, z in zip(state.null.keys, left, strict=True)
-    )
-    sure = not stand_out or share - _SURE * error > 0
+    sure = not warm_left(state) or share - _SURE * error > 0
     if sure and share + _SURE * error >= _LEAST_SHARE:
         return None
     least = f"{max(share, 0):.0%} +- {error:.0%}"

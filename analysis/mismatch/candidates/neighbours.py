@@ -129,7 +129,8 @@ def _filtering(clues: Clues) -> Sequence[Proposal]:
 def _memory(clues: Clues) -> Sequence[Proposal]:
     """Propose the lags along lines that stand out most, of so many.
 
-    Of the noise; of samples of another colour that of the signal too, which levels tell from it.
+    Of the noise; of samples of another colour that of the signal too, which colours may tell from
+    it: see `forms`.
     """
     step = 1 if clues.layout.channels == ("MONO",) else 2
     departures: dict[tuple[str, int], list[float]] = {}

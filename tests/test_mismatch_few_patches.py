@@ -128,6 +128,24 @@ def test_columns_that_differ_as_their_neighbours_do_are_none_by_themselves(cfa: 
         assert "neighbours" in said.why
 
 
+@pytest.mark.parametrize("rows", [48, 84])
+def test_a_blot_on_the_middle_of_few_rows_is_no_columns(rows: int) -> None:
+    """Planes of 24 and 42 rows, both halves of which see it; columns of as few are believed."""
+    top = (ROWS - rows) // 2
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        apart = np.hypot(np.arange(ROWS)[:, None] - ROWS / 2, np.arange(COLUMNS) - 70)
+        for gain, told in (
+            (-0.1 * np.exp(-((apart / 5) ** 2)), True),
+            (np.tile(rng.normal(0, 1e-3, COLUMNS), (ROWS, 1)), False),
+        ):
+            state = _state(gain, Cfa.RGGB, seed)
+            images = state.setting.seen.images
+            for key, (image, noise) in list(images.items()):
+                images[key] = (image[top // 2 : top // 2 + rows // 2], noise)
+            assert (of_parts(state, "column_prnu") is not None) == told
+
+
 def _offsets(pattern: Array, seed: int, *noises: float) -> Any:
     """Return a state with maps of offsets of these noises: beside gains, and alone."""
     names = ("offset", "offset alone")

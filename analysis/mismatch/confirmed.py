@@ -126,11 +126,11 @@ def _gained(search: Search, final: State, trial: Trial) -> dict[str, Gained]:
 
 
 def _foretold(named: Named, without: Camera, trial: Trial, told: Gained) -> Gained:
-    """Return what locked frames gain by bands that the others foretell; of no such effect: `told`.
+    """Return what locked frames gain by bands or a line that the others foretell; else `told`.
 
-    Pixels know nothing of a phase that moves on; but what they are sure of is not asked again.
-    `without` is the camera without the effect: beside bands that it has at the same place nothing
-    is said.
+    Pixels know nothing of a phase that moves on or is kept, nor that few exposures show it; but
+    what they are sure of is not asked again. `without` is the camera without the effect: beside
+    one that it has at the same place nothing is said.
     """
     if named.proposal is None or denied(told.gain, trial.numbers.frames):
         return told

@@ -13,6 +13,7 @@ from scipy.stats import chi2, norm
 
 from analysis.mismatch.alikesamples import of_alike_samples
 from analysis.mismatch.brighter import no_brighter_alike
+from analysis.mismatch.bylevel import otherwise_by_level
 from analysis.mismatch.candidates.response import skewness_below
 from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.fewlines import of_few_lines
@@ -55,7 +56,7 @@ def displaced(state: State, kind: str, mean: Array, without: Array | None = None
     where variances scatter no more than codes that are not equally wide make them. Of a bend that
     levels show is asked, where gains of read-out paths would disagree, whether it is smooth. Of
     filters, crosstalk and charge that repels charge, how alike neighbours are at each level; of
-    noise of whole lines, how alike samples along them are; of greens that differ, what other
+    counted photons and amplifiers of greens, by how much levels show them; of noise of whole lines, how alike samples along them are; of greens that differ, what other
     colours share with them; of frames that move as a whole, whether their parts do so alike. Of
     widths of codes, whether it is codes that never occur which make them differ; of pixels,
     whether those side by side do alike.
@@ -85,7 +86,7 @@ def displaced(state: State, kind: str, mean: Array, without: Array | None = None
         denial = _of_colours(state, mean - without) or _of_memory(state, mean - without)
         if denial is not None:
             return denial
-    denial = of_moving_parts(state, kind, without)
+    denial = of_moving_parts(state, kind, without) or otherwise_by_level(state, kind, without, mean)
     denial = denial or of_late_light(state, kind) or shared_otherwise(state, kind, without)
     return denial or no_brighter_alike(state, kind, without)
 

@@ -41,7 +41,7 @@ Array = NDArray[np.float64]
 _MOST_EFFECTS = 20  # some may have to go again
 _CHOSEN = frozenset({"adc_memory", "dual_gain"})  # a period, a gap between levels
 _MOST_LINES = 5  # further ones stay unexplained, located
-_ROUNDS = 3  # of a search that goes on
+_ROUNDS = 6  # of a search that goes on: in each, what was taken in may be denied
 
 
 @dataclass

@@ -11,6 +11,8 @@ from analysis.mismatch.bandgain import foretold
 from analysis.mismatch.finding import Change, Gain, Proof
 from analysis.mismatch.given import Ratio
 from analysis.mismatch.heldnumbers import HeldNumbers
+from analysis.mismatch.instance import frequency_of
+from analysis.mismatch.lineforetold import line_foretold
 from analysis.mismatch.model import each, simulate
 from analysis.mismatch.null import null_of
 from analysis.mismatch.observe import observe
@@ -133,14 +135,20 @@ class Trial:
         return WholeFrames(layout, lambda name: source.frames(name, numbers[name]), jobs)
 
     def foretold(self, effect: Effect) -> Gained | None:
-        """Return what locked frames gain by bands of light that the others foretell; None: nothing.
+        """Return what locked frames gain by what the others foretell; None: nothing.
 
-        Exposures scatter as what they gain does, were it nothing in the mean.
+        By bands of light, and by lines. Exposures scatter as what they gain does, were it nothing
+        in the mean.
         """
-        if not isinstance(effect, LineFlicker):
-            return None
         lines, locked = self.lines, self.split.locked
-        nats = foretold(lines.layout, lines.frames_of, effect.cycles_per_frame, locked)
+        whole, frequency = (lines.layout, lines.frames_of), frequency_of(effect)
+        if isinstance(effect, LineFlicker):
+            nats = foretold(*whole, effect.cycles_per_frame, locked)
+        elif frequency is not None:
+            kept = effect.kind == "bistable_pattern"
+            nats = line_foretold(*whole, frequency, locked, kept=kept)
+        else:
+            return None
         frames = sum(len(locked.get(e.name, ())) for e in lines.layout.uniform)
         if not (nats.size and frames):
             return None

@@ -13,7 +13,7 @@ from analysis.mismatch.state import State
 Array = NDArray[np.float64]
 Images = Mapping[str, tuple[Array, float]]
 _MAPS = {"row_fpn": "offset", "column_fpn": "offset", "row_prnu": "gain", "column_prnu": "gain"}
-_PARTS = 12  # of a line: of each half of them the middle ones are asked
+_PARTS, _FEWEST = 12, 6  # of a line: of each half of them the middle ones are asked
 _LEAST_PIXELS = 4  # of a part
 _SURE = 2.0  # standard errors
 _MOST = 0.5  # of the lines' variance, that parts of them may make
@@ -44,10 +44,11 @@ def _told(images: Images, axis: int) -> Denial | bool | None:
     products, beside, whole, lines = [], [], 0.0, 0
     for image, noise in images.values():
         across = image if axis else image.T  # (along the line, line)
-        if len(across) < _PARTS * _LEAST_PIXELS:
+        count = min(len(across) // _LEAST_PIXELS, _PARTS)
+        if count < _FEWEST:
             return None
         means = beyond_smooth(across.mean(0)) / noise
-        parts = [beyond_smooth(part.mean(0)) / noise for part in np.array_split(across, _PARTS)]
+        parts = [beyond_smooth(part.mean(0)) / noise for part in np.array_split(across, count)]
         every, other = np.median(parts[::2], 0), np.median(parts[1::2], 0)
         products.append(every * other)
         beside.append(means[1:] * means[:-1])

@@ -15,6 +15,7 @@ _SEEN_STEPS = 100.0  # of chi-squared: ten standard deviations
 _AS_LIKELY = 4.6  # of chi-squared, odds of 10: of few levels, periods may be alike
 _TOLD = 2.0  # standard errors from which levels show an exchange
 _CLEAR = 3.0  # and from which there are diagonals
+_ASKEW = 0.5  # anisotropy from which a fit starts where greens alone tell it
 _LEAST_FLATS = 2  # of one, colours may be the light's
 _BESIDE = {"R": ("Gr", "Gb"), "Gr": ("R", "B"), "Gb": ("B", "R"), "B": ("Gb", "Gr")}
 _NEAR = (_ALONG_ROWS, _ALONG_COLUMNS, "line_correlation", "pixel_variance")
@@ -70,7 +71,33 @@ def _brighter_fatter(clues: Clues) -> Sequence[Proposal]:
             per_dn=(across + down) / 2,
             anisotropy=apart,
         )
+    if product := _exchanged_unequally(clues):
+        rate = max(abs(product) / _ASKEW, (across + down) / 2)
+        found += proposals(
+            "brighter_fatter",
+            ["per_dn", "anisotropy"],
+            ["anisotropy"],
+            per_dn=rate,
+            anisotropy=product / rate,
+        )
     return found
+
+
+def _exchanged_unequally(clues: Clues) -> float:
+    """Return rate per DN times anisotropy by which greens would differ as they do; 0: they do not.
+
+    Next to Gr red lies along its row and blue along its column, to Gb the other way round.
+    """
+
+    def shape(place: tuple[str, str]) -> float:
+        own = {c: clues.signal((place[0], c)) for c in _BESIDE}
+        greens = own["Gr"] + own["Gb"]
+        return 4 * (own["R"] ** 2 - own["B"] ** 2) / greens if greens > 0 else 0.0
+
+    if not set(_BESIDE) <= set(clues.layout.channels):
+        return 0.0
+    product, error = clues.amplitude("channel_ratio", shape)
+    return product if abs(product) > _TOLD * error else 0.0
 
 
 def _exchanged(clues: Clues) -> float:
@@ -213,7 +240,10 @@ def _lag(clues: Clues) -> Sequence[Proposal]:
 
 CANDIDATES = (
     Candidate("crosstalk", (*_NEAR, "channel_ratio"), _crosstalk),
-    Candidate("brighter_fatter", (*_NEAR, "level"), _brighter_fatter),
+    Candidate(
+        "brighter_fatter", (*_NEAR, "level", "channel_ratio"), _brighter_fatter,
+        credited=frozenset({"crosstalk"}),
+    ),
     Candidate(
         "spatial_filtering",
         ("correlation_0_1", "correlation_0_2", "correlation_1_0", "correlation_2_0",

@@ -25,8 +25,8 @@ def together(camera: Camera, proposal: Proposal, given: int) -> tuple[Camera, li
     """Return a camera, and what is fitted in it: a proposal, and what was credited with its part.
 
     The credited effect leaves the camera, and is proposed again with the variance that the other
-    leaves it, or with half of what it shares. Where there is none the camera stays as it is, and so do its first effects, as many
-    as are `given`: they are the user's.
+    leaves it, or with half of what it shares. Where there is none the camera stays as it is, and so
+    do its first effects, as many as are `given`: they are the user's.
     """
     place = _credited(camera, proposal.effect, given)
     if place is None:

@@ -56,10 +56,10 @@ def displaced(state: State, kind: str, mean: Array, without: Array | None = None
     where variances scatter no more than codes that are not equally wide make them. Of a bend that
     levels show is asked, where gains of read-out paths would disagree, whether it is smooth. Of
     filters, crosstalk and charge that repels charge, how alike neighbours are at each level; of
-    counted photons and amplifiers of greens, by how much levels show them; of noise of whole lines, how alike samples along them are; of greens that differ, what other
-    colours share with them; of frames that move as a whole, whether their parts do so alike. Of
-    widths of codes, whether it is codes that never occur which make them differ; of pixels,
-    whether those side by side do alike.
+    counted photons and amplifiers of greens, by how much levels show them; of noise of whole lines,
+    how alike samples along them are; of greens that differ, what other colours share with them; of
+    frames that move as a whole, whether their parts do so alike. Of widths of codes, whether it is
+    codes that never occur which make them differ; of pixels, whether those side by side do alike.
 
     Parameters
     ----------

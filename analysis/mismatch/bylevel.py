@@ -72,9 +72,9 @@ def _levels(
             light = max(float(np.mean([signals[key.exposure, c] for c in channels])), 0.0)
             left = state.vector.values[i] - without[i]
             found.append((mean[i] - without[i], left, light, float(state.null.sd[i])))
-    change, left, light, sd = np.array(found, np.float64).reshape(-1, 4).T
-    usable = np.isfinite(change) & np.isfinite(left) & (sd > 0)
-    return change[usable] / sd[usable], left[usable] / sd[usable], light[usable]
+    changes, rest, lights, errors = np.array(found, np.float64).reshape(-1, 4).T
+    usable = np.isfinite(changes) & np.isfinite(rest) & (errors > 0)
+    return (changes / errors)[usable], (rest / errors)[usable], lights[usable]
 
 
 def _gained(seen: Array, *shapes: Array) -> float:

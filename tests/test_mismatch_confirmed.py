@@ -56,3 +56,12 @@ def test_nobody_overrules_pixels_that_are_sure_it_is_worse(
 ) -> None:
     worse, sure = Gained(_gain(-5, 0.5), certain=False), Gained(_gain(0.6, 0.1), certain=True)
     assert _asked(monkeypatch, worse, sure, by_all=True) == worse
+
+
+def test_what_all_frames_show_is_reported_by_what_exceeds_its_error(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    unsure = Gained(_gain(0.02, 0.12), certain=False)
+    foretold = Gained(_gain(0.17, 0.15), certain=False)
+    found = _asked(monkeypatch, unsure, foretold, by_all=True)
+    assert found == Gained(foretold.gain, certain=True)

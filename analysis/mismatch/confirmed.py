@@ -118,7 +118,8 @@ def _gained(search: Search, final: State, trial: Trial) -> dict[str, Gained]:
             elif (exceeds(one.gain) or exceeds(other.gain)) and shown_by_all(
                 search, final, named, cameras[named.name], trial
             ):
-                told[named.name] = replace(one, certain=True)
+                best = one if exceeds(one.gain) else other
+                told[named.name] = replace(best, certain=True)
         found |= told
         if not all(one.certain for one in found.values()):
             break

@@ -36,6 +36,11 @@ def _state(statistic: str, left: Array, seed: int) -> Any:
                 signal_dn={(n, c): s for n, s in zip(names, LIGHT, strict=True) for c in channels}
             )
         ),
+        setting=SimpleNamespace(
+            seen=SimpleNamespace(
+                levels={(n, c): SimpleNamespace(clipped_high=0.0) for n in names for c in channels}
+            )
+        ),
     )
 
 
@@ -49,7 +54,7 @@ CASES = [
 @pytest.mark.parametrize(("kind", "statistic", "law"), CASES)
 def test_what_grows_with_light_denies_it(kind: str, statistic: str, law: Array) -> None:
     """Grains of light skew noise by what they have in common; charge that is repelled by S^2."""
-    for power in (0.5, 1.0):
+    for power in (0.3, 0.5, 0.75, 1.0, 1.3):
         left = 0.02 * (LIGHT / LIGHT.max()) ** power
         denial = otherwise_by_level(_state(statistic, left, 1), kind, 0 * law, law)
         assert denial is not None
@@ -62,8 +67,12 @@ def test_what_grows_with_light_denies_it(kind: str, statistic: str, law: Array) 
 def test_its_own_law_is_believed_whatever_its_size(
     kind: str, statistic: str, law: Array, size: float
 ) -> None:
-    for seed in range(40):
-        assert otherwise_by_level(_state(statistic, size * law, seed), kind, 0 * law, law) is None
+    """At odds of 20: of an effect that is a fifth of what is predicted a few in a hundred are not."""
+    denied = [
+        otherwise_by_level(_state(statistic, size * law, seed), kind, 0 * law, law) is not None
+        for seed in range(40)
+    ]
+    assert sum(denied) <= (2 if size < 1 else 0)
 
 
 @pytest.mark.parametrize(("kind", "statistic", "law"), CASES)
@@ -82,3 +91,25 @@ def test_of_few_levels_and_of_other_effects_nothing_is_said() -> None:
     assert otherwise_by_level(state, "poisson_shot_noise", 0 * COUNTS, COUNTS) is None
     state = _state("skewness", 0.02 * LIGHT / LIGHT.max(), 1)
     assert otherwise_by_level(state, "nonlinearity", 0 * COUNTS, COUNTS) is None
+
+
+def test_halves_that_do_not_part_the_greens_are_not_denied_by_them() -> None:
+    """What their noise changes there is far below errors: the greens differ for another reason."""
+    rng = np.random.default_rng(3)
+    for seed in range(50):
+        left = 1e-3 * LIGHT / LIGHT.max()
+        state = _state("channel_ratio", left, seed)
+        tap = rng.normal(0, 5e-6, LIGHT.size)
+        assert otherwise_by_level(state, "tap_mismatch", 0 * tap, tap) is None
+
+
+def test_of_its_own_size_beside_another_it_stays() -> None:
+    """Flats from 2000 to 4000 DN: what grows with light is hardly told from a constant."""
+    narrow = np.where(LIGHT > 2000, np.linspace(2000, 4000, LIGHT.size), np.nan)
+    law = np.where(LIGHT > 0, 0.008, 0.0)
+    left = law + np.nan_to_num(0.002 * narrow / 4000)
+    denied = 0
+    for seed in range(60):
+        state = _state("skewness", left, seed)
+        denied += otherwise_by_level(state, "poisson_shot_noise", 0 * law, law) is not None
+    assert denied <= 3

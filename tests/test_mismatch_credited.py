@@ -47,18 +47,6 @@ def test_of_bands_larger_than_all_white_rows_keep_little() -> None:
     assert starts[1].effect.model_dump()["sigma_dn"] == pytest.approx(0.05)
 
 
-def test_crosstalk_that_was_taken_in_first_starts_with_half_of_itself() -> None:
-    """Both leave neighbours alike: what shares do is fitted, and is not given back as variances."""
-    crosstalk = effect("crosstalk", fraction=0.012)
-    charge = Proposal(effect("brighter_fatter", per_dn=5e-7), ("per_dn",))
-    bare, starts = together(camera(crosstalk), charge, 0)
-    assert bare.effect == ()
-    assert [one.effect for one in starts] == [charge.effect, effect("crosstalk", fraction=0.006)]
-    assert starts[1].free == ("fraction",)
-    assert given_back(camera(crosstalk), charge.effect, 0) == camera(crosstalk)
-    assert together(camera(crosstalk), charge, 1) == (camera(crosstalk), [charge])
-
-
 def test_rows_of_the_users_own_give_nothing_back() -> None:
     """They come first, and are addressed by their places: sizes are fitted there."""
     assert together(camera(WHITE, DARK), _bands(0.3), 2) == (camera(WHITE, DARK), [_bands(0.3)])

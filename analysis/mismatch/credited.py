@@ -1,8 +1,7 @@
 """Effects that were credited with what another explains: both are fitted together.
 
 Offsets that rows share are row noise too. Where white row noise was taken in first it has all of
-their variance: beside it nothing that adds to that fits, until it gives some back. So has crosstalk
-of what neighbours share, where charge is repelled as well.
+their variance: beside it nothing that adds to that fits, until it gives some back.
 """
 
 from collections.abc import Sequence
@@ -16,8 +15,6 @@ from dsis.effects import Effect
 
 _SIZE = "sigma_dn"
 _MAY = frozenset(kind for own in CANDIDATES.values() for kind in own.credited)
-_SHARED = {"crosstalk": "fraction"}  # of kinds whose sizes do not add as variances do
-_HALF = 0.5  # of that, where a fit of both starts
 _KEPT = 0.1  # of its size, that the credited effect keeps at least where a fit starts
 
 
@@ -25,21 +22,16 @@ def together(camera: Camera, proposal: Proposal, given: int) -> tuple[Camera, li
     """Return a camera, and what is fitted in it: a proposal, and what was credited with its part.
 
     The credited effect leaves the camera, and is proposed again with the variance that the other
-    leaves it, or with half of what it shares. Where there is none the camera stays as it is, and so
-    do its first effects, as many as are `given`: they are the user's.
+    leaves it. Where there is none the camera stays as it is, and so do its first effects, as many
+    as are `given`: they are the user's.
     """
     place = _credited(camera, proposal.effect, given)
     if place is None:
         return camera, [proposal]
     credited = camera.effect[place]
-    name = _SHARED.get(credited.kind, _SIZE)
-    size = float(getattr(credited, name))
-    if name == _SIZE:
-        other = float(getattr(proposal.effect, _SIZE))
-        left = sqrt(max(size**2 - other**2, (_KEPT * size) ** 2))
-    else:
-        left = _HALF * size
-    again = Proposal(type(credited)(**{**credited.model_dump(), name: left}), (name,))
+    size, other = (float(getattr(own, _SIZE)) for own in (credited, proposal.effect))
+    left = sqrt(max(size**2 - other**2, (_KEPT * size) ** 2))
+    again = Proposal(type(credited)(**{**credited.model_dump(), _SIZE: left}), (_SIZE,))
     return _without(camera, place), [proposal, again]
 
 
@@ -52,11 +44,10 @@ def joined(camera: Camera, effects: Sequence[Effect], given: int) -> Camera | No
 def given_back(camera: Camera, effect: Effect, given: int) -> Camera:
     """Return a camera without an effect in which what was credited has its part again.
 
-    Variances add: no effect is to gain what another would explain without it. What does not add is
-    left as it is, until it is fitted anew.
+    Variances add: no effect is to gain what another would explain without it.
     """
     place = _credited(camera, effect, given)
-    if place is None or camera.effect[place].kind in _SHARED:
+    if place is None:
         return camera
     credited = camera.effect[place]
     size = hypot(float(getattr(credited, _SIZE)), float(getattr(effect, _SIZE)))

@@ -16,6 +16,7 @@ from analysis.mismatch.phaselaw import of_exposures, there_in
 from analysis.mismatch.projections import LEAST, FramesOf, Power, projections
 
 _FAR = (-23, -17, -13, -9, 9, 13, 17, 23)  # bins that say what rows or columns have in common
+_NEAR = (-2, -1, 1, 2)  # bins that a line leaves as they are
 _LEAST_EACH = 2  # frames of an exposure, that know what is fixed
 
 
@@ -30,8 +31,8 @@ def line_foretold(
     """Return what locked frames gain by a line that the others show: nats of each exposure.
 
     Odds of all frames less those of the others, by what these know: size, noise, and of a phase
-    that is kept but for its sign the phase. Exposures are added one after another. None where the
-    others show no line.
+    that is kept but for its sign the phase. Exposures are added one after another. An empty array
+    where the others are too few, or show no power there, or as much beside.
 
     Parameters
     ----------
@@ -45,8 +46,9 @@ def line_foretold(
         Whether the phase is kept but for its sign; else it is another in each frame.
     """
     fx, fy = frequency
-    across = [(fx + k / layout.columns, fy) for k in _FAR]
-    down = [(fx, fy + k / layout.rows) for k in _FAR]
+    bins = (*_NEAR, *_FAR)
+    across = [(fx + k / layout.columns, fy) for k in bins]
+    down = [(fx, fy + k / layout.rows) for k in bins]
     power = Power.of(layout, projections(layout, frames_of, [frequency, *across, *down]))
     rest = [~np.isin(e.numbers, locked.get(e.name, ())) for e in layout.uniform]
     if any(own.sum() < _LEAST_EACH for own in rest):
@@ -54,11 +56,15 @@ def line_foretold(
     others = tuple(
         own[some] - own[some].mean(0) for own, some in zip(power.found, rest, strict=True)
     )
-    known = Power(others, power.weights)
-    noise = known.ground([slice(1, 1 + len(_FAR)), slice(1 + len(_FAR), None)])
+    known, groups = Power(others, power.weights), []
+    for first in (1, 1 + len(bins)):
+        far = first + len(_NEAR)
+        groups += [slice(first, far), slice(far, first + len(bins))]
+    noise = known.ground(groups)
     known = known.over(noise)
-    size = float(known.excess[0])
-    if known.frames < LEAST or not size > 0:
+    if known.frames < LEAST or not (size := float(known.excess[0])) > 0:
+        return np.zeros(0)
+    if any(known.crowded(range(near.start, near.stop), size) for near in groups[::2]):
         return np.zeros(0)
     real = all((2 * f) % 1 == 0 for f in frequency)
     sizes = [float(np.sqrt(size * weight)) for weight in known.weights]

@@ -41,7 +41,7 @@ Array = NDArray[np.float64]
 _MOST_EFFECTS = 20  # some may have to go again
 _CHOSEN = frozenset({"adc_memory", "dual_gain"})  # a period, a gap between levels
 _MOST_LINES = 5  # further ones stay unexplained, located
-_ROUNDS = 6  # of a search that goes on: in each, what was taken in may be denied
+_ROUNDS, _FEW_ROUNDS = 6, 3  # of a search that goes on; of a large recording
 
 
 @dataclass
@@ -92,7 +92,7 @@ class Search(Fitted):
         named is judged even where nothing is added.
         """
         forgiven: dict[str, str] = {}
-        for number in range(_ROUNDS):
+        for number in range(_FEW_ROUNDS if self.setting.large else _ROUNDS):
             known = len(self.named)
             state = self._sought(state)
             if len(self.named) == known and not again:

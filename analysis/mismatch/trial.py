@@ -1,7 +1,7 @@
 """The locked frames: what they say of the base model, the final model and every effect."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 
 import numpy as np
@@ -153,7 +153,13 @@ class Trial:
         if not (nats.size and frames):
             return None
         told = Ratio(float(nats.sum()), float(np.sqrt(nats @ nats)), certain=False)
-        return _of_pixels(_per_frame(told, frames), frames)
+        found = _of_pixels(_per_frame(told, frames), frames)
+        if isinstance(effect, LineFlicker):
+            return found
+        # The locked frames had a say in where the line is: chance gains some nats by that.
+        if told.nats <= _BARE:
+            return None
+        return replace(found, certain=found.certain and told.nats > _TOTAL)
 
     def gains(self, final: State, without: Mapping[str, Camera]) -> dict[str, Gained]:
         """Return what the final model gains over cameras without an effect, by effect."""

@@ -15,6 +15,7 @@ _SEEN_STEPS = 100.0  # of chi-squared: ten standard deviations
 _AS_LIKELY = 4.6  # of chi-squared, odds of 10: of few levels, periods may be alike
 _TOLD = 2.0  # standard errors from which levels show an exchange
 _CLEAR = 3.0  # and from which there are diagonals
+_MOST = 0.1  # of a pixel's charge, that it gives a neighbour
 _ASKEW = 0.5  # anisotropy from which a fit starts where greens alone tell it
 _LEAST_FLATS = 2  # of one, colours may be the light's
 _BESIDE = {"R": ("Gr", "Gb"), "Gr": ("R", "B"), "Gb": ("B", "R"), "B": ("Gb", "Gr")}
@@ -73,13 +74,14 @@ def _brighter_fatter(clues: Clues) -> Sequence[Proposal]:
         )
     if product := _exchanged_unequally(clues):
         rate = max(abs(product) / _ASKEW, (across + down) / 2)
-        found += proposals(
-            "brighter_fatter",
-            ["per_dn", "anisotropy"],
-            ["anisotropy"],
-            per_dn=rate,
-            anisotropy=product / rate,
-        )
+        if rate * max(map(clues.signal, clues.seen.levels)) < _MOST:
+            found += proposals(
+                "brighter_fatter",
+                ["per_dn", "anisotropy"],
+                ["anisotropy"],
+                per_dn=rate,
+                anisotropy=product / rate,
+            )
     return found
 
 
@@ -241,8 +243,7 @@ def _lag(clues: Clues) -> Sequence[Proposal]:
 CANDIDATES = (
     Candidate("crosstalk", (*_NEAR, "channel_ratio"), _crosstalk),
     Candidate(
-        "brighter_fatter", (*_NEAR, "level", "channel_ratio"), _brighter_fatter,
-        credited=frozenset({"crosstalk"}),
+        "brighter_fatter", (*_NEAR, "level"), _brighter_fatter, hints=("channel_ratio",)
     ),
     Candidate(
         "spatial_filtering",

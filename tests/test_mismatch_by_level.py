@@ -67,7 +67,7 @@ def test_what_grows_with_light_denies_it(kind: str, statistic: str, law: Array) 
 def test_its_own_law_is_believed_whatever_its_size(
     kind: str, statistic: str, law: Array, size: float
 ) -> None:
-    """At odds of 20: of an effect that is a fifth of what is predicted a few in a hundred are not."""
+    """At odds of 20: of a fifth of what is predicted few in a hundred are not."""
     denied = [
         otherwise_by_level(_state(statistic, size * law, seed), kind, 0 * law, law) is not None
         for seed in range(40)

@@ -90,3 +90,19 @@ def test_where_all_frames_are_locked_nothing_is_foretold() -> None:
     every = {"flat": tuple(range(FRAMES))}
     frames = _frames(2 * SIZE, 3, kept=True)
     assert not line_foretold(_layout(), frames, AT, every, kept=True).size
+
+
+def test_beside_a_stronger_line_nothing_is_foretold() -> None:
+    """What leaks from half a bin off raises all neighbours: it is no line of its own."""
+    y = np.arange(ROWS)[:, np.newaxis]
+
+    def frames(name: str) -> Iterator[NDArray[np.float64]]:
+        rng = np.random.default_rng([4, name == "dark"])
+        for _ in range(FRAMES):
+            line = np.sin(2 * np.pi * (20.5 / ROWS * y + rng.uniform(0, 1)))
+            yield line + rng.normal(0, SD[name], (ROWS, COLUMNS))
+
+    for cycles in (15.0, 17.0, 24.0):
+        assert not line_foretold(_layout(), frames, (0.0, cycles / ROWS), LOCKED, kept=False).size
+    there = line_foretold(_layout(), frames, (0.0, 20.5 / ROWS), LOCKED, kept=False)
+    assert there.sum() > 50

@@ -36,6 +36,7 @@ def _state(
     regressors = SimpleNamespace(scales={"time": TIME_S})
     return SimpleNamespace(
         setting=SimpleNamespace(
+            asked_again=False,
             seen=SimpleNamespace(images=images),
             layout=SimpleNamespace(regressors=lambda _: regressors),
         ),

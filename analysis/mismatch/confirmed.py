@@ -6,6 +6,7 @@ from functools import partial
 
 from analysis.mismatch.allframes import shown_by_all
 from analysis.mismatch.finding import Gain
+from analysis.mismatch.fixedforetold import FIXED_LINES
 from analysis.mismatch.instance import same_place
 from analysis.mismatch.judge import Judge
 from analysis.mismatch.model import side_by_side
@@ -112,7 +113,7 @@ def _gained(search: Search, final: State, trial: Trial) -> dict[str, Gained]:
             one = told[named.name]
             if one.certain:
                 continue
-            other = _foretold(named, cameras[named.name], trial, one)
+            other = _foretold(search, named, cameras[named.name], trial, one)
             if other.certain:
                 told[named.name] = other
             elif (exceeds(one.gain) or exceeds(other.gain)) and shown_by_all(
@@ -126,8 +127,10 @@ def _gained(search: Search, final: State, trial: Trial) -> dict[str, Gained]:
     return found
 
 
-def _foretold(named: Named, without: Camera, trial: Trial, told: Gained) -> Gained:
-    """Return what locked frames gain by bands or a line that the others foretell; else `told`.
+def _foretold(
+    search: Search, named: Named, without: Camera, trial: Trial, told: Gained
+) -> Gained:
+    """Return what locked frames gain by bands or lines that the others foretell; else `told`.
 
     Pixels know nothing of a phase that moves on or is kept, nor that few exposures show it; but
     what they are sure of is not asked again. `without` is the camera without the effect: beside
@@ -138,6 +141,9 @@ def _foretold(named: Named, without: Camera, trial: Trial, told: Gained) -> Gain
     effect, layout = named.proposal.effect, trial.numbers.whole[0]
     if any(same_place(effect, one, layout) for one in without.effect):
         return told
+    if effect.kind in FIXED_LINES and search.whole is not None:
+        bare = State.of(search.whole, without, search.step)
+        return trial.fixed_foretold(bare, effect) or told
     return trial.foretold(effect) or told
 
 

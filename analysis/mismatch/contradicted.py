@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from analysis.mismatch.candidates import CANDIDATES
 from analysis.mismatch.credited import joined
+from analysis.mismatch.layout import Place
 from analysis.mismatch.masked import with_path
 from analysis.mismatch.polish import Polished
 from analysis.mismatch.predict import Predictor
@@ -94,34 +95,50 @@ def refuted(
 
 
 def _of_codes(state: State, kind: str, mean: Array) -> Denial | None:
-    """Return how an effect on the noise's shape is denied by coarse codes; None: it is not.
+    """Return how an effect is denied by coarse codes; None: it is not.
 
-    The shape of noise that is no wider than a step between codes is the steps': where these are
-    wider than the model's, and unexplained, nothing else is told by it. `mean` are the numbers
-    with the effect; most of what it changes may be such.
+    The shape of noise that is no wider than the distance of the codes is theirs, and its mean lies
+    by up to half of it off: where codes are farther apart than the model's, and that is
+    unexplained, nothing else is told by it. `mean` are the numbers with the effect; most of what it
+    changes may be such.
     """
     if all(m.statistic != "code_spacing" for m in state.mismatches):
         return None
-    coarse = {
-        key.place
-        for key, log_dn, model in zip(
-            state.vector.keys, state.vector.values, state.null.mean, strict=True
-        )
-        if key.statistic == "code_spacing" and key.place in state.setting.seen.levels
-        if log_dn - model > _WIDER
-        and state.setting.seen.levels[key.place].variance_dn2 <= 4.0**log_dn
-    }
+    coarse = _coarse(state)
     known = state.null.known & np.isfinite(mean)
-    change = np.where(known, (np.nan_to_num(mean) - state.null.mean) / state.null.sd, 0.0) ** 2
+    moved = np.where(known, np.nan_to_num(mean) - state.null.mean, 0.0)
+    change = (moved / state.null.sd) ** 2
     calls = CANDIDATES[kind].calls if kind in CANDIDATES else ()
     own = np.array([key.statistic in calls for key in state.vector.keys])
     theirs = np.array(
-        [key.statistic in _SHAPE and key.place in coarse for key in state.vector.keys]
+        [
+            key.place in coarse
+            and (
+                key.statistic in _SHAPE
+                or (key.statistic == "level" and abs(dn) <= coarse[key.place] / 2)
+            )
+            for key, dn in zip(state.vector.keys, moved.tolist(), strict=True)
+        ]
     )
     whole, feigned = float(change[own].sum()), float(change[own & theirs].sum())
     if feigned <= _MOST * whole:
         return None
     return Denial(1 - feigned / whole, "codes come in steps no finer than the noise they shape")
+
+
+def _coarse(state: State) -> dict[Place, float]:
+    """Return the distance of codes, DN, where it is wider than the model's and than the noise."""
+    found: dict[Place, float] = {}
+    seen = state.setting.seen
+    for key, log_dn, model in zip(
+        state.vector.keys, state.vector.values, state.null.mean, strict=True
+    ):
+        if key.statistic != "code_spacing" or key.place not in seen.levels:
+            continue
+        gap = float(np.nanmax([2.0**log_dn, seen.gaps_dn.get(key.place, np.nan)]))
+        if gap > 2 ** (model + _WIDER) and seen.levels[key.place].variance_dn2 <= gap**2:
+            found[key.place] = gap
+    return found
 
 
 def _denied(

@@ -117,7 +117,7 @@ def _found(
     seen = observe(layout, frames_of, album, keep=True, threads=how[1])
     large = layout.large
     setting = Setting.of(layout, seen, split.interpolated, *how)
-    setting = replace(setting, given=len(camera.effect))
+    setting = replace(setting, given=len(camera.effect), asked_again=not large)
 
     trial = Trial.of(recording, split, source, setting)
     whole = State.of(setting if large else _of_all_frames(setting, trial), camera, step)
@@ -205,7 +205,7 @@ def _of_all_frames(setting: Setting, trial: Trial) -> Setting:
     Whether anything differs is asked of all; what it is, of those that are not locked.
     """
     layout, seen = trial.numbers.whole
-    return replace(setting, layout=layout, seen=seen)
+    return replace(setting, layout=layout, seen=seen, asked_again=False)
 
 
 def _calibrated_to(setting: Setting, whole: State, camera: Camera) -> Calibrated:

@@ -87,7 +87,8 @@ def displaced(state: State, kind: str, mean: Array, without: Array | None = None
         if denial is not None:
             return denial
     denial = of_moving_parts(state, kind, without) or otherwise_by_level(state, kind, without, mean)
-    denial = denial or of_late_light(state, kind) or shared_otherwise(state, kind, without)
+    denial = denial or of_few_lines(state, kind, without, mean) or of_late_light(state, kind)
+    denial = denial or shared_otherwise(state, kind, without)
     return denial or no_brighter_alike(state, kind, without)
 
 

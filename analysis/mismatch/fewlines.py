@@ -19,14 +19,18 @@ _FIXED: Mapping[str, Axis] = {
     "column_prnu": "column",
 }
 _OF_LIGHT = frozenset({"row_prnu", "column_prnu"})
+_PINK = "pink_noise"  # drawn anew for all lines, too
 _CHANCE = 1e-3  # that any line moves so much farther than the others
 _MOST = 0.5  # of what an effect would explain, that few lines may make
 
 
-def of_few_lines(state: State, kind: str, without: Array) -> Denial | None:
+def of_few_lines(
+    state: State, kind: str, without: Array, mean: Array | None = None
+) -> Denial | None:
     """Return how lines that differ are denied by few of them that move; None: they are not.
 
-    `without` are the numbers predicted without the effect.
+    `without` are the numbers predicted without the effect, `mean` those with it: pink noise may be
+    that of rows or of columns.
 
     Offsets that are drawn anew for all lines of a frame move all of them alike: the sum of squares
     of each is chi-squared, about a mean that the middle one tells, whatever moves them besides.
@@ -34,6 +38,8 @@ def of_few_lines(state: State, kind: str, without: Array) -> Denial | None:
     brighter or darker in the mean as well - and without them half is left of what an effect
     explains, or less, there may be nothing that all lines have.
     """
+    if kind == _PINK and mean is not None:
+        kind = f"{_changed_most(state, mean - without)}_noise"
     axis = _NEW.get(kind) or _FIXED.get(kind)
     if axis is None:
         return None
@@ -44,10 +50,10 @@ def of_few_lines(state: State, kind: str, without: Array) -> Denial | None:
     if not few.any():
         return None
     if kind in _NEW:
-        excess = _moving(own, _factors(state, exposures, (f"{axis}_variance",), without))
+        excess = _moving(own, grown_by(state, exposures, (f"{axis}_variance",), without))
     else:
         of_means = ("fixed_pixel_variance", f"fixed_{axis}_variance")
-        factors = _factors(state, exposures, of_means, without)
+        factors = grown_by(state, exposures, of_means, without)
         signals, channels = state.calibrated.fit.signal_dn, state.setting.layout.channels
         light = [float(np.mean([signals[e, c] for c in channels])) for e in exposures]
         excess = _fixed(own, light if kind in _OF_LIGHT else [1.0] * len(own), factors)
@@ -56,6 +62,16 @@ def of_few_lines(state: State, kind: str, without: Array) -> Denial | None:
         return None
     why = f"few {axis}s that move by themselves from frame to frame make most of it"
     return Denial(max(rest / whole, 0.0), why)
+
+
+def _changed_most(state: State, change: Array) -> Axis:
+    """Return the axis whose lines' variances a change of the numbers raises by more."""
+    size: dict[Axis, float] = {"row": 0.0, "column": 0.0}
+    for axis in size:
+        own = np.array([key.statistic == f"{axis}_variance" for key in state.vector.keys])
+        own &= state.null.known & np.isfinite(change)
+        size[axis] = float(((change[own] / state.null.sd[own]) ** 2).sum())
+    return max(size, key=lambda axis: size[axis])
 
 
 def moving_farther(own: Sequence[LineMeans]) -> NDArray[np.bool_]:
@@ -78,7 +94,7 @@ def moving_farther(own: Sequence[LineMeans]) -> NDArray[np.bool_]:
     return np.asarray(squares / unit > float(chi2.isf(_CHANCE / squares.size, few)))
 
 
-def _factors(
+def grown_by(
     state: State, exposures: Sequence[str], names: Sequence[str], without: Array
 ) -> list[float]:
     """Return by which factor lines move, or differ, more than noise of pixels makes them.

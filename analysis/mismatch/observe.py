@@ -105,6 +105,8 @@ class Observation:
         Where the codes lie that occur, by exposure and channel, clipped ends left out.
     middles
         Kept on demand: codes in the middle of their histograms, by exposure and channel.
+    gaps_dn
+        Kept on demand: how far apart the codes lie that occur, by exposure and channel.
     """
 
     levels: Mapping[Place, Level]
@@ -121,6 +123,7 @@ class Observation:
     shifts: Mapping[str, Shifts] = field(default_factory=dict)
     lattices: Mapping[Place, Lattice] = field(default_factory=dict)
     middles: Mapping[Place, Middle] = field(default_factory=dict)
+    gaps_dn: Mapping[Place, float] = field(default_factory=dict)
 
     def level(self, place: Place) -> Level | None:
         """Return mean and variance at a place, of a scene or not; None: it is none."""
@@ -197,6 +200,7 @@ def observing(
     found: dict[Place, Mapping[str, Number]] = {}
     lattices: dict[Place, Lattice] = {}
     middles: dict[Place, Middle] = {}
+    gaps: dict[Place, float] = {}
     sums: dict[str, ChannelSums] = {}
     whole = SensorSums(layout, samples=kept.images and kept.samples, made=kept.made)
     lines: dict[tuple[str, Axis], LineMeans] = {}
@@ -216,6 +220,7 @@ def observing(
         lattices |= _of_codes(one.exposure, measured, lambda codes: codes.lattice)
         if kept.images:
             middles |= _of_codes(one.exposure, measured, lambda codes: codes.middle)
+            gaps |= _of_codes(one.exposure, measured, lambda codes: codes.gap)
         if kept.images and not still:
             lines |= {(one.exposure, axis): whole.lines(one, axis) for axis in AXES}
         if watch is not None:
@@ -255,6 +260,7 @@ def observing(
         shifts if kept.images else {},
         lattices,
         middles,
+        gaps,
     )
 
 

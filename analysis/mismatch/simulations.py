@@ -60,7 +60,7 @@ class Simulations:
             for key in wanted
             if number >= len(self.kept.get(key, ()))
         ]
-        if self.jobs < 2 or len(missing) < 2:
+        if len(missing) < 2:
             return
 
         own = self.model.camera

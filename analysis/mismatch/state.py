@@ -48,6 +48,8 @@ class Setting:
         Whether the recording, of which this may be a part, is large: simulations take long.
     given
         How many effects the user's camera has: they come first, those taken in after them.
+    asked_again
+        Whether all frames will be asked what these leave undecided.
     """
 
     layout: Layout
@@ -62,6 +64,7 @@ class Setting:
     polishing: int
     large: bool = False
     given: int = 0
+    asked_again: bool = False
 
     @classmethod
     def of(

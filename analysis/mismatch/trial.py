@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from analysis.mismatch.bandgain import foretold
 from analysis.mismatch.finding import Change, Gain, Proof
+from analysis.mismatch.fixedforetold import fixed_foretold
 from analysis.mismatch.given import Ratio
 from analysis.mismatch.heldnumbers import HeldNumbers
 from analysis.mismatch.instance import frequency_of
@@ -23,6 +24,7 @@ from analysis.mismatch.prove.held import Held, hold
 from analysis.mismatch.prove.likelihood import Loglik
 from analysis.mismatch.prove.proof import hold_seen, loglik_of, prove_held
 from analysis.mismatch.prove.virtual import Signals
+from analysis.mismatch.rank import SURE_GAIN
 from analysis.mismatch.source import Source
 from analysis.mismatch.split import Split
 from analysis.mismatch.state import Setting, State, judged
@@ -160,6 +162,23 @@ class Trial:
         if told.nats <= _BARE:
             return None
         return replace(found, certain=found.certain and told.nats > _TOTAL)
+
+    def fixed_foretold(self, bare: State, effect: Effect) -> Gained | None:
+        """Return what locked frames gain by a fixed deviation of lines; None: nothing.
+
+        `bare` is the model of all frames without it. What is fixed is drawn once, for each line:
+        of the same draws locked frames are a few more, which say little by themselves. Where they
+        gain by it, the odds of all frames count that take an effect into a search, once its size is
+        paid for.
+        """
+        nats, of_all = fixed_foretold(bare, self.numbers.rest[1], effect)
+        frames = self.numbers.frames
+        if not (nats.size and frames):
+            return None
+        told = Ratio(float(nats.sum()), float(np.sqrt(nats @ nats)), certain=False)
+        found = _of_pixels(_per_frame(told, frames), frames)
+        shown = told.nats > _BARE and float(of_all.sum()) - 1 >= SURE_GAIN
+        return replace(found, certain=found.certain or shown)
 
     def gains(self, final: State, without: Mapping[str, Camera]) -> dict[str, Gained]:
         """Return what the final model gains over cameras without an effect, by effect."""

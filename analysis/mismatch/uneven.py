@@ -1,5 +1,6 @@
 """Dark current that parts of a sensor do not have: something else grows with exposure time."""
 
+from dataclasses import dataclass
 from itertools import product
 from math import log
 
@@ -8,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 from analysis.mismatch.bank.robust import drawn_in, typical_square
+from analysis.mismatch.bank.seams import beyond_smooth
 from analysis.mismatch.candidates.patterns import EXTENTS, PLACES, glowing
 from analysis.mismatch.contradicted import Denial, rival
 from analysis.mismatch.leftopen import warm_left
@@ -118,31 +120,85 @@ def _glowing(state: State, effect: DarkCurrent) -> Denial | None:
     Of a glow of shape g and mean m the map is m (g / mean(g) - 1) and noise: m is known as well as
     pixels tell, a normal variate, over which the likelihood ratio is integrated in closed form; so
     it is over all places and extents that a glow is looked for in, each as likely. Noise is that of
-    the map's pixels where they scatter more than frames alone make them.
+    the map's pixels where they scatter more than frames alone make them, and of its rows and
+    columns where these do: noise of whole lines is not averaged along them. Where all frames will be
+    asked, only a glow that is likelier denies.
     """
-    maps = {
-        c: (image, max(noise, typical_square(image - image.mean()) ** 0.5))
-        for (c, name), (image, noise) in state.setting.seen.images.items()
-        if name == "time"
-    }
+    layout, ratios = state.setting.layout, []
+    images = {c: own for (c, name), own in state.setting.seen.images.items() if name == "time"}
+    alike = min(len(images), 2)  # channels that share a line, and its noise
+    maps = {c: _Map.of(*own, alike) for c, own in images.items()}
     if not maps:
         return None
-    layout, ratios = state.setting.layout, []
     pixels = sum(
-        image.size * (effect.dn_per_s * layout.regressors(c).scales["time"] / noise) ** 2
-        for c, (image, noise) in maps.items()
+        own.image.size * (effect.dn_per_s * layout.regressors(c).scales["time"]) ** 2 / own.mean_dn2
+        for c, own in maps.items()
     )
     for place, extent in product(PLACES, EXTENTS):
         square = along = 0.0
-        for channel, (image, noise) in maps.items():
-            glow = glowing(image.shape, place, extent)
+        for channel, own in maps.items():
+            glow = glowing(own.image.shape, place, extent)
             growth = effect.dn_per_s * layout.regressors(channel).scales["time"]
-            shape = growth * (glow / glow.mean() - 1) / noise
-            square += float((shape**2).sum())
-            along += float((shape * drawn_in(image / noise)).sum())
+            of_shape, of_both = own.products(growth * (glow / glow.mean() - 1))
+            square += of_shape
+            along += of_both
         ratios.append(_ratio(square, along, pixels))
     behind = float(logsumexp(ratios)) - log(len(ratios))
+    if state.setting.asked_again and behind <= 0:
+        return None
     return rival(behind, "of the sensor what grows with exposure time may as well be a glow")
+
+
+@dataclass(frozen=True)
+class _Map:
+    """A map of one channel, about its mean, and the variances of its noise.
+
+    Attributes
+    ----------
+    image
+        What is far out is drawn in: (row, column).
+    pixel_dn2, row_dn2, column_dn2
+        Of single pixels; of waves that are constant along rows, and along columns.
+    """
+
+    image: Array
+    pixel_dn2: float
+    row_dn2: float
+    column_dn2: float
+
+    @classmethod
+    def of(cls, image: Array, noise: float, alike: int) -> "_Map":
+        """Return a map of known noise of frames; `alike` channels share the noise of a line."""
+        drawn, lines = drawn_in(image), []
+        pixel = max(noise**2, typical_square(image - image.mean()))
+        for axis in (1, 0):
+            seen = typical_square(beyond_smooth(drawn.mean(axis))) * image.shape[axis]
+            lines.append(pixel + alike * max(seen - pixel, 0.0))
+        return cls(drawn, pixel, *lines)
+
+    @property
+    def mean_dn2(self) -> float:
+        """The variance of the mean, times the pixels."""
+        return self.row_dn2 + self.column_dn2 - self.pixel_dn2
+
+    def products(self, shape: Array) -> tuple[float, float]:
+        """Return the square of a shape, and its product with the map, in units of noise."""
+        square = along = 0.0
+        parts = (_lines_apart(shape), _lines_apart(self.image))
+        variances = (self.row_dn2, self.column_dn2, self.pixel_dn2)
+        for own, seen, variance in zip(*parts, variances, strict=True):
+            square += float((own**2).sum()) / variance
+            along += float((own * seen).sum()) / variance
+        return square, along
+
+
+def _lines_apart(image: Array) -> tuple[Array, Array, Array]:
+    """Return what rows of an image have in common, what columns have, and the rest: its size."""
+    apart = image - image.mean()
+    rows, columns = apart.mean(1, keepdims=True), apart.mean(0, keepdims=True)
+    rest = apart - rows - columns
+    none = np.zeros_like(apart)
+    return none + rows, none + columns, rest
 
 
 def _ratio(square: float, along: float, precision: float) -> float:

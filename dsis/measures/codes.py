@@ -28,6 +28,7 @@ _REMEMBERED = 4096  # transforms up to this size keep their bands: 17 MB at most
 _LEAST_DOF, _NODES = 4.0, 20
 _MIDDLE = (0.05, 0.95)  # of the samples: there no density is less than a tenth of its mean
 _EXPECTED = 300.0  # samples a code there on average: at a tenth of it none is missed by chance
+_FEW = 20.0  # samples a code there: of fewer many are missed by chance
 
 
 @dataclass(frozen=True)
@@ -200,6 +201,25 @@ class Codes:
             return None
         absent = start + step * (first + np.flatnonzero(inside == 0))
         return Middle(int(start + step * first), int(start + step * last), step, absent)
+
+    @property
+    def gap(self) -> float:
+        """How far apart the codes lie that occur, DN, mean over samples; nan: it cannot be told.
+
+        Each sample has half the distance between the codes on both sides of its own. So it is the
+        step of a converter whose steps are alike, and what most samples are rounded to where they
+        are not. Of few samples a code codes are missed by chance: nothing is told.
+        """
+        used = np.flatnonzero(self.counts)
+        if used.size < 2:
+            return nan
+        below = np.cumsum(self.counts) / self.total
+        first, last = np.searchsorted(below, _MIDDLE)
+        if self.total < _FEW * (last - first + 1) / max(self.lattice.step if self.lattice else 1, 1):
+            return nan
+        apart = np.diff(used).astype(np.float64)
+        around = (np.append(apart, apart[-1]) + np.insert(apart, 0, apart[0])) / 2
+        return float(around @ self.counts[used] / self.total)
 
     @cached_property
     def _inner(self) -> NDArray[np.intp]:

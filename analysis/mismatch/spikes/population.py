@@ -23,6 +23,9 @@ _BY_TAIL = 0.02  # chance that so many are strong
 _MOST = 1e-4  # of the samples
 _COMPLETE = 0.8  # of the spikes, where noise is least, that are strong
 _TAIL = 0.25  # as many would be of a tail that falls with the square of the distance, and more
+_FALLING = 2.0  # power of the distance with which a tail falls at least, if noise has a variance
+_MOSTLY = 0.5  # of the spikes that are strong, where distances of all say that they are no tail
+_BY_FALL = 1e-3  # chance that those of a tail are as large
 _NEGATIVE = 0.1  # of the spikes
 _RETURNING = 0.2  # pixels that come back, beside the spikes
 _BLINKING = 0.05  # of them, where they rise as high: others may do so once
@@ -121,7 +124,9 @@ def _certain(once: Hits, electron_dn: float, samples: int) -> bool:
     """Return whether one-off samples are no tail of a law of noise.
 
     Spikes of one law of heights fall below thirty noises where noise is large: so whether nearly
-    all are above is asked of the exposures where it is least, as many as say so.
+    all are above is asked of the exposures where it is least, as many as say so. Beside noise whose
+    own tail reaches past eight, more than half have to be, and all together so far as no such tail
+    does.
     """
     strong = (once.ratio > STRONG) & (once.height_dn > _ELECTRONS * electron_dn)
     positive = once.ratio > 0
@@ -135,7 +140,18 @@ def _certain(once: Hits, electron_dn: float, samples: int) -> bool:
         tail = scipy.stats.binom.sf(n - 1, of, _TAIL) > _BY_TAIL
         if n >= max(_LEAST, _COMPLETE * of) and not tail:
             return True
+        if n >= max(_LEAST, _MOSTLY * of) and _farther(once.ratio[own & positive]) < _BY_FALL:
+            return True
     return False
+
+
+def _farther(ratio: Array) -> float:
+    """Return the chance that samples of a tail are as far, which falls with a power of distance.
+
+    Of that the logarithms of distances, from where they begin, are exponential: their sum is a
+    gamma variate (Hill, Annals of Statistics 3, 1975).
+    """
+    return float(scipy.stats.gamma.sf(_FALLING * np.log(ratio / SPIKE).sum(), ratio.size))
 
 
 def _echoes(hits: Hits) -> Flags:

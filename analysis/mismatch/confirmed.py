@@ -127,9 +127,7 @@ def _gained(search: Search, final: State, trial: Trial) -> dict[str, Gained]:
     return found
 
 
-def _foretold(
-    search: Search, named: Named, without: Camera, trial: Trial, told: Gained
-) -> Gained:
+def _foretold(search: Search, named: Named, without: Camera, trial: Trial, told: Gained) -> Gained:
     """Return what locked frames gain by bands or lines that the others foretell; else `told`.
 
     Pixels know nothing of a phase that moves on or is kept, nor that few exposures show it; but

@@ -121,8 +121,8 @@ def _glowing(state: State, effect: DarkCurrent) -> Denial | None:
     pixels tell, a normal variate, over which the likelihood ratio is integrated in closed form; so
     it is over all places and extents that a glow is looked for in, each as likely. Noise is that of
     the map's pixels where they scatter more than frames alone make them, and of its rows and
-    columns where these do: noise of whole lines is not averaged along them. Where all frames will be
-    asked, only a glow that is likelier denies.
+    columns where these do: noise of whole lines is not averaged along them. Where all frames will
+    be asked, only a glow that is likelier denies.
     """
     layout, ratios = state.setting.layout, []
     images = {c: own for (c, name), own in state.setting.seen.images.items() if name == "time"}

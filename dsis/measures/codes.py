@@ -213,9 +213,9 @@ class Codes:
         used = np.flatnonzero(self.counts)
         if used.size < 2:
             return nan
-        below = np.cumsum(self.counts) / self.total
-        first, last = np.searchsorted(below, _MIDDLE)
-        if self.total < _FEW * (last - first + 1) / max(self.lattice.step if self.lattice else 1, 1):
+        first, last = np.searchsorted(np.cumsum(self.counts) / self.total, _MIDDLE)
+        step = max(self.lattice.step if self.lattice else 1, 1)
+        if self.total * step < _FEW * (last - first + 1):
             return nan
         apart = np.diff(used).astype(np.float64)
         around = (np.append(apart, apart[-1]) + np.insert(apart, 0, apart[0])) / 2

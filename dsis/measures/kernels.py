@@ -67,11 +67,13 @@ def offsets(by_row: Sums, by_column: Sums, single: bool) -> tuple[Sums, Sums, Su
     """
     rows, columns = by_row.shape[0], by_column.shape[1]
     if single:
-        by_line = by_row.sum(1)
+        by_line = by_row[:, 0] + by_row[:, 1]
         mean = by_line.sum() / (rows * columns)
-        of_columns = (by_column[0] + by_column[1]) / rows - mean
-        of_rows = np.repeat(by_line / columns, 2).reshape(rows, 2)
-        return of_rows, np.tile(of_columns, (2, 1)), np.full((2, 2), mean)
+        of_rows, of_columns, means = np.empty((rows, 2)), np.empty((2, columns)), np.empty((2, 2))
+        of_rows[:] = (by_line / columns)[:, np.newaxis]
+        of_columns[:] = (by_column[0] + by_column[1]) / rows - mean
+        means[:] = mean
+        return of_rows, of_columns, means
     down, across = (np.array([(size + 1) // 2, size // 2]) for size in (rows, columns))
     means = np.array([by_row[0::2].sum(0), by_row[1::2].sum(0)]) / np.outer(down, across)
     of_columns = by_column / down[:, np.newaxis] - means[:, np.arange(columns) & 1]

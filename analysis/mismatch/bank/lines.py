@@ -5,13 +5,13 @@ sinusoid is a single bin, or leaks into few where its frequency lies between bin
 """
 
 from collections.abc import Iterator
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import betainc, gammaincc, gammainccinv, gammaincinv, gammaln, polygamma
-from scipy.stats import norm
+from scipy.special import betainc, gammaincc, gammainccinv, gammaln, log_ndtr, polygamma
 
-from analysis.mismatch.bank.scalars import UNKNOWN, Number, score_of_log
+from analysis.mismatch.bank.scalars import UNKNOWN, Number, middle_of_gamma, score_of_log
 
 Array = NDArray[np.float64]
 _AROUND = 9  # bins along each axis whose median says what is around
@@ -44,7 +44,7 @@ def without_lines(power: Array, degrees: int) -> Array:
     u = np.minimum(u, 2 * (half - 1) - u) % half  # beyond its ends a half plane is mirrored
     down = _middle(power[(y[:, np.newaxis] + near) % rows, x[:, np.newaxis]])
     level = np.maximum(down, _middle(power[y[:, np.newaxis], u]))
-    level /= float(gammaincinv(degrees, 0.5)) / degrees
+    level /= middle_of_gamma(degrees) / degrees
     limit = float(gammainccinv(degrees, _CHANCE / power.size)) / degrees
     found = power.copy()
     found[y, x] = np.where(power[y, x] > limit * level, level, power[y, x])
@@ -126,7 +126,7 @@ def beside_others(power: Array, degrees: float) -> Array:
 def chance_beside(standing_out: Array) -> float:
     """Return the logarithm of the chance of the largest of such deviations in noise."""
     known = standing_out[np.isfinite(standing_out)]
-    return any_of(float(norm.logsf(known.max())), known.size) if known.size else 0.0
+    return any_of(float(log_ndtr(-known.max())), known.size) if known.size else 0.0
 
 
 def of_colour(power: Array, degrees: float) -> Number:
@@ -171,6 +171,12 @@ def _highest(power: Array) -> tuple[NDArray[np.int_], NDArray[np.int_]]:
 
 def _leak(distance: NDArray[np.int_], size: int) -> Array:
     """Return the largest amplitude that leaks so many bins away, relative to the larger bin."""
-    around = np.abs((distance + size // 2) % size - size // 2)
+    return _leaks(size)[distance % size]
+
+
+@lru_cache(maxsize=64)
+def _leaks(size: int) -> Array:
+    """Return what `_leak` does for each distance of 0 to the size."""
+    around = np.abs((np.arange(size) + size // 2) % size - size // 2)
     farther = np.sin(np.pi / (2 * size)) / np.sin(np.pi * (np.maximum(around, 1) - 0.5) / size)
     return np.where(around > 0, farther, 1.0)

@@ -122,8 +122,7 @@ def strongest(image: NDArray[np.floating], moving: Moving, step: int) -> tuple[N
         below, beside = (y + v) % rows, np.minimum(x + u, level.shape[1] - 1)
         still = within[below, beside] & (_moves(moving, white[0, 0], (0, 0), below, beside) == 0)
         total += np.where(still, (power[0, 0] / level)[below, beside] / around, 1.0)
-    chances = np.array([_log_above(_BLOCK, *pair) for pair in zip(total, worth, strict=True)])
-    found += _least(chances, y, x, count)
+    found += _least(_log_above(_BLOCK, total, worth), y, x, count)
     if not found:
         return (score_of_log(0.0), 1.0), None
     chance, *place = min(found)
@@ -167,9 +166,15 @@ def _screened(power: Array, level: Array, within: Mask, limit: float) -> tuple[P
 
 def _moves(moving: Moving, white: float, half: tuple[int, int], y: Places, x: Places) -> Array:
     """Return what bins move beyond white noise, in its units; 0 where chance moves them as much."""
-    limit = float(gammainccinv(moving.degrees, _MOVES)) / moving.degrees
+    limit = _most_of_white(moving.degrees)
     own = moving.power[half][y, x] / max(white, 1e-300)
     return np.asarray(np.where(own > limit, own - 1, 0.0))
+
+
+@lru_cache(maxsize=64)
+def _most_of_white(degrees: int) -> float:
+    """Return the power, of a mean of 1, that bins of white noise exceed by the chance `_MOVES`."""
+    return float(gammainccinv(degrees, _MOVES)) / degrees
 
 
 def _some(values: Array) -> Array:
@@ -178,16 +183,18 @@ def _some(values: Array) -> Array:
     return flat[:: max(flat.size // _SAMPLE, 1) | 1]
 
 
-def _log_above(count: int, total: float, worth: float) -> float:
-    """Return ln of the chance that so many exponential variates sum up to more.
+def _log_above(count: int, total: Array, worth: Array) -> Array:
+    """Return ln of the chances that so many exponential variates sum up to more.
 
     Their mean is known as well as from `worth` others.
     """
     share = worth / (worth + total)
-    chance = float(betainc(worth, count, share))
-    if chance > _HELD:
-        return log(chance)
-    return float(worth * np.log(share) - np.log(worth) - betaln(worth, count))
+    chance = betainc(worth, count, share)
+    found = np.log(np.maximum(chance, _HELD))
+    far = ~(chance > _HELD)
+    share, worth = share[far], worth[far]
+    found[far] = worth * np.log(share) - np.log(worth) - betaln(worth, count)
+    return np.asarray(found)
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,7 @@ loses 34 % at most of a sinusoid that lies there. Of a mosaic all colours are ta
 that channels add by amplitude, not by power, and a frequency has no aliases.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -116,10 +116,10 @@ class WaveSums:
         """Take one exposure; the variance that is expected of each channel weighs it."""
         sizes = [c.mean_frame.size for c in channels.values()]
         own = [c.estimates["pixel_variance"].value for c in channels.values()]
-        white = float(np.average(own, weights=sizes))
+        white = _mean(own, sizes)
         if waves.frames < 2 or not white > 0:
             return
-        expected = float(np.average([variance_dn2[name] for name in channels], weights=sizes))
+        expected = _mean([variance_dn2[name] for name in channels], sizes)
         seen = waves.frames - 1
         weight = seen / expected
         if self.taken:
@@ -226,6 +226,11 @@ class WaveSums:
         return [
             self.power[down, right][seen[down::2, right::2]] for down in (0, 1) for right in (0, 1)
         ]
+
+
+def _mean(values: Sequence[float], weights: Sequence[float]) -> float:
+    """Return the weighted mean of few values."""
+    return sum(v * w for v, w in zip(values, weights, strict=True)) / sum(weights)
 
 
 def looked_at(shape: tuple[int, int], step: int) -> NDArray[np.bool_]:

@@ -175,7 +175,7 @@ class CarryOverSums:
             by_code, (count, square, product, before) = own.sums(axis)
             if min(square, before) <= 0:
                 continue
-            cosines, sines, doubled = (_waves() @ by_code.T).reshape(3, len(PERIODS), -1)
+            cosines, sines, doubled = (by_code @ _waves()).T.reshape(3, len(PERIODS), -1)
             codes, differences, sums = doubled[:, :1], cosines[:, 1:2], cosines[:, 2:3]
             moved, through = np.stack([cosines[:, 3:], sines[:, 3:]]).T
             # Of cosines (cos a - cos b)^2, of sines (sin a - sin b)^2, from a - b and a + b.
@@ -202,10 +202,10 @@ class CarryOverSums:
 
 @cache
 def _waves() -> Array:
-    """Return cosines, sines and cosines of twice the angle: (each period, code folded)."""
-    angle = 2 * pi * np.arange(FOLDED) / np.array(PERIODS)[:, None]
+    """Return cosines, sines and cosines of twice the angle: (code folded, each period)."""
+    angle = 2 * pi * np.arange(FOLDED)[:, None] / np.array(PERIODS)
     cosine = np.cos(angle)
-    return np.concatenate([cosine, np.sin(angle), 2 * cosine**2 - 1])
+    return np.hstack([cosine, np.sin(angle), 2 * cosine**2 - 1])
 
 
 def _ends(one: Frame, other: Frame) -> tuple[int, int]:

@@ -190,7 +190,7 @@ class Camera(Model):
             self._refuse_growth()
         time_s = exposure_time_s or 0.0
         shutter = Shutter(clean, temporal, sensor, frame, grid, time_s, earlier_clean, threads)
-        return shutter.through(self.chain(), self.read_out, shared)
+        return shutter.through(*_readied(self), shared)
 
     def chain(self) -> tuple[Effect, ...]:
         """Return all links, base model included, in the order that light and charge meet them."""
@@ -224,6 +224,12 @@ class Camera(Model):
             message = f"the camera '{self.name}' has no diffuse_white_dn: no scene can be exposed"
             raise ValueError(message)
         return self.diffuse_white_dn
+
+
+@lru_cache(maxsize=64)
+def _readied(camera: Camera) -> tuple[tuple[Effect, ...], ReadOut]:
+    """Return links and read-out of a camera: to make them takes as long as a small frame."""
+    return camera.chain(), camera.read_out
 
 
 @lru_cache(maxsize=16)

@@ -4,7 +4,6 @@ Links are effects in the order that light and charge meet them. Draws are counte
 the same make the same of a frame, whatever comes behind them.
 """
 
-from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -114,10 +113,11 @@ def _drawn(
     chain: Sequence[Effect], temporal: Draw, sensor: Draw
 ) -> Iterator[tuple[Effect, Draw, Draw]]:
     """Yield each link with its random fields: a second effect of one kind has fields of its own."""
-    seen: Counter[str] = Counter()
+    seen: dict[str, int] = {}
     for link in chain:
-        seen[link.kind] += 1
-        nth = () if seen[link.kind] == 1 else (f"{link.kind} {seen[link.kind]}",)
-        yield (
-            (link, temporal.within(*nth), sensor.within(*nth)) if nth else (link, temporal, sensor)
-        )
+        kind = link.kind
+        count = seen[kind] = seen.get(kind, 0) + 1
+        if count == 1:
+            yield link, temporal, sensor
+        else:
+            yield link, temporal.within(f"{kind} {count}"), sensor.within(f"{kind} {count}")

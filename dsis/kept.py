@@ -2,10 +2,19 @@
 
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
+from dataclasses import dataclass
 from threading import Lock
 from typing import Any
 
 from numpy.typing import NDArray
+
+
+@dataclass
+class _Asked:
+    """An array, and the number of the last request for it."""
+
+    array: NDArray[Any]
+    when: int
 
 
 class Kept:
@@ -23,7 +32,7 @@ class Kept:
     def __init__(self, most_bytes: int, patience: int = 0) -> None:
         self._most, self._bytes, self._lock = most_bytes, 0, Lock()
         self._patience, self._asked = patience, 0
-        self._arrays: OrderedDict[Hashable, tuple[NDArray[Any], int]] = OrderedDict()
+        self._arrays: OrderedDict[Hashable, _Asked] = OrderedDict()
 
     def keep(self, most_bytes: int) -> None:
         """Keep so much at least from now on."""
@@ -54,19 +63,19 @@ class Kept:
     def _found(self, key: Hashable) -> NDArray[Any] | None:
         with self._lock:
             self._asked += 1
-            if key not in self._arrays:
+            found = self._arrays.get(key)  # once: keys of many parts are slow to compare
+            if found is None:
                 return None
             self._arrays.move_to_end(key)
-            array = self._arrays[key][0]
-            self._arrays[key] = (array, self._asked)
-            return array
+            found.when = self._asked
+            return found.array
 
     def _made(self, key: Hashable, make: Callable[[], NDArray[Any]]) -> NDArray[Any]:
         made = make()
         made.flags.writeable = False
         with self._lock:
             if key not in self._arrays and self._room(made.nbytes):
-                self._arrays[key] = (made, self._asked)
+                self._arrays[key] = _Asked(made, self._asked)
                 self._bytes += made.nbytes
         return made
 
@@ -75,9 +84,9 @@ class Kept:
         if size_bytes > self._most:
             return False
         while self._bytes + size_bytes > self._most:
-            key, (array, asked) = next(iter(self._arrays.items()))
-            if self._asked - asked < self._patience * len(self._arrays):
+            key, oldest = next(iter(self._arrays.items()))
+            if self._asked - oldest.when < self._patience * len(self._arrays):
                 return False
             del self._arrays[key]
-            self._bytes -= array.nbytes
+            self._bytes -= oldest.array.nbytes
         return True

@@ -6,8 +6,9 @@ It is drawn as what it is made of: shot noise of variance m x and read noise of 
 from a field of its own, so that physics between the two finds its place in the chain.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -86,8 +87,8 @@ def shot_noise(
     out = np.empty(expected_dn.shape, np.float32)  # rows of it are filled as flat views
 
     def block(first: int, last: int) -> None:
-        whole = draw.held("shot_noise", grid, frame)
-        for top, end in [(first, last)] if whole else _spans(first, last, out):
+        held = partial(draw.held, "shot_noise", grid, frame)
+        for top, end in _spans(first, last, out, held):
             _add_shot(
                 _flat(expected_dn[top:end]),
                 draw.normal_rows("shot_noise", grid, frame, top, end).reshape(-1),
@@ -115,8 +116,8 @@ def read_noise(
     sigma = np.sqrt(np.maximum(segments.intercept_dn2, np.float32(0)))
 
     def block(first: int, last: int) -> None:
-        whole = draw.held("read_noise", grid, frame)
-        for top, end in [(first, last)] if whole else _spans(first, last, out):
+        held = partial(draw.held, "read_noise", grid, frame)
+        for top, end in _spans(first, last, out, held):
             _add_read(
                 _flat(signal_dn[top:end]),
                 _flat(expected_dn[top:end]),
@@ -146,16 +147,24 @@ def camera_noise(
     return read_noise(shot, clean_dn, segments, draw, grid, frame, threads)
 
 
-def _spans(first: int, last: int, field: NDArray[np.float32]) -> Iterator[tuple[int, int]]:
-    """Yield (first, end) of runs of rows whose deviates stay in the cache until they are used."""
+def _spans(
+    first: int, last: int, field: NDArray[np.float32], held: Callable[[], bool] = lambda: False
+) -> Iterator[tuple[int, int]]:
+    """Yield (first, end) of runs of rows whose deviates stay in the cache until they are used.
+
+    All in one run where they are `held` already.
+    """
     rows = max(1, _SAMPLES_IN_CACHE * len(field) // max(1, field.size))
+    if last - first > rows and held():
+        rows = last - first
     for top in range(first, last, rows):
         yield top, min(top + rows, last)
 
 
 def _flat(rows: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return rows as one line that could be written: read-only ones need kernels of their own."""
-    return np.require(rows.reshape(-1), requirements=["C", "W"])
+    flat = rows.reshape(-1)
+    return flat if flat.flags.carray else np.require(flat, requirements=["C", "W"])
 
 
 @kernel

@@ -267,6 +267,7 @@ def _piece(
         slope = 0.0
     # Weights need a variance: start from the observed, go on with the fitted.
     total = np.maximum(v + added, 1e-9)
+    design = np.stack([x, np.ones_like(x)], 1)
     parameters = np.zeros(2)
     inverse = np.zeros((2, 2))
     for _ in range(_ROUNDS):
@@ -276,10 +277,10 @@ def _piece(
             rest = (v - parameters[0] * x - parameters[1]) / sd if parameters.any() else 0 * v
             spread = max(1.0, median(np.abs(rest)) * 1.4826)
             w = w * np.minimum(1, _HUBER * spread / np.maximum(np.abs(rest), 1e-12))
-            design = np.stack([x, np.ones_like(x)], 1)
             normal = (design * w[:, None]).T @ design
             size = np.sqrt(np.diag(normal))
-            inverse = np.linalg.pinv(normal / np.outer(size, size)) / np.outer(size, size)
+            sizes = size * size[:, np.newaxis]
+            inverse = np.linalg.pinv(normal / sizes) / sizes
             parameters = inverse @ (design.T @ (w * v))
         else:
             rest_v = v - (slope or 0.0) * x

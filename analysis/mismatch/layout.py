@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -134,6 +135,16 @@ class Layout:
 
     def regressors(self, channel: str) -> Regressors:
         """Return what the mean frames of a channel are regressed on."""
+        if channel not in self._regressors:
+            self._regressors[channel] = self._regressors_of(channel)
+        return self._regressors[channel]
+
+    @cached_property
+    def _regressors(self) -> dict[str, Regressors]:
+        """Those that were asked for: every simulation asks again."""
+        return {}
+
+    def _regressors_of(self, channel: str) -> Regressors:
         names = [e.name for e in self.uniform if (e.name, channel) not in self.still]
         return Regressors.of(
             names,

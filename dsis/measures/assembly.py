@@ -257,8 +257,8 @@ def _pairs(sums: Accumulator, plane: Plane, means: Array) -> tuple[list[float], 
     """Return mean squares and means of the difference of each pair of frames."""
     n, m = plane.shape
     squares = [
-        sum(float(square[phase]) for phase in plane.phases) / (n * m)
-        for square in sums.pair_squares
+        sum(square[y][x] for y, x in plane.phases) / (n * m)
+        for square in map(np.ndarray.tolist, sums.pair_squares)
     ]
     pairs = len(squares)
     return squares, (means[1 : 2 * pairs : 2] - means[: 2 * pairs : 2]).tolist()

@@ -7,15 +7,15 @@ above counting noise, is unequal code widths, whatever light, pattern or drift t
 
 import math
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 from math import nan
-from typing import NamedTuple
 
 import numpy as np
 import scipy.fft
 import scipy.special
 from numpy.typing import NDArray
 
+from dsis.kept import Kept
 from dsis.measures.estimate import Estimate, estimate, unknown
 from dsis.measures.kernels import count_codes
 from dsis.measures.spikes import variance_of_quartiles, without_spikes
@@ -24,7 +24,9 @@ LOWEST_CODE, CODES = -(2**16), 2**18  # the first code counted, and how many
 LEAST_SIGMA_STEPS = 2.0  # below, noise does not smooth the density: no code width can be told
 _LEAST_CODES = 4  # whose common step is larger by chance once in 8 times, much larger hardly ever
 _LEAK = 1e-7  # of the smooth density's power is let into the band
-_REMEMBERED = 4096  # transforms up to this size keep their bands: 17 MB at most
+_BANDS = Kept(32 << 20)  # bytes, of bands: 500 of transforms of a bright exposure of 12 bits
+_CLOSER = 1.01  # of degrees of freedom whose law is known
+_RATIO = 1.03  # of the sizes of bands, and of where they begin
 _LEAST_DOF, _NODES = 4.0, 20
 _MIDDLE = (0.05, 0.95)  # of the samples: there no density is less than a tenth of its mean
 _EXPECTED = 300.0  # samples a code there on average: at a tenth of it none is missed by chance
@@ -244,7 +246,9 @@ class Codes:
 
         Notes
         -----
-        With D(w) the transform of counts h, mean |D|^2 over the band = sum h + rms^2 sum h^2.
+        With D(w) the transform of counts h, mean |D|^2 over the band = sum h + rms^2 sum h^2. The
+        band begins up to 3 %, or a bin, above the frequency from which noise leaves nothing: so few
+        bands serve many histograms, and none of them lets in more of the smooth density.
         """
         step = self.spacing().value
         variance_dn2 = without_spikes(variance_dn2, self._middle_dn2)
@@ -252,13 +256,14 @@ class Codes:
         if not sigma >= LEAST_SIGMA_STEPS or self._clipped:
             return unknown(0.0)
         counts = self.counts[:: int(step)].astype(np.float64)
-        band = _band_of(counts.size, sigma)
-        power = _power(counts, band.size)
+        size, mean_of, pairs_of = _band_of(counts.size, sigma)
+        power = _power(counts, size)
         total, squares = float(counts.sum()), float(counts @ counts - counts.sum())
-        excess = (float(band.mean @ power) - total) / squares
-        null = float(band.pairs @ power) / squares**2
-        raised = _power(counts + max(excess, 0.0) * counts**2, band.size)
-        error = float(band.pairs @ raised) / squares**2
+        excess = (float(mean_of @ power) - total) / squares
+        null = error = float(pairs_of @ power) / squares**2
+        if excess > 0:
+            raised = _power(counts + excess * counts**2, size)
+            error = float(pairs_of @ raised) / squares**2
         mean, variance = _signed_root(2 * (total / squares) ** 2 / null)
         # Far above the noise the root's error is that of its square over 2 rms.
         clear = max(excess - 2 * error**0.5, 0.0)
@@ -283,35 +288,30 @@ class Codes:
         return bool(max(self.counts[0], self.counts[-1]) > few)
 
 
-class _Band(NamedTuple):
-    """The band of frequencies that noise leaves empty, as weights on the bins of a half spectrum.
+def _band_of(codes: int, sigma: float) -> tuple[int, NDArray[np.float64], NDArray[np.float64]]:
+    """Return size and weights of a band for so many codes and noise of `sigma` steps.
 
-    Attributes
-    ----------
-    size
-        Of the transform.
-    mean
-        Give the mean over the band.
-    pairs
-        Give 2 sum window(j - k) v_j v_k, the variance of a sum over pairs of codes: v the counts'
-        variances, window the band's transform squared, 1 at 0.
+    The size of the transform; `_band`. Size and first bin are rounded up: see `Codes.imbalance`.
     """
-
-    size: int
-    mean: NDArray[np.float64]
-    pairs: NDArray[np.float64]
-
-
-def _band_of(codes: int, sigma: float) -> _Band:
-    """Return the band for so many codes and noise of `sigma` steps."""
-    size = scipy.fft.next_fast_len(2 * codes, real=True)
+    size = scipy.fft.next_fast_len(_coarse(2 * codes), real=True)
     edge = (-math.log(_LEAK) / (4 * math.pi**2)) ** 0.5 / sigma
-    make = _remembered_band if size <= _REMEMBERED else _band
-    return make(size, math.ceil(edge * size))
+    first = _coarse(edge * size)
+    mean, pairs = _BANDS.of((size, first), partial(_band, size, first))
+    return size, mean, pairs
 
 
-def _band(size: int, first: int) -> _Band:
-    """Return the band from bin `first` on."""
+def _coarse(number: float) -> int:
+    """Return the next of few whole numbers, each of the larger ones 3 % above the last."""
+    return math.ceil(_RATIO ** math.ceil(math.log(number) / math.log(_RATIO)))
+
+
+def _band(size: int, first: int) -> NDArray[np.float64]:
+    """Return the band from bin `first` on, as weights on bins: (2, half spectrum).
+
+    The first give the mean over the band. The others give 2 sum window(j - k) v_j v_k, the variance
+    of a sum over pairs of codes: v the counts' variances, window the band's transform squared, 1 at
+    0.
+    """
     bins = np.arange(size // 2 + 1)
     halves = np.full(bins.size, 2.0)
     halves[0] = 1.0
@@ -320,10 +320,7 @@ def _band(size: int, first: int) -> _Band:
     mean = np.where(bins >= first, halves, 0.0)
     window = scipy.fft.irfft((bins >= first).astype(np.float64), size)
     transform = scipy.fft.rfft((window / window[0]) ** 2).real
-    return _Band(size, mean / mean.sum(), 2 * halves * transform / size)
-
-
-_remembered_band = lru_cache(maxsize=512)(_band)
+    return np.stack([mean / mean.sum(), 2 * halves * transform / size])
 
 
 def _power(counts: NDArray[np.float64], size: int) -> NDArray[np.float64]:
@@ -334,7 +331,16 @@ def _power(counts: NDArray[np.float64], size: int) -> NDArray[np.float64]:
 
 
 def _signed_root(dof: float) -> tuple[float, float]:
-    """Return mean and variance of sign(z) sqrt|z|, z a standardised chi-squared variate."""
+    """Return mean and variance of sign(z) sqrt|z|, z a standardised chi-squared variate.
+
+    To 1 in 1000: of the nearest of few degrees of freedom.
+    """
+    return _root_of(round(math.log(dof) / math.log(_CLOSER)))
+
+
+@lru_cache(maxsize=2048)
+def _root_of(power: int) -> tuple[float, float]:
+    dof = _CLOSER**power
     z = _quantiles(dof) if dof < _LEAST_DOF else _quantiles_between(dof)
     root = np.copysign(np.sqrt(np.abs(z)), z)
     mean = float(root.mean())

@@ -55,9 +55,11 @@ def first_pass(
 
     over_rows(block, rows, threads)
     # Blocks are added in their order, whoever made them.
-    broken, lowest, highest = limits[:, 0].any(), limits[:, 1].min(), limits[:, 2].max()
+    broken, lowest, highest = zip(*limits.tolist(), strict=True)
     columns_summed, squares_summed = by_column.sum(0), squares.sum(0)
-    return Passed(by_row, columns_summed, squares_summed, not broken, int(lowest), int(highest))
+    return Passed(
+        by_row, columns_summed, squares_summed, not any(broken), min(lowest), max(highest)
+    )
 
 
 def no_change(frame: Frame) -> Passed:

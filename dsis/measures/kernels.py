@@ -4,6 +4,8 @@ Sums are kept by row, or by block of 64 rows, and added up in one order: the sam
 number of threads. A 2 x 2 phase is (row parity, column parity) within the array.
 """
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -67,15 +69,27 @@ def offsets(by_row: Sums, by_column: Sums, single: bool) -> tuple[Sums, Sums, Su
     """
     rows, columns = by_row.shape[0], by_column.shape[1]
     if single:
-        by_line = by_row.sum(1)
+        by_line = by_row[:, 0] + by_row[:, 1]
         mean = by_line.sum() / (rows * columns)
-        of_columns = (by_column[0] + by_column[1]) / rows - mean
-        of_rows = np.repeat(by_line / columns, 2).reshape(rows, 2)
-        return of_rows, np.tile(of_columns, (2, 1)), np.full((2, 2), mean)
-    down, across = (np.array([(size + 1) // 2, size // 2]) for size in (rows, columns))
-    means = np.array([by_row[0::2].sum(0), by_row[1::2].sum(0)]) / np.outer(down, across)
-    of_columns = by_column / down[:, np.newaxis] - means[:, np.arange(columns) & 1]
+        of_rows, of_columns, means = np.empty((rows, 2)), np.empty((2, columns)), np.empty((2, 2))
+        of_rows[:] = (by_line / columns)[:, np.newaxis]
+        of_columns[:] = (by_column[0] + by_column[1]) / rows - mean
+        means[:] = mean
+        return of_rows, of_columns, means
+    down, across, pixels, parity = _of_parity(rows, columns)
+    means = np.array([by_row[0::2].sum(0), by_row[1::2].sum(0)]) / pixels
+    of_columns = by_column / down - means[:, parity]
     return by_row / across, of_columns, means
+
+
+@lru_cache(maxsize=32)
+def _of_parity(rows: int, columns: int) -> tuple[NDArray[np.int_], ...]:
+    """Return how many rows (2, 1), columns (2,) and pixels (2, 2) are even and odd; of each column.
+
+    Last its parity: (column,).
+    """
+    down, across = (np.array([(size + 1) // 2, size // 2]) for size in (rows, columns))
+    return down[:, np.newaxis], across, np.outer(down, across), np.arange(columns) & 1
 
 
 def split(image: Frame, places: NDArray[np.int64], means: Sums, out: Frame) -> None:

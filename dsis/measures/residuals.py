@@ -107,6 +107,5 @@ def line_residuals(means: Array, series: Array, basis: Array) -> tuple[float, fl
 
 def _outside(lines: Array, basis: Array) -> float:
     """Return the sum of squares of lines (any, line) less their projections."""
-    inside = np.einsum("tl,ld->td", lines, basis)
-    left = lines - np.einsum("td,ld->tl", inside, basis)
-    return float(np.einsum("tl,tl->", left, left))
+    left = lines - lines @ basis @ basis.T
+    return float(np.vdot(left, left))

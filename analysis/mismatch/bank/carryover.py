@@ -170,25 +170,22 @@ class CarryOverSums:
             self.samples[axis] += (kept,) if kept is not None else ()
         # n - 1 differences of successive frames, which share frames, say as much as fewer apart.
         weight = (2 * own.frames - 2) / (3 * own.frames - 4)
-        waves = _waves()
+        signs = np.array([1.0, -1.0])  # of cosines, of sines
         for axis in AXES:
             by_code, (count, square, product, before) = own.sums(axis)
             if min(square, before) <= 0:
                 continue
-            codes, differences, sums, moved, itself = by_code
-            variance = max(square - product**2 / before, 1e-12) / count
-            for k, (wave, sign) in enumerate(zip(waves, (1.0, -1.0), strict=True)):
-                # Of cosines (cos a - cos b)^2, of sines (sin a - sin b)^2, from a - b and a + b.
-                cosine = waves[0]
-                whole = count + sign * (_doubled() @ codes) / 2
-                whole -= cosine @ differences + sign * (cosine @ sums)
-                through = wave @ itself
-                left = whole - through**2 / before
-                known = left > _LEAST / own.size[axis] * np.abs(whole)
-                top = wave @ moved - through * product / before
-                scale = weight / variance
-                self.top[axis][:, k] += np.where(known, top * scale, 0.0)
-                self.bottom[axis][:, k] += np.where(known, left * scale, 0.0)
+            cosines, sines, doubled = (by_code @ _waves()).T.reshape(3, len(PERIODS), -1)
+            codes, differences, sums = doubled[:, :1], cosines[:, 1:2], cosines[:, 2:3]
+            moved, through = np.stack([cosines[:, 3:], sines[:, 3:]]).T
+            # Of cosines (cos a - cos b)^2, of sines (sin a - sin b)^2, from a - b and a + b.
+            whole = count + signs * codes / 2 - (differences + signs * sums)
+            left = whole - through**2 / before
+            known = left > _LEAST / own.size[axis] * np.abs(whole)
+            top = moved - through * product / before
+            scale = weight / (max(square - product**2 / before, 1e-12) / count)
+            self.top[axis] += np.where(known, top * scale, 0.0)
+            self.bottom[axis] += np.where(known, left * scale, 0.0)
 
     def numbers(self) -> dict[str, Number]:
         """Return amplitudes and their errors in white noise, DN, by name."""
@@ -204,16 +201,11 @@ class CarryOverSums:
 
 
 @cache
-def _waves() -> tuple[Array, Array]:
-    """Return cosines and sines over the folded codes: (period, code)."""
-    angle = 2 * pi * np.arange(FOLDED) / np.array(PERIODS)[:, None]
-    return np.cos(angle), np.sin(angle)
-
-
-@cache
-def _doubled() -> Array:
-    """Return cosines of twice the angle: (period, code)."""
-    return np.asarray(2 * _waves()[0] ** 2 - 1)
+def _waves() -> Array:
+    """Return cosines, sines and cosines of twice the angle: (code folded, each period)."""
+    angle = 2 * pi * np.arange(FOLDED)[:, None] / np.array(PERIODS)
+    cosine = np.cos(angle)
+    return np.hstack([cosine, np.sin(angle), 2 * cosine**2 - 1])
 
 
 def _ends(one: Frame, other: Frame) -> tuple[int, int]:
@@ -235,9 +227,13 @@ def _quantiles(one: Frame, other: Frame, every: int, at: Array) -> Array:
     """
     columns, count = one.shape[1], (one.size + every - 1) // every
     change = np.empty(count, np.int32)
+    y = x = 0
     for i in range(count):
-        y, x = divmod(i * every, columns)
         change[i] = one[y, x] - other[y, x]
+        x += every
+        while x >= columns:  # a division takes longer
+            x -= columns
+            y += 1
     least = change.min()
     met = np.zeros(change.max() - least + 1, np.int64)
     for i in range(count):

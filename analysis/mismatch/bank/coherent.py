@@ -2,13 +2,12 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, reduce
 from itertools import islice
 from math import sqrt
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import gammaincinv
 
 from analysis.mismatch.bank.lines import (
     clearest_bin,
@@ -18,7 +17,13 @@ from analysis.mismatch.bank.lines import (
     without_lines,
 )
 from analysis.mismatch.bank.rowlags import row_lags
-from analysis.mismatch.bank.scalars import UNKNOWN, Number, ratio_root, score_of_log
+from analysis.mismatch.bank.scalars import (
+    UNKNOWN,
+    Number,
+    middle_of_gamma,
+    ratio_root,
+    score_of_log,
+)
 from dsis.measures import Channel
 from dsis.measures.median import median
 
@@ -358,14 +363,14 @@ def _largest(
 
 def white_level(power: Array, degrees: float) -> float:
     """Return the power of a bin of white noise, Gamma(degrees): by the median, without lines."""
-    return median(power) * degrees / float(gammaincinv(degrees, 0.5))
+    return median(power) * degrees / middle_of_gamma(degrees)
 
 
 def _summed(power: Array, block: tuple[int, int]) -> Array:
     """Return the sum of every block (rows, columns) of bins."""
     rows, columns = (size - own + 1 for size, own in zip(power.shape, block, strict=True))
     parts = [power[y : y + rows, x : x + columns] for y in range(block[0]) for x in range(block[1])]
-    return np.asarray(np.sum(parts, 0))
+    return reduce(np.add, parts)
 
 
 def _within_bin(power: Array, place: int) -> float:

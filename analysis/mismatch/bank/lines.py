@@ -5,15 +5,17 @@ sinusoid is a single bin, or leaks into few where its frequency lies between bin
 """
 
 from collections.abc import Iterator
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import betainc, gammaincc, gammainccinv, gammaincinv, gammaln, polygamma
-from scipy.stats import norm
+from scipy.special import betainc, gammaincc, gammainccinv, gammaln, log_ndtr, polygamma
 
-from analysis.mismatch.bank.scalars import UNKNOWN, Number, score_of_log
+from analysis.mismatch.bank.scalars import UNKNOWN, Number, middle_of_gamma, score_of_log
+from dsis.compiled import kernel
 
 Array = NDArray[np.float64]
+Places = NDArray[np.int_]
 _AROUND = 9  # bins along each axis whose median says what is around
 _LOOKED_AT = 1024  # highest bins: lines are among them
 _ALONE = -40.0  # ln of a chance, of which two bins in a spectrum are none
@@ -37,14 +39,8 @@ def without_lines(power: Array, degrees: int) -> Array:
     degrees
         Independent frames in it.
     """
-    rows, half = power.shape
     y, x = _highest(power)
-    near = np.arange(-(_AROUND // 2), _AROUND // 2 + 1)
-    u = np.abs(x[:, np.newaxis] + near)
-    u = np.minimum(u, 2 * (half - 1) - u) % half  # beyond its ends a half plane is mirrored
-    down = _middle(power[(y[:, np.newaxis] + near) % rows, x[:, np.newaxis]])
-    level = np.maximum(down, _middle(power[y[:, np.newaxis], u]))
-    level /= float(gammaincinv(degrees, 0.5)) / degrees
+    level = _around(power, y, x) / (middle_of_gamma(degrees) / degrees)
     limit = float(gammainccinv(degrees, _CHANCE / power.size)) / degrees
     found = power.copy()
     found[y, x] = np.where(power[y, x] > limit * level, level, power[y, x])
@@ -126,7 +122,7 @@ def beside_others(power: Array, degrees: float) -> Array:
 def chance_beside(standing_out: Array) -> float:
     """Return the logarithm of the chance of the largest of such deviations in noise."""
     known = standing_out[np.isfinite(standing_out)]
-    return any_of(float(norm.logsf(known.max())), known.size) if known.size else 0.0
+    return any_of(float(log_ndtr(-known.max())), known.size) if known.size else 0.0
 
 
 def of_colour(power: Array, degrees: float) -> Number:
@@ -156,12 +152,27 @@ def _log_above(shape: float, x: float) -> float:
     return float((shape - 1) * np.log(x) - x - gammaln(shape) - np.log1p(-max(shape - 1, 0.0) / x))
 
 
-def _middle(values: Array) -> Array:
-    """Return the median of each row of `_AROUND` values, an odd number."""
-    return np.asarray(np.sort(values, 1)[:, _AROUND // 2])
+@kernel
+def _around(power: Array, y: Places, x: Places) -> Array:
+    """Return the larger median of the `_AROUND` bins around each along either axis."""
+    rows, half = power.shape
+    found, near = np.empty(y.size), np.empty((2, _AROUND))
+    for i in range(y.size):
+        for k in range(_AROUND):
+            apart = k - _AROUND // 2
+            u = abs(x[i] + apart)
+            u = min(u, 2 * (half - 1) - u) % half  # beyond its ends a half plane is mirrored
+            for axis, value in ((0, power[(y[i] + apart) % rows, x[i]]), (1, power[y[i], u])):
+                line, place = near[axis], k
+                while place > 0 and line[place - 1] > value:
+                    line[place] = line[place - 1]
+                    place -= 1
+                line[place] = value
+        found[i] = max(near[0, _AROUND // 2], near[1, _AROUND // 2])
+    return found
 
 
-def _highest(power: Array) -> tuple[NDArray[np.int_], NDArray[np.int_]]:
+def _highest(power: Array) -> tuple[Places, Places]:
     """Return rows and columns of the highest bins, in the order of the spectrum."""
     count = min(_LOOKED_AT, power.size)
     found = np.sort(np.argpartition(power, -count, axis=None)[-count:])
@@ -169,8 +180,14 @@ def _highest(power: Array) -> tuple[NDArray[np.int_], NDArray[np.int_]]:
     return y, x
 
 
-def _leak(distance: NDArray[np.int_], size: int) -> Array:
+def _leak(distance: Places, size: int) -> Array:
     """Return the largest amplitude that leaks so many bins away, relative to the larger bin."""
-    around = np.abs((distance + size // 2) % size - size // 2)
+    return _leaks(size)[distance % size]
+
+
+@lru_cache(maxsize=64)
+def _leaks(size: int) -> Array:
+    """Return what `_leak` does for each distance of 0 to the size."""
+    around = np.abs((np.arange(size) + size // 2) % size - size // 2)
     farther = np.sin(np.pi / (2 * size)) / np.sin(np.pi * (np.maximum(around, 1) - 0.5) / size)
     return np.where(around > 0, farther, 1.0)

@@ -5,6 +5,7 @@ chi-squared^(1/3) is normal, var 2 / (9 dof)); largest values by the normal scor
 """
 
 from collections.abc import Mapping
+from functools import lru_cache
 from math import exp, inf, isfinite, log, log2, nan, pi, sqrt
 
 import numpy as np
@@ -173,13 +174,19 @@ def score_of_log(log_chance: float) -> float:
     return -float(scipy.special.ndtri_exp(min(log_chance, -1e-12)))
 
 
+@lru_cache(maxsize=256)
+def middle_of_gamma(degrees: float) -> float:
+    """Return the median of a Gamma variate."""
+    return float(scipy.special.gammaincinv(degrees, 0.5))
+
+
 def _largest(channel: Channel, frames: int) -> Number:
     """Return the normal score of the largest pixel variance, chi-squared in white noise."""
     if frames < 3:
         return UNKNOWN
     dof = frames - 1
     ratio = float(channel.variance_map.max()) / median(channel.variance_map)
-    largest = ratio * 2 * float(scipy.special.gammaincinv(dof / 2, 0.5))
+    largest = ratio * 2 * middle_of_gamma(dof / 2)
     single = float(scipy.special.gammaincc(dof / 2, largest / 2))
     chance = -np.expm1(channel.variance_map.size * np.log1p(-min(single, 0.5)))
     return normal_score(float(chance)), 1.0

@@ -30,10 +30,15 @@ def seams(by_row: Array, by_column: Array, squares: tuple[float, float]) -> dict
         sd = sqrt(square / across)
         for name, shape in zip(("half_seam", "parity"), seam_shapes(means.size), strict=True):
             found[f"{name} of {axis}"] = (float(shape @ means) / sd, 1.0)
-        half = np.where(np.arange(means.size) < means.size / 2, -1.0, 1.0)
-        half = (half - half.mean()) / (sqrt(means.size) * half.std())
-        found[f"half_seam of {axis}, {WHOLE}"] = (float(half @ means) / sd, 1.0)
+        found[f"half_seam of {axis}, {WHOLE}"] = (float(_halves(means.size) @ means) / sd, 1.0)
     return found
+
+
+@lru_cache(maxsize=64)
+def _halves(size: int) -> Array:
+    """Return the step between halves about its mean, of norm 1."""
+    half = np.where(np.arange(size) < size / 2, -1.0, 1.0)
+    return np.asarray((half - half.mean()) / (sqrt(size) * half.std()))
 
 
 @lru_cache(maxsize=64)

@@ -21,11 +21,11 @@ import scipy.fft
 from numpy.typing import NDArray
 from scipy.special import betainc, betaln, gammainccinv
 
-from analysis.mismatch.bank.coherent import Peak, frequency, white_level
+from analysis.mismatch.bank.coherent import Peak, frequency
 from analysis.mismatch.bank.lines import any_of
 from analysis.mismatch.bank.robust import typical_square
 from analysis.mismatch.bank.scalars import UNKNOWN, Number, score_of_log
-from analysis.mismatch.bank.waves import Moving, WaveSums, add_power, looked_at
+from analysis.mismatch.bank.waves import Moving, WaveSums, add_power, looked_at, some
 from dsis.compiled import kernel
 from dsis.measures.median import median
 
@@ -45,7 +45,6 @@ _MOST = 4096  # in all
 _STRICTER = 1.3  # is the limit where there are more
 _KINDS = 5  # of places: bins, three between them, and blocks
 _FAR_OUT = 5.0  # standard deviations, beyond which pixels count as so far out
-_SAMPLE = 8192  # values of which a median is taken
 _HELD = 1e-290  # chances that a float holds
 
 
@@ -79,7 +78,7 @@ def standing(
     image = np.zeros(waves.shape, np.float32)
     for name, own in planes.items():  # few pixels that stand far out are no wave, and hide none
         y, x = sites[name]
-        limit = _FAR_OUT * typical_square(_some(own)) ** 0.5
+        limit = _FAR_OUT * typical_square(some(own)) ** 0.5
         share = sharpness[name] / size
         image[y :: waves.step, x :: waves.step] = share * np.clip(own, -limit, limit)
     return strongest(image, moving, waves.step)
@@ -95,12 +94,12 @@ def strongest(image: NDArray[np.floating], moving: Moving, step: int) -> tuple[N
     power = np.zeros((2, 2, rows, columns // 2 + 1))
     add_power(scipy.fft.rfft2(image), 1 / image.size, power)
     # The middle of the sensor counts more than its edges between bins: each by its own middle.
-    middles = np.array([[median(_some(own)) for own in pair] for pair in power])
+    middles = np.array([[median(some(own)) for own in pair] for pair in power])
     if not middles.min() > 0:
         return UNKNOWN, None
     scales = middles / middles[0, 0]
     level, apart = sensor.levels(power[0, 0])
-    white = {half: white_level(_some(moving.power[half]), moving.degrees) for half in sensor.sizes}
+    white = moving.white
     found: list[Found] = []
     for down, right in sensor.sizes:
         within, scale = sensor.within[down, right], float(scales[down, right])
@@ -117,13 +116,12 @@ def strongest(image: NDArray[np.floating], moving: Moving, step: int) -> tuple[N
     limit = float(gammainccinv(_BLOCK, _share(count)))
     y, x = _screened(_blocks(power[0, 0], level, within), np.ones(level.shape), within, limit)
     worth, around = sensor.around(apart, y, x)
-    total = np.zeros(y.size)
+    total, ratio = np.zeros(y.size), power[0, 0] / level
     for v, u in ((v, u) for v in (-1, 0, 1) for u in (-1, 0, 1)):
         below, beside = (y + v) % rows, np.minimum(x + u, level.shape[1] - 1)
         still = within[below, beside] & (_moves(moving, white[0, 0], (0, 0), below, beside) == 0)
-        total += np.where(still, (power[0, 0] / level)[below, beside] / around, 1.0)
-    chances = np.array([_log_above(_BLOCK, *pair) for pair in zip(total, worth, strict=True)])
-    found += _least(chances, y, x, count)
+        total += np.where(still, ratio[below, beside] / around, 1.0)
+    found += _least(_log_above(_BLOCK, total, worth), y, x, count)
     if not found:
         return (score_of_log(0.0), 1.0), None
     chance, *place = min(found)
@@ -167,27 +165,29 @@ def _screened(power: Array, level: Array, within: Mask, limit: float) -> tuple[P
 
 def _moves(moving: Moving, white: float, half: tuple[int, int], y: Places, x: Places) -> Array:
     """Return what bins move beyond white noise, in its units; 0 where chance moves them as much."""
-    limit = float(gammainccinv(moving.degrees, _MOVES)) / moving.degrees
+    limit = _most_of_white(moving.degrees)
     own = moving.power[half][y, x] / max(white, 1e-300)
     return np.asarray(np.where(own > limit, own - 1, 0.0))
 
 
-def _some(values: Array) -> Array:
-    """Return values enough for a median, evenly from all."""
-    flat = values.reshape(-1)
-    return flat[:: max(flat.size // _SAMPLE, 1) | 1]
+@lru_cache(maxsize=64)
+def _most_of_white(degrees: int) -> float:
+    """Return the power, of a mean of 1, that bins of white noise exceed by the chance `_MOVES`."""
+    return float(gammainccinv(degrees, _MOVES)) / degrees
 
 
-def _log_above(count: int, total: float, worth: float) -> float:
-    """Return ln of the chance that so many exponential variates sum up to more.
+def _log_above(count: int, total: Array, worth: Array) -> Array:
+    """Return ln of the chances that so many exponential variates sum up to more.
 
     Their mean is known as well as from `worth` others.
     """
     share = worth / (worth + total)
-    chance = float(betainc(worth, count, share))
-    if chance > _HELD:
-        return log(chance)
-    return float(worth * np.log(share) - np.log(worth) - betaln(worth, count))
+    chance = betainc(worth, count, share)
+    found = np.log(np.maximum(chance, _HELD))
+    far = ~(chance > _HELD)
+    share, worth = share[far], worth[far]
+    found[far] = worth * np.log(share) - np.log(worth) - betaln(worth, count)
+    return np.asarray(found)
 
 
 @dataclass(frozen=True, eq=False)
@@ -347,7 +347,10 @@ def _nearby(
                 y, x = places[0][i] + v, places[1][i] + u
                 if x < 0 or x >= half:  # a bin's conjugate is at the opposite frequency
                     y, x = -y, -x if x < 0 else columns - x
-                y %= rows
+                while y < 0:  # a division takes longer
+                    y += rows
+                while y >= rows:
+                    y -= rows
                 if 0 <= x < half and within[y, x]:
                     number += 1
                     total += apart[y, x]

@@ -6,8 +6,9 @@ loses 34 % at most of a sinusoid that lies there. Of a mosaic all colours are ta
 that channels add by amplitude, not by power, and a frequency has no aliases.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy.fft
@@ -23,6 +24,7 @@ from dsis.measures.median import median
 Array = NDArray[np.float64]
 Image = NDArray[np.float32]
 Amplitudes = NDArray[np.complexfloating]
+_SAMPLE = 8192  # values of which a median is taken
 _PAIRED = {"rows": (("R", "Gr"), ("Gb", "B")), "columns": (("R", "Gb"), ("Gr", "B"))}
 """Channels that take turns along a line."""
 
@@ -89,6 +91,12 @@ class Moving:
     power: Array
     degrees: int
 
+    @cached_property
+    def white(self) -> dict[tuple[int, int], float]:
+        """Power of a bin of white noise, by where bins lie: half a bin down, half a bin right."""
+        halves = [(down, right) for down in (0, 1) for right in (0, 1)]
+        return {half: white_level(some(self.power[half]), self.degrees) for half in halves}
+
 
 class WaveSums:
     """Power of waves over all exposures, white noise scaled to 1; amplitudes constant in DN.
@@ -109,6 +117,7 @@ class WaveSums:
         self.power = np.zeros((2, 2, rows, columns // 2 + 1))
         self.weight = self.squares = 0.0
         self.uneven = dict.fromkeys(_PAIRED, 0.0)
+        self._moving: Moving | None = None  # every map asks for it
 
     def add(
         self, waves: Waves, channels: Mapping[str, Channel], variance_dn2: Mapping[str, float]
@@ -116,12 +125,13 @@ class WaveSums:
         """Take one exposure; the variance that is expected of each channel weighs it."""
         sizes = [c.mean_frame.size for c in channels.values()]
         own = [c.estimates["pixel_variance"].value for c in channels.values()]
-        white = float(np.average(own, weights=sizes))
+        white = _mean(own, sizes)
         if waves.frames < 2 or not white > 0:
             return
-        expected = float(np.average([variance_dn2[name] for name in channels], weights=sizes))
+        expected = _mean([variance_dn2[name] for name in channels], sizes)
         seen = waves.frames - 1
         weight = seen / expected
+        self._moving = None
         if self.taken:
             waves.add_to(self.power, weight / white)
         self.weight += weight
@@ -157,7 +167,8 @@ class WaveSums:
         """Return the power itself; None where no frames were taken."""
         if not (self.taken and self.weight):
             return None
-        return Moving(self.power, self._degrees)
+        self._moving = self._moving or Moving(self.power, self._degrees)
+        return self._moving
 
     def odd_lags(self) -> dict[str, Number]:
         """Return correlations along lines of samples an odd number of pixels apart.
@@ -228,6 +239,11 @@ class WaveSums:
         ]
 
 
+def _mean(values: Sequence[float], weights: Sequence[float]) -> float:
+    """Return the weighted mean of few values."""
+    return sum(v * w for v, w in zip(values, weights, strict=True)) / sum(weights)
+
+
 def looked_at(shape: tuple[int, int], step: int) -> NDArray[np.bool_]:
     """Return which half bins (2 rows, columns + 2) of a sensor hold waves of their own.
 
@@ -247,6 +263,12 @@ def looked_at(shape: tuple[int, int], step: int) -> NDArray[np.bool_]:
         found[rows - 1 : rows + 2] = False
         found[:, columns - 1 :] = False
     return found
+
+
+def some(values: Array) -> Array:
+    """Return values enough for a median, evenly from all."""
+    flat = values.reshape(-1)
+    return flat[:: max(flat.size // _SAMPLE, 1) | 1]
 
 
 @kernel

@@ -54,7 +54,7 @@ CASES = [
 @pytest.mark.parametrize(("kind", "statistic", "law"), CASES)
 def test_what_grows_with_light_denies_it(kind: str, statistic: str, law: Array) -> None:
     """Grains of light skew noise by what they have in common; charge that is repelled by S^2."""
-    for power in (0.3, 0.5, 0.75, 1.0, 1.3):
+    for power in (1.0, 1.3, 2.0):
         left = 0.02 * (LIGHT / LIGHT.max()) ** power
         denial = otherwise_by_level(_state(statistic, left, 1), kind, 0 * law, law)
         assert denial is not None
@@ -73,6 +73,16 @@ def test_its_own_law_is_believed_whatever_its_size(
         for seed in range(40)
     ]
     assert sum(denied) <= (2 if size < 1 else 0)
+
+
+@pytest.mark.parametrize(("kind", "statistic", "law"), CASES)
+def test_a_law_that_is_a_few_percent_off_denies_nothing(
+    kind: str, statistic: str, law: Array
+) -> None:
+    """Seen at twenty errors of each level, and bent a little: no effect's form is known better."""
+    for seed in range(20):
+        left = law * (1 + 0.06 * (LIGHT / LIGHT.max()) ** 0.5)
+        assert otherwise_by_level(_state(statistic, left, seed), kind, 0 * law, law) is None
 
 
 @pytest.mark.parametrize(("kind", "statistic", "law"), CASES)

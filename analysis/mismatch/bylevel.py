@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from analysis.mismatch.basefit import CLIPPED_SHARE
 from analysis.mismatch.contradicted import Denial, rival
+from analysis.mismatch.predict import form_errors
 from analysis.mismatch.rank import TOLD_APART
 from analysis.mismatch.state import State
 
@@ -24,7 +25,7 @@ _WORDS = {
     "skewness": "how skewed noise is grows with light as no counting makes it",
     "channel_ratio": "the greens differ the more the brighter, as no amplifier makes them",
 }
-_POWERS = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0)  # of the signal: something else grows by one
+_POWERS = (1.0, 1.5, 2.0, 3.0)  # of the signal, by which something else grows faster
 _LEAST = 3  # exposures with light
 _SEEN = 3.0  # standard errors: a change that numbers can show
 _NEAR = 2.0  # standard errors of a size that is as predicted
@@ -34,7 +35,8 @@ def otherwise_by_level(state: State, kind: str, without: Array, mean: Array) -> 
     """Return how an effect is denied by the levels that show what it makes; None: it is not.
 
     Least squares of what is left open without it, by what the effect changes there, of any size
-    but none below zero, and by the same times a power of the signal. Denied is the effect where
+    but none below zero, and by the same times a power of the signal: a lower one than the first is
+    no other law, the form of an effect is known no better. Denied is the effect where
     such a power is likelier at odds of 20, and the effect beside it is not needed at such odds, nor
     of its own size within two errors. Of changes that no level shows nothing is said.
 
@@ -69,8 +71,10 @@ def _levels(
 ) -> tuple[Array, Array, Array, list[str]]:
     """Return what an effect changes, what is left without, the signal, and the exposure: of each.
 
-    In standard errors; where there is light that is not cut off.
+    In standard errors, with what is allowed for the form of the change; where there is light that
+    is not cut off.
     """
+    forms = form_errors(state.vector.keys)
     signals, levels = state.calibrated.fit.signal_dn, state.setting.seen.levels
     found, names = [], []
     for i, key in enumerate(state.vector.keys):
@@ -82,7 +86,7 @@ def _levels(
         clipped = any(levels[place].clipped_high > CLIPPED_SHARE for place in places)
         change, left = (float(one[i] - without[i]) for one in (mean, state.vector.values))
         if light > 0 and not clipped and np.isfinite(change) and np.isfinite(left):
-            error = float(state.null.sd[i])
+            error = float(np.hypot(state.null.sd[i], forms[i] * change))
             found.append((change / error, left / error, light))
             names.append(key.exposure)
     changes, rest, lights = np.array(found, np.float64).reshape(-1, 3).T

@@ -44,6 +44,27 @@ class TestCodes:
             low, high = (codes == phase).mean(), (codes == codes.max()).mean()
             assert (channel.clipped_low, channel.clipped_high) == ((0, high) if level else (low, 0))
 
+    @pytest.mark.parametrize("step", [1, 3, 8])
+    def test_the_gap_of_alike_steps_is_the_step(self, step: int) -> None:
+        codes = step * np.rint((1000 + 3 * step * noise(10, 64, 64) / SIGMA) / step)
+        found = one(codes.astype(np.uint16)).codes
+        assert found is not None
+        assert found.gap == pytest.approx(step, rel=2e-3)  # a few codes far out are missed
+
+    def test_the_gap_of_unlike_steps_is_that_around_most_samples(self) -> None:
+        """Squares of whole numbers: from one to the next there are 2 n + 1 codes."""
+        roots = np.rint(30 + 2 * np.random.default_rng(3).normal(size=(10, 64, 64)))
+        found = one((roots**2).astype(np.uint16)).codes
+        assert found is not None
+        assert found.gap == pytest.approx(2 * roots.mean(), rel=0.02)
+
+    def test_of_few_samples_a_code_no_gap_is_known(self) -> None:
+        rng = np.random.default_rng(4)
+        found = one(rng.normal(20000, 1500, (4, 32, 32)).round().astype(np.uint16)).codes
+        assert found is not None
+        assert np.isnan(found.gap)
+        assert np.isnan(Codes.of(5, np.array([7])).gap)
+
     def test_random_code_widths(self) -> None:
         """Edges of codes moved so that widths scatter by 5 %: what the measure must return."""
         widths = 1 + 0.05 * np.random.default_rng(11).normal(size=400)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from analysis.mismatch.bank.key import Key
-from analysis.mismatch.contradicted import Denial, contradicted, refuted
+from analysis.mismatch.contradicted import Denial, _of_codes, contradicted, refuted
 from analysis.mismatch.polish import Polished
 from analysis.mismatch.predict import Predictor
 from analysis.mismatch.state import State
@@ -129,4 +129,40 @@ def test_flats_do_not_outvote_darks(in_darks: float, denied: bool) -> None:
     )
     predictor: Any = SimpleNamespace(mean=lambda _: np.zeros(4), forms=np.full(4, 0.08))
     found = contradicted(state, predictor, "amp_glow", camera())
+    assert (found is not None) is denied
+
+
+@pytest.mark.parametrize(
+    ("gap_dn", "moved_dn", "noise_dn", "denied"),
+    [
+        (8.0, 3.0, 5.0, True),
+        (8.0, 30.0, 5.0, False),
+        (8.0, 3.0, 20.0, False),
+        (1.0, 3.0, 0.9, False),
+    ],
+)
+def test_codes_that_are_far_apart_move_levels(
+    gap_dn: float, moved_dn: float, noise_dn: float, denied: bool
+) -> None:
+    """By up to half their distance, where noise is no wider and none of it is explained."""
+    names = [f"flat-{i}" for i in range(4)]
+    keys = tuple(
+        Key(statistic, "exposure", name, "MONO")
+        for name in names
+        for statistic in ("level", "code_spacing")
+    )
+    of_levels = np.array([key.statistic == "level" for key in keys])
+    places = [(name, "MONO") for name in names]
+    state: Any = SimpleNamespace(
+        mismatches=[SimpleNamespace(statistic="code_spacing")],
+        vector=SimpleNamespace(keys=keys, values=np.zeros(8)),
+        null=SimpleNamespace(mean=np.zeros(8), sd=np.full(8, 0.1), known=np.ones(8, bool)),
+        setting=SimpleNamespace(
+            seen=SimpleNamespace(
+                levels=dict.fromkeys(places, SimpleNamespace(variance_dn2=noise_dn**2)),
+                gaps_dn=dict.fromkeys(places, gap_dn),
+            )
+        ),
+    )
+    found = _of_codes(state, "nonlinearity", np.where(of_levels, moved_dn, 0.0))
     assert (found is not None) is denied

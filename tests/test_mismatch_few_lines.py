@@ -100,6 +100,19 @@ def test_offsets_of_all_are_believed_beside_few_that_jump(cfa: Cfa) -> None:
     assert not _denied(stacks, "column_fpn", cfa)
 
 
+@pytest.mark.parametrize(("offsets", "denied"), [(_jumping, True), (_new, False)])
+@pytest.mark.parametrize("cfa", [Cfa.MONO, Cfa.RGGB])
+def test_pink_noise_of_columns_is_in_all_of_them(offsets: Any, denied: bool, cfa: Cfa) -> None:
+    """It is asked of the lines whose variance it changes."""
+    state = _state(_frames(7, offsets), cfa)
+    keys = state.vector.keys
+    state.null.sd = np.full(len(keys), 0.01)
+    without = np.ones(len(keys))
+    mean = without + np.array([0.5 * (key.statistic == "column_variance") for key in keys])
+    assert (of_few_lines(state, "pink_noise", without, mean) is not None) is denied
+    assert of_few_lines(state, "pink_noise", without, without) is None  # of rows: none jump
+
+
 def test_rows_and_other_effects_are_not_asked_of_columns() -> None:
     stacks = _frames(5, _jumping)
     assert not _denied(stacks, "row_noise", Cfa.MONO)

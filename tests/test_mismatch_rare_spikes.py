@@ -155,6 +155,21 @@ def test_saturated_flats_say_nothing_of_how_often_spikes_hit() -> None:
     assert hits / (4 * 12 * ROWS * COLUMNS) == pytest.approx(law.share, rel=0.1)
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_spikes_are_found_beside_noise_with_a_tail_of_its_own(seed: int) -> None:
+    """A sample or two past eight standard deviations do not hide nine far above."""
+
+    def change(rng: np.random.Generator, stacks: dict[str, Array]) -> None:
+        spikes(9, 3000.0)(rng, stacks)
+        for own in (stacks["dark-0"], stacks["flat-1"]):
+            y, x = rng.integers(ROWS), rng.integers(COLUMNS)
+            own[3, y, x] += 9.5 * own[:, y, x].std()
+
+    some = found(made(30 + seed, change))
+    assert some is not None
+    assert some.hits.frame.size >= 8
+
+
 def test_spikes_are_put_aside_and_nothing_else() -> None:
     def change(rng: np.random.Generator, stacks: dict[str, Array]) -> None:
         spikes(20)(rng, stacks)

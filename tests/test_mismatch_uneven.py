@@ -12,7 +12,7 @@ from scipy.stats import binom
 from analysis.mismatch import find_mismatch
 from analysis.mismatch.bank.key import Key
 from analysis.mismatch.diagnose import VOCABULARY
-from analysis.mismatch.uneven import _ratio, uneven
+from analysis.mismatch.uneven import _Map, _ratio, uneven
 from dsis.effects import registry
 from mismatch_recordings import FEW_LEVELS, camera, recorded
 
@@ -67,6 +67,41 @@ def test_a_glow_is_no_dark_current(extent: float) -> None:
 def test_dark_current_is_believed_alone_and_beside_a_glow(growth: Any) -> None:
     state = _state(RATE * TIME_S + growth)
     assert uneven(state, registry()["dark_current"](dn_per_s=RATE)) is None
+
+
+def test_noise_of_whole_rows_is_no_glow() -> None:
+    """A row's noise is not averaged along it: what rows differ by says less of a wide glow."""
+    rows = np.random.default_rng(11).normal(0, 1.5 * NOISE_DN, (64, 1))
+    assert uneven(_state(RATE * TIME_S + rows), DARK_CURRENT) is None
+    said = uneven(_state(_glow(0.1) + rows), DARK_CURRENT)
+    assert said is not None
+    assert said.share < 0.5
+
+
+def test_maps_have_the_covariance_that_products_assume() -> None:
+    """Row, column and pixel noise: squares in units of it are chi-squared, and the mean's too."""
+    rng, shape = np.random.default_rng(5), (24, 32)
+    squares, means = [], []
+    wave = np.cos(np.arange(24) / 3)[:, np.newaxis] * np.sin(np.arange(32) / 5 + 1)
+    wave = wave + 0.3 * np.arange(24)[:, np.newaxis] / 24
+    for _ in range(600):
+        rows, columns = rng.normal(0, 0.5, (24, 1)), rng.normal(0, 0.2, 32)
+        image = rng.normal(0, 1.0, shape) + rows + columns
+        own = _Map(image, 1.0, 1 + 32 * 0.25, 1 + 24 * 0.04)
+        square, along = own.products(wave)
+        squares.append(along / square**0.5)
+        means.append(image.mean() * (image.size / own.mean_dn2) ** 0.5)
+    for own in (squares, means):
+        assert abs(np.var(own) - 1) < 5 * (2 / 600) ** 0.5
+
+
+@pytest.mark.parametrize(("extent", "denied"), [(0.1, True), (1.5, False)])
+def test_before_all_frames_are_asked_only_a_likelier_glow_denies(
+    extent: float, denied: bool
+) -> None:
+    state = _state(RATE * TIME_S if not denied else _glow(extent))
+    state.setting.asked_again = True
+    assert (uneven(state, DARK_CURRENT) is not None) is denied
 
 
 def _few(share: float, rate: float, seed: int) -> Any:

@@ -1,0 +1,77 @@
+"""Fixed deviations of lines: what frames that others foretell gain by them, and all frames."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.stats import multivariate_normal
+
+from analysis.mismatch.bank.linemeans import LineMeans
+from analysis.mismatch.fixedforetold import odds_of_lines
+
+Array = NDArray[np.float64]
+LINES = 120
+FRAMES, LOCKED = (8, 6, 12), (2, 2, 3)
+NOISE_DN2 = (0.02, 0.05, 0.2)  # of a line's mean in one frame
+SIGNAL_DN = np.array([0.0, 400.0, 2000.0])
+
+
+def _lines(series: Array, noise: float) -> LineMeans:
+    """Return the lines of frames: (frame, line)."""
+    frames = len(series)
+    return LineMeans(frames, series.mean(0), series.var(0, ddof=1), noise, np.zeros((frames, 1)))
+
+
+def _recorded(seed: int, fixed: Any) -> tuple[list[LineMeans], list[LineMeans]]:
+    """Return lines of all frames, and of those that are not locked; `fixed` by the signal, DN."""
+    rng = np.random.default_rng(seed)
+    whole, some = [], []
+    for count, locked, noise, signal in zip(FRAMES, LOCKED, NOISE_DN2, SIGNAL_DN, strict=True):
+        series = rng.normal(0, noise**0.5, (count, LINES)) + fixed(signal)
+        whole.append(_lines(series, noise))
+        some.append(_lines(series[locked:], noise))
+    return whole, some
+
+
+def test_odds_are_those_of_normal_laws() -> None:
+    """Of the means of locked and other frames, one line at a time."""
+    pattern = np.random.default_rng(1).normal(0, 0.05, LINES)
+    whole, some = _recorded(2, lambda _: pattern)
+    size = np.full(3, 0.05)
+    gained, of_all = odds_of_lines(whole, some, SIGNAL_DN, size, (1e-3, 1e-9))
+    moving = np.array([own.moving.mean() for own in whole])
+    counts = np.array([*(f - k for f, k in zip(FRAMES, LOCKED, strict=True)), *LOCKED])
+    signal = np.tile(SIGNAL_DN, 2)
+    without = np.diag(np.tile(moving, 2) / counts) + 1e-3 + 1e-9 * np.outer(signal, signal)
+    beside = without + 0.05**2
+    locked = [(w.frames * w.fixed - s.frames * s.fixed) / (w.frames - s.frames)
+              for w, s in zip(whole, some, strict=True)]  # fmt: skip
+    seen = np.stack([*(own.fixed for own in some), *locked]).T
+    for which, expected in ((slice(None), of_all), (slice(3), of_all - gained)):
+        laws = [
+            multivariate_normal(cov=c[which, which]).logpdf(seen[:, which])
+            for c in (beside, without)
+        ]
+        np.testing.assert_allclose(laws[0] - laws[1], expected, atol=1e-9)
+
+
+@pytest.mark.parametrize("deviation", [np.full(3, 0.05), 1e-4 * SIGNAL_DN])
+def test_what_is_there_gains_and_what_is_not_loses(deviation: Array) -> None:
+    """An offset, and a gain: 7 nats take an effect into a search."""
+    by_signal = dict(zip(SIGNAL_DN.tolist(), deviation.tolist(), strict=True))
+    gains, losses = [], []
+    for seed in range(30):
+        lines = np.random.default_rng([seed, 1]).normal(0, 1, LINES)
+        there = _recorded(seed, lambda signal, own=lines: own * by_signal[float(signal)])
+        gains.append(odds_of_lines(*there, SIGNAL_DN, deviation, (0.0, 0.0))[1].sum())
+        none = _recorded(1000 + seed, lambda _: 0.0)
+        losses.append(odds_of_lines(*none, SIGNAL_DN, deviation, (0.0, 0.0))[1].sum())
+    assert min(gains) > 7
+    assert max(losses) < 0
+
+
+def test_where_no_frame_is_locked_nothing_is_told() -> None:
+    whole, _ = _recorded(3, lambda _: 0.0)
+    gained, of_all = odds_of_lines(whole, whole, SIGNAL_DN, np.full(3, 0.05), (0.0, 0.0))
+    assert gained.size == of_all.size == 0

@@ -135,7 +135,10 @@ def _coarse(state: State) -> dict[Place, float]:
     ):
         if key.statistic != "code_spacing" or key.place not in seen.levels:
             continue
-        gap = float(np.nanmax([2.0**log_dn, seen.gaps_dn.get(key.place, np.nan)]))
+        # Of what is unknown nothing is larger.
+        gap = max(
+            float(np.nan_to_num(2.0**log_dn)), np.nan_to_num(seen.gaps_dn.get(key.place, 0.0))
+        )
         if gap > 2 ** (model + _WIDER) and seen.levels[key.place].variance_dn2 <= gap**2:
             found[key.place] = gap
     return found

@@ -226,9 +226,16 @@ class Camera(Model):
         return self.diffuse_white_dn
 
 
-@lru_cache(maxsize=64)
 def _readied(camera: Camera) -> tuple[tuple[Effect, ...], ReadOut]:
     """Return links and read-out of a camera: to make them takes as long as a small frame."""
+    try:
+        return _kept_ready(camera)
+    except TypeError:  # the maps of a sensor are arrays, which have no hash
+        return camera.chain(), camera.read_out
+
+
+@lru_cache(maxsize=64)
+def _kept_ready(camera: Camera) -> tuple[tuple[Effect, ...], ReadOut]:
     return camera.chain(), camera.read_out
 
 

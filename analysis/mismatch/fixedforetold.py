@@ -119,9 +119,8 @@ def _shared(
     `grown`: by which factor the model's lines differ more than noise of pixels makes them.
     """
     noise = np.array([own.noise_dn2 / own.frames for own in whole])
-    moving = np.array([own.moving.mean() / own.frames for own in whole])
     design = np.stack([np.ones(signal_dn.size), signal_dn**2], 1) / noise[:, np.newaxis]
-    left = np.maximum(noise * np.array(grown) - moving, 0.0) / noise
+    left = np.maximum(np.array(grown) - 1, 0.0)  # what lines move by is not in it
     found, _ = scipy.optimize.nnls(design, left)
     return float(found[0]), float(found[1])
 

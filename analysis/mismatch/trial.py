@@ -178,7 +178,7 @@ class Trial:
         told = Ratio(float(nats.sum()), float(np.sqrt(nats @ nats)), certain=False)
         found = _of_pixels(_per_frame(told, frames), frames)
         shown = told.nats > _BARE and float(of_all.sum()) - 1 >= SURE_GAIN
-        return replace(found, certain=found.certain or shown)
+        return replace(found, certain=shown)
 
     def gains(self, final: State, without: Mapping[str, Camera]) -> dict[str, Gained]:
         """Return what the final model gains over cameras without an effect, by effect."""

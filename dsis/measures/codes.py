@@ -206,7 +206,7 @@ class Codes:
 
     @property
     def gap(self) -> float:
-        """How far apart the codes lie that occur, DN, mean over samples; nan: it cannot be told.
+        """How far apart codes lie in the middle, DN, mean over samples; nan: it cannot be told.
 
         Each sample has half the distance between the codes on both sides of its own. So it is the
         step of a converter whose steps are alike, and what most samples are rounded to where they
@@ -221,7 +221,9 @@ class Codes:
             return nan
         apart = np.diff(used).astype(np.float64)
         around = (np.append(apart, apart[-1]) + np.insert(apart, 0, apart[0])) / 2
-        return float(around @ self.counts[used] / self.total)
+        inside = (used >= first) & (used <= last)  # what lies far out is around few samples
+        counts = self.counts[used[inside]]
+        return float(around[inside] @ counts / counts.sum())
 
     @cached_property
     def _inner(self) -> NDArray[np.intp]:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.stats import multivariate_normal
 
 from analysis.mismatch.bank.linemeans import LineMeans
-from analysis.mismatch.fixedforetold import odds_of_lines
+from analysis.mismatch.fixedforetold import _shared, odds_of_lines
 
 Array = NDArray[np.float64]
 LINES = 120
@@ -75,3 +75,13 @@ def test_where_no_frame_is_locked_nothing_is_told() -> None:
     whole, _ = _recorded(3, lambda _: 0.0)
     gained, of_all = odds_of_lines(whole, whole, SIGNAL_DN, np.full(3, 0.05), (0.0, 0.0))
     assert gained.size == of_all.size == 0
+
+
+def test_what_lines_move_by_leaves_what_they_share_as_it_is() -> None:
+    """Ratios of fixed variances are net of movement: lines that move more share no less."""
+    whole, _ = _recorded(4, lambda _: 0.0)
+    still = [LineMeans(o.frames, o.fixed, 0 * o.moving, o.noise_dn2, o.parts) for o in whole]
+    noise = np.array([own.noise_dn2 / own.frames for own in whole])
+    grown = 1 + (0.09 + 1e-8 * SIGNAL_DN**2) / noise
+    assert _shared(whole, grown, SIGNAL_DN) == pytest.approx((0.09, 1e-8))
+    assert _shared(still, grown, SIGNAL_DN) == pytest.approx((0.09, 1e-8))

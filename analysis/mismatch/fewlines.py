@@ -39,7 +39,8 @@ def of_few_lines(
     explains, or less, there may be nothing that all lines have.
     """
     if kind == _PINK and mean is not None:
-        kind = f"{_changed_most(state, mean - without)}_noise"
+        changed = _changed_most(state, mean - without)
+        kind = f"{changed}_noise" if changed is not None else kind
     axis = _NEW.get(kind) or _FIXED.get(kind)
     if axis is None:
         return None
@@ -64,13 +65,15 @@ def of_few_lines(
     return Denial(max(rest / whole, 0.0), why)
 
 
-def _changed_most(state: State, change: Array) -> Axis:
-    """Return the axis whose lines' variances a change of the numbers raises by more."""
+def _changed_most(state: State, change: Array) -> Axis | None:
+    """Return the axis whose lines' variances a change of the numbers moves by more; None: none."""
     size: dict[Axis, float] = {"row": 0.0, "column": 0.0}
     for axis in size:
         own = np.array([key.statistic == f"{axis}_variance" for key in state.vector.keys])
         own &= state.null.known & np.isfinite(change)
         size[axis] = float(((change[own] / state.null.sd[own]) ** 2).sum())
+    if not any(size.values()):
+        return None
     return max(size, key=lambda axis: size[axis])
 
 

@@ -2,7 +2,8 @@
 
 A likelihood of pixels learns a fixed pattern site by site, and wave by wave: weak offsets of whole
 lines are lost in that. Means of lines, of which each exposure has one, are normal variates that
-know all that frames say of them.
+know all that frames say of them. A pattern that each exposure draws anew, or movement that frames
+share, repeats within an exposure only: what is fixed is what exposures have in common.
 """
 
 from collections.abc import Mapping, Sequence
@@ -32,8 +33,8 @@ def fixed_foretold(bare: State, before: Observation, effect: Effect) -> tuple[Ar
     """Return what locked frames gain by a fixed deviation of lines, and all: nats of each line.
 
     The first are odds of all frames less those of the others. What lines deviate by without the
-    effect, an offset and a gain, is in both models. Empty arrays: the effect is none of lines, or
-    nothing tells.
+    effect, an offset and a gain, is in both models, and so is what an exposure has alone. Empty
+    arrays: the effect is none of lines, or nothing tells.
 
     Parameters
     ----------
@@ -73,7 +74,8 @@ def odds_of_lines(
     whole, some
         Means of lines of all frames of each exposure, and of some of them.
     signal_dn
-        Of each exposure.
+        Of each exposure. What an exposure has alone is an offset and a gain, of likeliest sizes
+        with the deviation and without.
     deviation_dn
         Standard deviation of what is fixed in each exposure, of one shape in all of them.
     shared
@@ -89,12 +91,29 @@ def odds_of_lines(
     signal, deviation = signal_dn[which], deviation_dn[which]
     without = np.diag(moving[which] / np.array(frames))
     without += shared[0] + shared[1] * np.outer(signal, signal)
+    same = (which[:, np.newaxis] == which).astype(np.float64)
+    own = np.stack([same, same * np.outer(signal, signal)])
     beside = without + np.outer(deviation, deviation)
+    without, beside = (_with_own(seen, one, own) for one in (without, beside))
     first = len(whole)
     odds = _loglik(seen, beside) - _loglik(seen, without)
     known = _loglik(seen[:first], beside[:first, :first])
     known = known - _loglik(seen[:first], without[:first, :first])
     return np.clip(odds - known, -_MOST, _MOST), np.clip(odds, -_MOST, _MOST)
+
+
+def _with_own(seen: Array, covariance: Array, own: Array) -> Array:
+    """Return a covariance with the likeliest amounts of what each exposure has of its own."""
+    scale = np.trace(covariance) / np.trace(own, axis1=1, axis2=2).clip(np.finfo(float).tiny)
+
+    def total(amounts: Array) -> Array:
+        return np.asarray(covariance + np.tensordot(amounts * scale, own, 1))
+
+    def misfit(amounts: Array) -> float:
+        return -float(_loglik(seen, total(amounts)).mean())
+
+    found = scipy.optimize.minimize(misfit, np.full(len(own), 0.1), bounds=[(0, None)] * len(own))
+    return total(found.x)
 
 
 def _deviation(effect: Effect, signal_dn: Array) -> Array:

@@ -2,8 +2,11 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import exp, log
 
 import numpy as np
+import scipy.optimize
+import scipy.special
 import scipy.stats
 from numpy.typing import NDArray
 
@@ -18,6 +21,8 @@ Array = NDArray[np.float64]
 _OWN = 40.0  # degrees of freedom that the closed form, scaled by name, is worth for a number
 _POOLED = 160.0  # and for the tails: a scale is shared by all numbers of a name
 _LEAST_SCALE = 0.8
+_SEVERAL = 5  # numbers of a name that tell whether they are alike
+_UNLIKE = 1e-4  # chance of spreads that differ so
 _ODD = 1e-3  # chance of simulations so far off that a score is not normal under the model
 _COMB = 0.4  # relative error of the codes' imbalance that a model predicts
 
@@ -72,7 +77,8 @@ def null_of(layout: Layout, simulated: Sequence[Vector], seen: Vector) -> Null:
     """Return the null from simulated recordings.
 
     The closed-form errors are scaled, name by name, to the spread that the simulations show; each
-    number's own spread counts by its degrees of freedom. Scores of the highest of many bins are
+    number's own spread counts by its degrees of freedom, and alone where spreads of a name differ
+    as chance does not make them. Scores of the highest of many bins are
     standard normal in white noise: so they are taken, unless the simulations deny it.
     """
     values = np.stack([one.values for one in simulated])
@@ -82,8 +88,8 @@ def null_of(layout: Layout, simulated: Sequence[Vector], seen: Vector) -> Null:
     mean = np.where(known, np.nan_to_num(values).mean(0), 0.0)
     error = np.where(known, np.sqrt(np.mean(np.where(np.isfinite(errors), errors, 1.0) ** 2, 0)), 1)
     own = np.where(known, ((np.nan_to_num(values) - mean) ** 2).sum(0) / (count - 1), 1) / error**2
-    scale = _by_name(seen.keys, own, known)
-    blended = (_OWN * scale + (count - 1) * own) / (_OWN + count - 1)
+    scale, worth, tails = _by_name(seen.keys, own, known, count - 1)
+    blended = tails**2 * (worth * scale + (count - 1) * own) / (worth + count - 1)
     sd = error * np.sqrt(np.maximum(blended, _LEAST_SCALE**2) * (1 + 1 / count))
     normal = known & _normal(seen.keys, np.where(known, np.nan_to_num(values), 0.0))
     mean, sd = np.where(normal, 0.0, mean), np.where(normal, 1.0, sd)
@@ -135,17 +141,59 @@ def _normal(keys: Sequence[Key], values: Array) -> NDArray[np.bool_]:
     return np.asarray(scores & ~far)
 
 
-def _by_name(keys: Sequence[Key], own: Array, known: NDArray[np.bool_]) -> Array:
-    """Return the mean squared ratio of spread to closed form of each statistic and scope."""
+def _by_name(
+    keys: Sequence[Key], own: Array, known: NDArray[np.bool_], dof: int
+) -> tuple[Array, Array, Array]:
+    """Return what a name says of the ratio of mean squared spread to closed form, of each number.
+
+    The ratio, the degrees of freedom that it is worth beside a number's own `dof`, and by how much
+    farther tails of fewer reach. A statistic and scope of which some spread otherwise than others,
+    as few strong pixels do where noise is low, says as much as its logarithms scatter less than
+    chance lets them (Smyth 2004, "Linear models and empirical Bayes methods").
+    """
     groups: dict[tuple[str, str], list[int]] = {}
     for i, key in enumerate(keys):
         if known[i]:
             groups.setdefault((key.statistic, key.scope), []).append(i)
-    scale = np.ones(len(keys))
+    scale, worth, tails = np.ones(len(keys)), np.full(len(keys), _OWN), np.ones(len(keys))
     for which in groups.values():
         # Few numbers leave the closed form its say.
         scale[which] = (own[which].sum() + 4.0) / (len(which) + 4.0)
-    return scale
+        unlike = _unlike(own[which], dof)
+        if unlike:
+            scale[which], worth[which] = unlike
+            tails[which] = _farther(unlike[1] + dof) / _farther(_OWN + dof)
+    return scale, worth, tails
+
+
+def _unlike(own: Array, dof: int) -> tuple[float, float] | None:
+    """Return the variance of variances that chance alone does not scatter so, and its worth.
+
+    None: they are as like as chance lets them be.
+    """
+    if len(own) < _SEVERAL or not (own > 0).all():
+        return None
+    logs = np.log(own) - float(scipy.special.digamma(dof / 2)) + log(dof / 2)
+    by_chance = float(scipy.special.polygamma(1, dof / 2))
+    scatter = float(logs.var(ddof=1))
+    if (len(own) - 1) * scatter / by_chance < scipy.stats.chi2.isf(_UNLIKE, len(own) - 1):
+        return None
+    half = _with_trigamma(scatter - by_chance)
+    typical = exp(float(logs.mean()) + float(scipy.special.digamma(half)) - log(half))
+    return typical, min(2 * half, _OWN)
+
+
+def _with_trigamma(value: float) -> float:
+    """Return where the trigamma function has a value."""
+    of_log = scipy.optimize.brentq(
+        lambda x: float(scipy.special.polygamma(1, exp(x))) - value, -12.0, 12.0
+    )
+    return exp(of_log)
+
+
+def _farther(dof: float) -> float:
+    """Return how far out a Student's variate lies at a small chance."""
+    return float(scipy.stats.t.isf(_ODD, dof))
 
 
 def adjusted(chances: Array, weights: Array) -> Array:

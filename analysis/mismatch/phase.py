@@ -37,7 +37,7 @@ _BETWEEN = (-1 / 3, 0.0, 1 / 3)  # bins by which a frequency may be off
 _CHANCE = 0.05  # of a line as strong among all frequencies
 _SLOWEST = 3.0  # waves of a frame, beside which noise may rise as 1 / f
 _SHORTER = 5, 24  # waves of a frame, that say by how much
-_FEW = 8  # multiples of a quarter, at which patterns of single pixels lie
+_FEW = 32  # multiples of an eighth, at which patterns of few pixels lie
 _PHASE_WORDS = {
     "periodic_noise": "the pattern's phase is the same in all frames but for its sign",
     "bistable_pattern": "the pattern's phase is another in every frame",
@@ -357,8 +357,8 @@ def _top(at: float, beside: NDArray[np.float64]) -> tuple[float, list[float]]:
 
 
 def _of_pixels(frequency: Frequency) -> bool:
-    """Return whether a frequency is that of stripes or checkerboards of one or two pixels."""
-    return all((4 * f) % 1 == 0 for f in frequency)
+    """Return whether a frequency is that of what repeats over two, four or eight pixels."""
+    return all((8 * f) % 1 == 0 for f in frequency)
 
 
 def _apart(layout: Layout, one: Frequency, other: Frequency) -> bool:

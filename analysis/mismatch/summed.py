@@ -12,6 +12,7 @@ from analysis.mismatch.bank.coherent import Peak, SpectrumSums
 from analysis.mismatch.bank.common import common
 from analysis.mismatch.bank.linemeans import Axis, LineMeans, line_means
 from analysis.mismatch.bank.maps import PatternSums, Regressors
+from analysis.mismatch.bank.periods import FEW_PIXELS, Periods, PeriodSums
 from analysis.mismatch.bank.persistent import VarianceSums
 from analysis.mismatch.bank.scalars import Number
 from analysis.mismatch.bank.waves import Waves, WaveSums
@@ -61,8 +62,8 @@ class Looked:
         Its name, and how many frames.
     measured
         The measures.
-    lines, after
-        Waves of the whole sensor, and samples by the code before.
+    lines, after, cells
+        Waves of the whole sensor, samples by the code before, and patterns of few pixels.
     """
 
     exposure: str
@@ -70,6 +71,7 @@ class Looked:
     measured: Measured
     lines: Waves
     after: CarryOver
+    cells: Periods
 
 
 class ChannelSums:
@@ -106,20 +108,21 @@ class SensorSums:
         self.common: dict[str, Mapping[str, Number]] = {}
         self.bands = Bands(layout.rows, layout.sites)
         self.waves = WaveSums(self.shape, 1 + self.mosaic, taken=SPECTRA in made)
+        self.periods = PeriodSums(self.shape, 1 + self.mosaic)
         self.memory = CarryOverSums()
 
     def looked(self, exposure: str, frames: int, seen: Iterable[NDArray[np.generic]]) -> "Looked":
         """Return what an exposure's frames show; nothing is summed yet."""
-        lines, after = Waves(self.shape), CarryOver(keep=self.samples)
+        lines, after, cells = Waves(self.shape), CarryOver(keep=self.samples), Periods()
         if SPECTRA not in self.made:
             lines.frames = frames
-        elif self.mosaic:
-            seen = lines.watching(seen)
+        else:
+            seen = cells.watching(lines.watching(seen) if self.mosaic else seen)
         watched = after.watching(seen) if CARRY_OVER in self.made else seen
         # The transforms of a sensor without colours are at hand.
         take = None if self.mosaic else lambda one: lines.take(one[0])
         found = measure(self.layout, watched, take, self.made)
-        return Looked(exposure, frames, found, lines, after)
+        return Looked(exposure, frames, found, lines, after, cells)
 
     def add(self, one: "Looked", *, still: bool) -> None:
         """Take what moves in an exposure's frames, unless it is `still`."""
@@ -130,6 +133,10 @@ class SensorSums:
         places = {name: (one.exposure, name) for name in found}
         expected = {name: self.layout.variance_dn2[place] for name, place in places.items()}
         self.waves.add(one.lines, found, expected)
+        sizes = [c.mean_frame.size for c in found.values()]
+        own = [c.estimates["pixel_variance"].value for c in found.values()]
+        wanted = [expected[name] for name in found]
+        self.periods.add(one.cells, *(float(np.average(v, weights=sizes)) for v in (own, wanted)))
         if self.mosaic:
             signals = {name: self.layout.signal_dn[place] for name, place in places.items()}
             sites = self.layout.sites
@@ -144,10 +151,11 @@ class SensorSums:
         """Return spectra and memories of the whole sensor."""
         own = self.bands.numbers() if self.mosaic else {}
         waves = {"spectral_peak": self.waves.number(), **self.waves.odd_lags()}
+        waves[f"spectral_peak of {FEW_PIXELS}"] = self.periods.number()
         return {**own, **self.memory.numbers(), **waves}
 
     def peaks(self) -> dict[str, Peak]:
         """Return where its spectra are largest, by kind."""
         own = self.bands.peaks() if self.mosaic else {}
-        peak = self.waves.peak()
-        return own if peak is None else {**own, "spectrum": peak}
+        whole = {"spectrum": self.waves.peak(), f"spectrum, {FEW_PIXELS}": self.periods.peak()}
+        return {**own, **{kind: peak for kind, peak in whole.items() if peak is not None}}

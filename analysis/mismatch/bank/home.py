@@ -11,6 +11,7 @@ from analysis.mismatch.bank.edges import names as edge_names
 from analysis.mismatch.bank.key import MOSAIC, Key
 from analysis.mismatch.bank.parts import STANDING_OUT
 from analysis.mismatch.bank.patches import SIZES
+from analysis.mismatch.bank.periods import FEW_PIXELS
 from analysis.mismatch.bank.persistent import OUTSTANDING, SURFACE
 from analysis.mismatch.bank.seams import WHOLE
 from analysis.mismatch.bank.surfaces import LOW
@@ -71,6 +72,7 @@ _POOLED = frozenset(
         (SURFACE, "all", ""),
         *(("noisy_pixels", "all", str(limit)) for limit in OUTSTANDING),
         ("spectral_peak", "all", ""),
+        ("spectral_peak", "all", FEW_PIXELS),
         ("row_spectrum_peak", "all", ""),
         ("row_spectrum_peak", "all", "light"),
         ("column_spectrum_peak", "all", "colour"),

@@ -1,0 +1,114 @@
+"""Patterns of few pixels that change from frame to frame, folded into cells of eight by eight.
+
+What a sensor repeats over two, four or eight pixels or lines, as channels that take turns do, has
+frequencies that are multiples of an eighth of a cycle per pixel: so few that a line there stands
+out where among all frequencies it would be one of many. Cells know them exactly, whatever the size
+of a sensor; what is beyond whole cells is left out. The axes hold what rows and columns have in
+common, on a mosaic those of each colour.
+"""
+
+from collections.abc import Iterable, Iterator
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.mismatch.bank.coherent import Peak
+from analysis.mismatch.bank.lines import any_of, log_chance
+from analysis.mismatch.bank.scalars import UNKNOWN, Number, score_of_log
+
+Array = NDArray[np.float64]
+CELL = 8
+FEW_PIXELS = "few pixels"
+_LEAST = 4  # cells along each axis
+
+
+class Periods:
+    """Cells (frame, row, column) of the frames of one exposure: means over what repeats them."""
+
+    def __init__(self) -> None:
+        self.cells: list[Array] = []
+
+    def watching(self, frames: Iterable[NDArray[np.generic]]) -> Iterator[NDArray[np.generic]]:
+        """Yield frames (row, column) as they come, and fold them."""
+        for frame in frames:
+            rows, columns = (size // CELL for size in frame.shape)
+            whole = frame[: rows * CELL, : columns * CELL].reshape(rows * CELL, columns, CELL)
+            lines = whole.sum(1, dtype=np.float64)
+            self.cells.append(lines.reshape(rows, CELL, CELL).sum(0) / max(rows * columns, 1))
+            yield frame
+
+    def power(self) -> Array:
+        """Return the power over time (row, column), summed over frames: of a mean of cells."""
+        cells = np.array(self.cells)
+        return np.asarray((np.abs(np.fft.fft2(cells - cells.mean(0))) ** 2).sum(0))
+
+
+class PeriodSums:
+    """Their power over all exposures, white noise scaled to 1; amplitudes constant in DN.
+
+    Parameters
+    ----------
+    shape
+        Rows and columns of the sensor.
+    step
+        Of a channel's pixels: 1, or 2 on a mosaic.
+    """
+
+    def __init__(self, shape: tuple[int, int], step: int) -> None:
+        self.shape, self.step = shape, step
+        self.repeats = (shape[0] // CELL) * (shape[1] // CELL)
+        self.power = np.zeros((CELL, CELL))
+        self.weight = self.squares = 0.0
+
+    def add(self, seen: Periods, variance_dn2: float, expected_dn2: float) -> None:
+        """Take one exposure: the variance of its pixels, and that expected, which weighs it."""
+        degrees = len(seen.cells) - 1
+        if degrees < 1 or not variance_dn2 > 0 or min(self.shape) < _LEAST * CELL:
+            return
+        weight = degrees / expected_dn2
+        white = variance_dn2 * degrees * CELL**2 / self.repeats
+        self.power += weight * seen.power() / white
+        self.weight += weight
+        self.squares += weight**2 / degrees
+
+    def number(self) -> Number:
+        """Return the normal score of the largest power, of the least of so many chances."""
+        places = _places(self.shape, self.step)
+        if not self.weight:
+            return UNKNOWN
+        least = min(self._log_chance(*place) for place in places)
+        return score_of_log(any_of(least, len(places))), 1.0
+
+    def peak(self) -> Peak | None:
+        """Return where that is: cycles per pixel of a plane, power as one plane shows it."""
+        if not self.weight:
+            return None
+        y, x = min(_places(self.shape, self.step), key=lambda place: self._log_chance(*place))
+        power = 1 + (float(self.power[y, x]) / self.weight - 1) / self.step**2
+        fy, fx = (at / CELL - float(at > CELL // 2) for at in (y, x))
+        return Peak(self.step * fx, self.step * fy, power)
+
+    def _log_chance(self, y: int, x: int) -> float:
+        """Return ln of the chance that white noise has as much power there."""
+        degrees = self.weight**2 / self.squares
+        real = all(at in (0, CELL // 2) for at in (y, x))
+        return log_chance(float(self.power[y, x]) / self.weight, 1, 1, degrees / (1 + real))
+
+
+@lru_cache(maxsize=8)
+def _places(shape: tuple[int, int], step: int) -> tuple[tuple[int, int], ...]:
+    """Return the frequencies, multiples of 1 / CELL along y and x, each but for its conjugate.
+
+    What alternates along both axes has a number of its own where both are even.
+    """
+    apart = CELL // step  # planes of a mosaic see this as none at all
+    found: set[tuple[int, int]] = set()
+    for y in range(CELL):
+        for x in range(CELL):
+            if y % apart == 0 or x % apart == 0 or ((CELL - y) % CELL, (CELL - x) % CELL) in found:
+                continue
+            found.add((y, x))
+    if shape[0] % 2 == 0 and shape[1] % 2 == 0:
+        found -= {(CELL // 2, CELL // 2)}
+    return tuple(sorted(found))

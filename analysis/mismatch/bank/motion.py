@@ -22,15 +22,15 @@ from analysis.mismatch.scenes import Scene
 Array = NDArray[np.float64]
 STATISTIC = "scene_motion"
 AXES = ("rows", "columns")  # that the scene moves along
-_SLOWEST = 8  # cycles a frame: slow waves
+_SLOWEST = 12  # cycles a frame: slow waves
 # One wave; two, where its cycles are no whole number; many, where it is none. First, behind last.
 _TOGETHER = (
     *((k, k + 1) for k in range(_SLOWEST + 1)),
     *((k, k + 2) for k in range(_SLOWEST)),
-    *((0, k + 1) for k in (2, 4, _SLOWEST)),
+    *((0, k + 1) for k in (2, 4, 8, _SLOWEST)),
 )
 _INDEPENDENT = (
-    13  # chances whose least is one in a hundred as often as that of these, which overlap
+    20  # chances whose least is one in a hundred as often as that of these, which overlap
 )
 _LEAST_ROWS = 48  # of fewer no wave is the measure of others
 _RAREST = -690.0  # logarithm of a chance that is told from none

@@ -56,6 +56,7 @@ _FOLLOWS = {
     "fixed_smooth_variance": frozenset({"fixed_smooth_variance"}) | _LINES,
     "fixed_correlation_0_1": frozenset({"fixed_correlation_0_1"}) | _CORRELATIONS,
     "fixed_correlation_1_0": frozenset({"fixed_correlation_1_0"}) | _CORRELATIONS,
+    "patch_variance": frozenset({"spectral_peak"}) | _CORRELATIONS,
     "fixed_patch_variance": frozenset({"fixed_correlation_0_1", "fixed_correlation_1_0"})
     | _CORRELATIONS,
     # Few electrons of several DN each leave codes out.
@@ -68,7 +69,13 @@ _FOLLOWS = {
 SPECTRA, NEIGHBOURS, CARRY_OVER = "spectra", "neighbours", "carry_over"
 _NEED: Mapping[str, frozenset[str]] = {
     SPECTRA: frozenset(
-        {"spectral_peak", "line_correlation", "alternation_variance", "fixed_spectral_peak"}
+        {
+            "spectral_peak",
+            "line_correlation",
+            "alternation_variance",
+            "patch_variance",
+            "fixed_spectral_peak",
+        }
     ),
     NEIGHBOURS: _CORRELATIONS | {"fixed_correlation_0_1", "fixed_correlation_1_0"},
     CARRY_OVER: frozenset({"carry_over"}),

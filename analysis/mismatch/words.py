@@ -25,6 +25,7 @@ STATISTICS = {
     "line_correlation": "correlation along a line",
     "carry_over": "carry-over from the code before",
     "alternation_variance": "power that alternates from pixel to pixel or line to line",
+    "patch_variance": "noise common to patches of pixels",
     "spectral_peak": "strongest line of the noise spectrum",
     "row_spectrum_peak": "strongest line of the spectrum of row means",
     "slow_row_variance": "slow waves of row means",

@@ -27,7 +27,10 @@ SHOWS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "horizontal_smear": ((*_PATCH, "level"), _SCENE),
     "vibration": (("scene_motion", "_variance", "correlation", "spectrum", *_VARYING), _SCENE),
     "speckle_light": (("correlation", "skew", "pixel_variance", "variance_line"), _LIT),
-    "block_offset_noise": (("correlation", "row_", "column_", "spectral_peak"), _ANY),
+    "block_offset_noise": (
+        ("correlation", "row_", "column_", "spectral_peak", "patch_variance"),
+        _ANY,
+    ),
     "shutter_gradient": (("fixed_smooth", "fixed_row", "half_seam"), ("flat",)),
     "column_telegraph": (("column_", "line_correlation", "correlation_1_0"), _ANY),
     "line_start_settling": (("fixed_", "half_seam"), _ANY),

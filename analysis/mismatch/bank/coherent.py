@@ -35,6 +35,7 @@ _ALTERNATES = 0.1  # bins from half a cycle per pixel: phases of a line drift by
 _ALONE = 2.0  # times as high a bin elsewhere is the peak, whatever a block sums up to
 LAGS = 16  # along a line, pixels of the plane
 RANKS = (2, 3, 4)  # of lines beside the strongest
+PATCHES = (4, 8, 16)  # pixels of the plane, that share noise
 
 
 @dataclass(frozen=True)
@@ -132,6 +133,7 @@ class SpectrumSums:
             found["column_spectrum_peak of colour"] = of_colour(columns[0], degrees)
             found |= self._lags()
             found |= self._corners(degrees)
+            found |= self._patches(degrees)
         for key, label in (("", "row_spectrum_peak"), ("signal", "row_spectrum_peak of light")):
             total = self.weight[key][0]
             if total:
@@ -246,6 +248,24 @@ class SpectrumSums:
             found[f"alternation_variance of {name}"] = ratio_root(float(power) / total, degrees)
         if not self.waves:
             found["alternation_variance of checkerboard"] = UNKNOWN
+        return found
+
+    def _patches(self, degrees: int) -> dict[str, Number]:
+        """Return the power of waves longer than two patches, of what neighbours have in common.
+
+        Off the axes, which hold what rows, columns and frames have in common.
+        """
+        n, m = self.shape
+        found: dict[str, Number] = {}
+        for size in PATCHES:
+            down, across = n // (2 * size), m // (2 * size)
+            label = f"patch_variance of {size} pixels"
+            found[label] = UNKNOWN
+            if not self.waves or min(down, across) < 1:
+                continue
+            inner = self.power[[*range(1, down + 1), *range(n - down, n)], 1 : across + 1]
+            ratio = float(inner.mean()) / self.weight[""][0]
+            found[label] = ratio_root(ratio, 2 * degrees * inner.size)
         return found
 
     def _lags(self) -> dict[str, Number]:

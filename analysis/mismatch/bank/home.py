@@ -6,6 +6,7 @@ one side. What may have either sign (a step, a ratio of gains, a memory) is look
 
 from collections.abc import Mapping, Sequence
 
+from analysis.mismatch.bank.coherent import PATCHES
 from analysis.mismatch.bank.common import SIGNS
 from analysis.mismatch.bank.edges import names as edge_names
 from analysis.mismatch.bank.key import MOSAIC, Key
@@ -73,6 +74,7 @@ _POOLED = frozenset(
         *(("noisy_pixels", "all", str(limit)) for limit in OUTSTANDING),
         ("spectral_peak", "all", ""),
         ("spectral_peak", "all", FEW_PIXELS),
+        *(("patch_variance", "all", f"{size} pixels") for size in PATCHES),
         ("row_spectrum_peak", "all", ""),
         ("row_spectrum_peak", "all", "light"),
         ("column_spectrum_peak", "all", "colour"),
@@ -82,7 +84,7 @@ _POOLED = frozenset(
     }
 )
 _SPECTRA = frozenset({"spectral_peak", "row_spectrum_peak", "column_spectrum_peak",
-                      "slow_row_variance", "row_correlation"})  # fmt: skip
+                      "patch_variance", "slow_row_variance", "row_correlation"})  # fmt: skip
 _SHARED = frozenset({"fixed_row_variance", "fixed_column_variance", "fixed_smooth_variance",
                      "fixed_smooth_tilt", "fixed_smooth_falloff", "fixed_edge",
                      "fixed_patch_variance", "half_seam", "outlying_pixels"})  # fmt: skip
@@ -112,6 +114,8 @@ def homes(keys: Sequence[Key], channels: Sequence[str]) -> list[float]:
             weight *= LAG
         if key.statistic == "fixed_patch_variance":
             weight /= len(SIZES)
+        if key.statistic == "patch_variance":
+            weight /= len(PATCHES)
         if key.statistic == "carry_over":
             weight = LAG
         if key.statistic == "pixel_variance" and key.detail.startswith(ABOVE):

@@ -82,7 +82,8 @@ def vector(layout: Layout, seen: Observation, fit: BaseFit) -> Vector:
     values, errors = np.array([number for _, number in rows]).T
     unknown = ~(np.isfinite(values) & np.isfinite(errors) & (errors > 0))
     values, errors = np.where(unknown, nan, values), np.where(unknown, inf, errors)
-    return Vector(keys, values, errors, np.array([shared.get(key, 0.0) for key in keys]))
+    alike = [shared.get(key, 0.0) for key in keys] if shared else np.zeros(len(keys))
+    return Vector(keys, values, errors, np.asarray(alike))
 
 
 def _in_common(name: str, seen: Observation) -> Iterator[tuple[Key, Number]]:

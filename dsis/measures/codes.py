@@ -119,7 +119,8 @@ class CodeCounts:
         """Return the histogram of some phases; None where frames held other values."""
         if not self.whole:
             return None
-        return Codes.of(self.lowest, np.sum([self.counts[phase] for phase in phases], axis=0))
+        own = [self.counts[phase] for phase in phases]
+        return Codes.of(self.lowest, np.sum(own, axis=0) if len(own) > 1 else own[0])
 
     def _make_room(self, low: int, high: int) -> None:
         size = self.counts.shape[2]

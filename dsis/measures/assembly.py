@@ -220,7 +220,7 @@ def _channel(
     first = float(one.first_rows.sum()) / n
     codes = sums.codes.of(plane.phases)
     estimates = {
-        "level": _level(float(one.mean_frame.mean()), part, fixed),
+        "level": _level(float(one.mean_frame.sum()) / (n * m), part, fixed),
         **part.estimates(),
         **one.moments.estimates(inflation),
         **_correlations(sums, temporal, CORRELATION_LAGS),

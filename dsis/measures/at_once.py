@@ -35,9 +35,7 @@ def take_all(sums: Accumulator, frames: Frames) -> None:
         if not np.isfinite(frames[number]).all():
             message = f"frame {number} holds values that are not finite (NaN or infinite)"
             raise ValueError(message)
-    sums.codes.add_all(
-        frames, whole=bool(found.whole.all()), low=found.lowest, high=found.highest
-    )
+    sums.codes.add_all(frames, whole=bool(found.whole.all()), low=found.lowest, high=found.highest)
     row_offsets, column_offsets, means = kernels.offsets_of_all(
         found.by_row, found.by_column, sums.cfa is Cfa.MONO
     )

@@ -105,9 +105,7 @@ class CodeCounts:
         """Count the codes of a frame: whether they are whole, the lowest and the highest."""
         self.add_all(frame[np.newaxis], whole=whole, low=low, high=high)
 
-    def add_all(
-        self, frames: NDArray[np.float32], *, whole: bool, low: int, high: int
-    ) -> None:
+    def add_all(self, frames: NDArray[np.float32], *, whole: bool, low: int, high: int) -> None:
         """Count the codes of frames (frame, row, column) that are whole, or not, in all of them."""
         self.whole = self.whole and whole and low >= LOWEST_CODE and high < LOWEST_CODE + CODES
         if self.whole:

@@ -93,7 +93,7 @@ def passes(frames: Frame) -> tuple[Frame, AllPassed]:
         by_row,
         by_column.sum(1),
         squares.sum(1),
-        ~limits[:, :, 0].any(1),
+        limits[:, :, 0].max(1) == 0,
         int(limits[:, :, 1].min()),
         int(limits[:, :, 2].max()),
     )

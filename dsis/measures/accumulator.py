@@ -127,10 +127,7 @@ class Accumulator:
         self.frames += 1
 
     def add_all(self, frames: Sequence[NDArray[Any]]) -> None:
-        """Take frames as `add` does, together where they are few and small: that takes less time.
-
-        Where one cannot be taken none is.
-        """
+        """Take frames as `add` does; together where they are small: that takes less time."""
         for number, frame in enumerate(frames, self.frames):
             if frame.shape != self.frame_shape:
                 message = f"frame {number} is {frame.shape}, must be {self.frame_shape}"

@@ -6,6 +6,7 @@ calls each kernel alone, and what follows from its sums is made of all frames to
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,7 +21,7 @@ from dsis.measures.lag_products import lag_products_of_all
 
 if TYPE_CHECKING:
     from dsis.measures.accumulator import Accumulator
-    from dsis.measures.plane import Sheets
+    from dsis.measures.plane import Sheets, Transforms
 
 Frames = NDArray[np.float32]
 
@@ -42,8 +43,11 @@ def take_all(sums: Accumulator, frames: Frames) -> None:
     sums.first, sums.frames = frames[0], len(frames)
     sums.row_sums, sums.column_sums = list(found.by_row), list(found.by_column)
     sums.means, sums.pair_squares = list(means), list(found.squares[1::2])
-    for sheet in sums.sheets:
-        _take_planes(sums, sheet, differences, means)
+    spectra = [_taken_planes(sums, sheet, differences, means) for sheet in sums.sheets]
+    if sums.power and sums.spectra is not None:
+        for of_frame in zip(*spectra, strict=True):
+            for transforms in of_frame:
+                sums.spectra(transforms)
     centred = np.empty_like(frames)
     centred[0] = 0
     for number in range(1, len(frames)):
@@ -54,21 +58,24 @@ def take_all(sums: Accumulator, frames: Frames) -> None:
             continue
         sums.moments = sums.moments or kernels.started(centred[1])
         kernels.add_moments(*own, centred[number - 1], centred[number], sums.moments, 1)
-    sums.centred = centred[-1]
+    sums.centred, sums.centred_before = centred[-1], centred[0]
+    sums.before, sums.difference = differences[-1], differences[0]  # should more frames come
     if sums.neighbours:
         sums.lag_sums += lag_products_of_all(centred[1:], sums.reach)
 
 
-def _take_planes(sums: Accumulator, sheet: Sheets, differences: Frames, means: Sums) -> None:
-    """Take the planes of one size: surfaces, and power."""
+def _taken_planes(
+    sums: Accumulator, sheet: Sheets, differences: Frames, means: Sums
+) -> Sequence[Transforms]:
+    """Take the planes of one size, surfaces and power; return the transforms of each frame."""
     sheet.start()
     images = np.empty((len(differences) - 1, *sheet.images.shape), np.float32)
     for number, image in enumerate(images, 1):
         kernels.split(differences[number], sheet.places, means[number], image)
     sheet.surfaces += list(sheet.planes[0].smooth.coefficients(images))
     if not sums.power:
-        return
-    for transforms in scipy.fft.rfft2(images):
+        return []
+    found = list(scipy.fft.rfft2(images))
+    for transforms in found:
         kernels.add_power(transforms, sheet.power)
-        if sums.spectra is not None:
-            sums.spectra(transforms)
+    return found

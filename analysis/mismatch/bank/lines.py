@@ -192,13 +192,16 @@ def _highest(power: Array) -> tuple[Places, Places]:
 
 
 def _leak(distance: Places, size: int) -> Array:
-    """Return the largest amplitude that leaks so many bins away, relative to the larger bin."""
-    return _leaks(size)[distance % size]
+    """Return the largest amplitude that leaks so many bins away, relative to the larger bin.
+
+    Distances are less than twice the size, to either side.
+    """
+    return _leaks(size)[distance]
 
 
 @lru_cache(maxsize=64)
 def _leaks(size: int) -> Array:
-    """Return what `_leak` does for each distance of 0 to the size."""
+    """Return what `_leak` does for each distance of 0 to twice the size; negative ones wrap."""
     around = np.abs((np.arange(size) + size // 2) % size - size // 2)
     farther = np.sin(np.pi / (2 * size)) / np.sin(np.pi * (np.maximum(around, 1) - 0.5) / size)
-    return np.where(around > 0, farther, 1.0)
+    return np.tile(np.where(around > 0, farther, 1.0), 2)

@@ -23,7 +23,7 @@ from dsis.draw import Draw
 from dsis.effects import Effect, Exposure, Image, ReadOut, Stage, any_effect
 from dsis.effects.poisson_shot_noise import PoissonShotNoise
 from dsis.errors import Fault, InputError
-from dsis.exposing import Shared, Shutter
+from dsis.exposing import Drawn, Shared, Shutter
 from dsis.grid import PixelGrid
 from dsis.model import Model, read_toml, structure
 from dsis.noise import Segments, read_noise, shot_noise
@@ -189,8 +189,12 @@ class Camera(Model):
         if exposure_time_s is None:
             self._refuse_growth()
         time_s = exposure_time_s or 0.0
-        shutter = Shutter(clean, temporal, sensor, frame, grid, time_s, earlier_clean, threads)
-        return shutter.through(*_readied(self), shared)
+        shutter = Shutter(clean, frame, grid, time_s, earlier_clean, threads)
+        return shutter.through(self.drawn(temporal, sensor), shared)
+
+    def drawn(self, temporal: Draw, sensor: Draw) -> Drawn:
+        """Return what `expose` sends frames through, for who exposes many with the same fields."""
+        return Drawn.of(*_readied(self), temporal, sensor)
 
     def chain(self) -> tuple[Effect, ...]:
         """Return all links, base model included, in the order that light and charge meet them."""

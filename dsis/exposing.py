@@ -56,36 +56,55 @@ class Shared:
 
 
 @dataclass(frozen=True)
+class Drawn:
+    """Links of a camera with the random fields of an exposure: the same in all its frames.
+
+    Attributes
+    ----------
+    steps
+        Each link, what it draws anew for every frame, and what it draws once for the sensor.
+    read_out
+        As `Exposure` has it.
+    """
+
+    steps: tuple[tuple[Effect, Draw, Draw], ...]
+    read_out: ReadOut
+
+    @classmethod
+    def of(
+        cls, links: Sequence[Effect], read_out: ReadOut, temporal: Draw, sensor: Draw
+    ) -> "Drawn":
+        """Return links with their fields: a second effect of one kind has fields of its own."""
+        return cls(tuple(_drawn(links, temporal, sensor)), read_out)
+
+
+@dataclass(frozen=True)
 class Shutter:
     """One frame that is exposed: see `dsis.camera.Camera.expose`."""
 
     clean: Image
-    temporal: Draw
-    sensor: Draw
     frame: int
     grid: PixelGrid
     exposure_time_s: float
-    earlier_clean: Callable[[int], Image] | None
-    threads: int
+    earlier_clean: Callable[[int], Image] | None = None
+    threads: int = 1
 
-    def through(
-        self, links: Sequence[Effect], read_out: ReadOut, shared: Shared | None = None
-    ) -> Image:
+    def through(self, drawn: Drawn, shared: Shared | None = None) -> Image:
         """Return what links make of the frame; `shared` where other cameras make it too."""
-        chain = list(_drawn(links, self.temporal, self.sensor))
+        steps, read_out = drawn.steps, drawn.read_out
         first = shared or Shared()
 
         def after(links: int, back: int) -> Image:
             """Return what the first `links` links make of the frame `back` frames earlier."""
             light = self.earlier_clean(back) if back and self.earlier_clean else self.clean
-            own = first if links == len(chain) and not back else Shared()
+            own = first if links == len(steps) and not back else Shared()
             begun = own.start or Begun(0, light, lit=False, expected_dn=light)
             image, lit, expected = begun.image, begun.lit, begun.expected_dn
             # Before the first frame the counter runs backwards: it has 32 bits.
             number = (self.frame - back) % 2**32
             for place in range(begun.links, links):
-                link, temporal, sensor = chain[place]
-                if link.stage > Stage.LIGHT and not lit:
+                link, temporal, sensor = steps[place]
+                if not lit and link.stage > Stage.LIGHT:
                     lit, expected = True, image
                 exposure = Exposure(
                     self.grid,
@@ -106,13 +125,13 @@ class Shutter:
         def before(links: int, back: int, k: int) -> Image:
             return after(links, back + k)
 
-        return after(len(chain), 0)
+        return after(len(steps), 0)
 
 
 def _drawn(
     chain: Sequence[Effect], temporal: Draw, sensor: Draw
 ) -> Iterator[tuple[Effect, Draw, Draw]]:
-    """Yield each link with its random fields: a second effect of one kind has fields of its own."""
+    """Yield each link with its random fields."""
     seen: dict[str, int] = {}
     for link in chain:
         kind = link.kind

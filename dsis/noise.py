@@ -86,19 +86,17 @@ def shot_noise(
     """Return the expected signal (DN above black, `grid.shape`) with shot noise of variance m x."""
     out = np.empty(expected_dn.shape, np.float32)  # rows of it are filled as flat views
 
-    def block(first: int, last: int) -> None:
-        held = partial(draw.held, "shot_noise", grid, frame)
-        for top, end in _spans(first, last, out, held):
-            _add_shot(
-                _flat(expected_dn[top:end]),
-                draw.normal_rows("shot_noise", grid, frame, top, end).reshape(-1),
-                out[top:end].reshape(-1),
-                segments.lower_dn,
-                segments.slope_dn,
-                segments.intercept_dn2,
-            )
+    def add(top: int, end: int) -> None:
+        _add_shot(
+            _flat(expected_dn[top:end]),
+            draw.normal_rows("shot_noise", grid, frame, top, end).reshape(-1),
+            out[top:end].reshape(-1),
+            segments.lower_dn,
+            segments.slope_dn,
+            segments.intercept_dn2,
+        )
 
-    over_rows(block, grid.rows, threads)
+    _in_spans(add, out, partial(draw.held, "shot_noise", grid, frame), threads)
     return out
 
 
@@ -115,19 +113,17 @@ def read_noise(
     out = np.empty(signal_dn.shape, np.float32)  # rows of it are filled as flat views
     sigma = np.sqrt(np.maximum(segments.intercept_dn2, np.float32(0)))
 
-    def block(first: int, last: int) -> None:
-        held = partial(draw.held, "read_noise", grid, frame)
-        for top, end in _spans(first, last, out, held):
-            _add_read(
-                _flat(signal_dn[top:end]),
-                _flat(expected_dn[top:end]),
-                draw.normal_rows("read_noise", grid, frame, top, end).reshape(-1),
-                out[top:end].reshape(-1),
-                segments.lower_dn,
-                sigma,
-            )
+    def add(top: int, end: int) -> None:
+        _add_read(
+            _flat(signal_dn[top:end]),
+            _flat(expected_dn[top:end]),
+            draw.normal_rows("read_noise", grid, frame, top, end).reshape(-1),
+            out[top:end].reshape(-1),
+            segments.lower_dn,
+            sigma,
+        )
 
-    over_rows(block, grid.rows, threads)
+    _in_spans(add, out, partial(draw.held, "read_noise", grid, frame), threads)
     return out
 
 
@@ -145,6 +141,27 @@ def camera_noise(
     """
     shot = shot_noise(clean_dn, segments, draw, grid, frame, threads)
     return read_noise(shot, clean_dn, segments, draw, grid, frame, threads)
+
+
+def _in_spans(
+    work: Callable[[int, int], None],
+    field: NDArray[np.float32],
+    held: Callable[[], bool],
+    threads: int,
+) -> None:
+    """Call `work(first, end)` on runs of rows that cover a field: small ones are one, see `_spans`.
+
+    One after another within blocks that threads share.
+    """
+    if field.size <= _SAMPLES_IN_CACHE:
+        work(0, len(field))
+        return
+
+    def block(first: int, last: int) -> None:
+        for top, end in _spans(first, last, field, held):
+            work(top, end)
+
+    over_rows(block, len(field), threads)
 
 
 def _spans(

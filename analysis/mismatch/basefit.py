@@ -169,8 +169,9 @@ def _hidden(level: Level, offsets: Offsets, place: Place) -> bool:
 
 
 def _sound(level: Level) -> bool:
-    low, high = np.nan_to_num([level.clipped_low, level.clipped_high])
-    return bool(high <= CLIPPED_SHARE and low <= CLIPPED_SHARE and level.variance_dn2 > 0)
+    shares = (level.clipped_low, level.clipped_high)
+    clipped = any(share > CLIPPED_SHARE for share in shares)  # none of those that are unknown
+    return not clipped and level.variance_dn2 > 0
 
 
 def _black(
@@ -206,6 +207,7 @@ def _signals(
                 own = levels[place].level_dn - offsets.level_dn.get(place, 0.0)
                 darks.setdefault(e.exposure_time_s, []).append(own)
         times = sorted(darks)
+        means = [float(np.mean(darks[t])) for t in times]
         for e in layout.uniform:
             place = (e.name, channel)
             if e.kind == "dark":
@@ -213,7 +215,6 @@ def _signals(
                 continue
             ground = black[channel]
             if len(times) > 1:
-                means = [float(np.mean(darks[t])) for t in times]
                 ground = float(np.interp(e.exposure_time_s, times, means))
             signal[place] = levels[place].level_dn - offsets.level_dn.get(place, 0.0) - ground
     return signal

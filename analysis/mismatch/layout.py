@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -156,6 +156,11 @@ class Layout:
 
 def sites(cfa: Cfa) -> dict[str, tuple[int, int]]:
     """Return the first row and column of each channel, in the order R, Gr, Gb, B."""
+    return dict(_sites(cfa))
+
+
+@cache
+def _sites(cfa: Cfa) -> dict[str, tuple[int, int]]:
     if cfa is Cfa.MONO:
         return {"MONO": (0, 0)}
     colours = pattern(cfa)

@@ -25,7 +25,7 @@ from dsis.conversion import codes_of
 from dsis.draw import Draw, keep_fields
 from dsis.effects import Image
 from dsis.effects.pink_noise import keep_series
-from dsis.exposing import Shared
+from dsis.exposing import Drawn, Shared, Shutter
 from dsis.grid import PixelGrid
 from dsis.simulate.shot import tiled
 from dsis.workers import Workers, workers
@@ -83,13 +83,14 @@ class Model:
         sensor = Draw(seed).within("sensor", str(replicate))
         times = {e.name: e.exposure_time_s for e in layout.exposures}
         black = self.camera.black_level
-        lit: dict[str, tuple[Camera, Image]] = {}
+        lit: dict[str, tuple[Drawn, Image]] = {}
 
-        def light(name: str) -> tuple[Camera, Image]:
+        def light(name: str) -> tuple[Drawn, Image]:
             picture, signal = name in layout.scenes, self.signals[name]
-            if picture:
-                return without_picture(self.camera), signal.astype(np.float32)
-            return self.camera, tiled(signal, grid)
+            camera = without_picture(self.camera) if picture else self.camera
+            clean = signal.astype(np.float32) if picture else tiled(signal, grid)
+            temporal = Draw(seed).within("exposure", name, str(replicate))
+            return camera.drawn(temporal, sensor), clean
 
         def shot(name: str, number: int, shared: Shared | None) -> Image:
             own = lit.get(name)  # threads may ask for frames of other exposures meanwhile
@@ -97,12 +98,8 @@ class Model:
                 own = light(name)
                 lit.clear()
                 lit[name] = own
-            camera, clean = own
-            temporal = Draw(seed).within("exposure", name, str(replicate))
-            time_s = times[name]
-            image = camera.expose(
-                clean, temporal, sensor, number, grid, exposure_time_s=time_s, shared=shared
-            )
+            drawn, clean = own
+            image = Shutter(clean, number, grid, times[name]).through(drawn, shared)
             return codes_of(image, black)
 
         return shot

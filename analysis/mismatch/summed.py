@@ -24,6 +24,7 @@ from dsis.measures.plane import Transforms
 
 _FEW_LAGS = 2  # of neighbours: the bank asks for no farther ones
 _MANY_PIXELS = 2e5  # of which farther ones would take long
+_SMALL_PIXELS = 2**15  # of frames that are looked at together
 
 
 def measure(
@@ -47,8 +48,11 @@ def measure(
         power=SPECTRA in made,
         neighbours=NEIGHBOURS in made,
     )
-    for frame in frames:
-        sums.add(frame)
+    if layout.rows * layout.columns > _SMALL_PIXELS:
+        for frame in frames:
+            sums.add(frame)
+    else:
+        sums.add_all(list(frames))
     return sums.result()
 
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import cache, lru_cache
 from math import inf, isfinite, log, nan, sqrt
 
 import numpy as np
@@ -24,6 +24,12 @@ RELATIVE_RATIO = 3e-5
 
 _key = lru_cache(maxsize=None)(Key)  # the same in every simulation
 _split = lru_cache(maxsize=None)(split_name)
+
+
+@cache
+def _keys(place: Place) -> tuple[Key, ...]:
+    """Return the keys of all `NAMES` at a place."""
+    return tuple(_key(name, "exposure", *place) for name in NAMES)
 
 
 @dataclass(frozen=True)
@@ -57,7 +63,8 @@ def vector(layout: Layout, seen: Observation, fit: BaseFit) -> Vector:
     for exposure in layout.uniform:
         for channel in layout.channels:
             place = (exposure.name, channel)
-            rows += [(_key(name, "exposure", *place), seen.scalars[place][name]) for name in NAMES]
+            own = seen.scalars[place]
+            rows += zip(_keys(place), [own[name] for name in NAMES], strict=True)
             variance = UNKNOWN if place in layout.still else _variance(place, seen, fit)
             rows.append((_key("pixel_variance", "exposure", *place), variance))
             level = _level(layout, exposure.name, channel, seen, fit)
@@ -82,7 +89,8 @@ def vector(layout: Layout, seen: Observation, fit: BaseFit) -> Vector:
     values, errors = np.array([number for _, number in rows]).T
     unknown = ~(np.isfinite(values) & np.isfinite(errors) & (errors > 0))
     values, errors = np.where(unknown, nan, values), np.where(unknown, inf, errors)
-    return Vector(keys, values, errors, np.array([shared.get(key, 0.0) for key in keys]))
+    alike = [shared.get(key, 0.0) for key in keys] if shared else np.zeros(len(keys))
+    return Vector(keys, values, errors, np.asarray(alike))
 
 
 def _in_common(name: str, seen: Observation) -> Iterator[tuple[Key, Number]]:

@@ -6,7 +6,8 @@ pixel's mean over time commutes with that, so the moments of the temporal residu
 of u, u^2, u^3, u^4 without a second pass.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
+from math import prod
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 from dsis.cfa import Cfa
 from dsis.measures import kernels
 from dsis.measures.assembly import measured
+from dsis.measures.at_once import take_all
 from dsis.measures.codes import CodeCounts
 from dsis.measures.first_pass import Passed, first_pass, no_change
 from dsis.measures.kernels import FiveSums, Sums
@@ -23,6 +25,7 @@ from dsis.measures.measured import Measured
 from dsis.measures.plane import Region, Transforms, planes, sheets
 
 LAGS = 4
+_AT_ONCE = 1 << 20  # samples: with what is made of them they take 20 MB
 
 
 class Accumulator:
@@ -122,6 +125,21 @@ class Accumulator:
         self._take_lines(found)
         self.before, self.difference = self.difference, self.before
         self.frames += 1
+
+    def add_all(self, frames: Sequence[NDArray[Any]]) -> None:
+        """Take frames as `add` does; together where they are small: that takes less time."""
+        for number, frame in enumerate(frames, self.frames):
+            if frame.shape != self.frame_shape:
+                message = f"frame {number} is {frame.shape}, must be {self.frame_shape}"
+                raise ValueError(message)
+        if self.frames or len(frames) < 2 or len(frames) * prod(self.shape) > _AT_ONCE:
+            for frame in frames:
+                self.add(frame)
+            return
+        codes = np.empty((len(frames), *self.shape), np.float32)
+        for own, frame in zip(codes, frames, strict=True):
+            own[:] = frame[self.region]
+        take_all(self, codes)
 
     def result(self) -> Measured:
         """Return the measures of the frames so far; raises ValueError with fewer than two."""

@@ -53,15 +53,16 @@ def measured(sums: Accumulator) -> Measured:
     found = {one.plane.name: one for sheet in sums.sheets for one in _noise(sums, sheet)}
     noise = [found[plane.name] for plane in sums.planes]
     temporal = _temporal_correlations(sums, noise)
+    inflations = [moving.inflation() for moving in temporal]
     parts = [
         components(
             one.row_power,
             one.column_power,
             one.means,
             one.plane.shape,
-            (one.moments.variance, one.moments.variance_error2 * moving.inflation()),
+            (one.moments.variance, one.moments.variance_error2 * inflation),
         )
-        for one, moving in zip(noise, temporal, strict=True)
+        for one, inflation in zip(noise, inflations, strict=True)
     ]
     fixed = [
         fixed_pattern(
@@ -78,11 +79,11 @@ def measured(sums: Accumulator) -> Measured:
     # What was not summed is as good as white, and said to be unknown.
     spatial = _fixed_correlations(sums, noise, fixed) if sums.neighbours else temporal
     channels = {}
-    for one, part, pattern, moving, still in zip(
-        noise, parts, fixed, temporal, spatial, strict=True
+    for one, part, pattern, moving, inflation, still in zip(
+        noise, parts, fixed, temporal, inflations, spatial, strict=True
     ):
         pair = (moving, still.less(moving, sums.frames) if sums.neighbours else still)
-        channels[one.plane.name] = _channel(sums, one, part, pattern, pair)
+        channels[one.plane.name] = _channel(sums, one, part, pattern, pair, inflation)
     return Measured(sums.frames, sums.cfa, sums.region, sums.black_level, channels)
 
 
@@ -207,7 +208,9 @@ def _channel(
     part: Components,
     fixed: FixedPattern,
     correlations: tuple[Autocorrelation, Autocorrelation],
+    inflation: float,
 ) -> Channel:
+    """Return the measures of one channel; `inflation` is that of its temporal correlations."""
     plane, frames, (temporal, still) = one.plane, sums.frames, correlations
     n, m = plane.shape
     row_power, column_power = (
@@ -217,9 +220,9 @@ def _channel(
     first = float(one.first_rows.sum()) / n
     codes = sums.codes.of(plane.phases)
     estimates = {
-        "level": _level(float(one.mean_frame.mean()), part, fixed),
+        "level": _level(float(one.mean_frame.sum()) / (n * m), part, fixed),
         **part.estimates(),
-        **one.moments.estimates(temporal.inflation()),
+        **one.moments.estimates(inflation),
         **_correlations(sums, temporal, CORRELATION_LAGS),
         "spectral_peak": spectral_peak(one.power, m, frames - 1) if sums.power else unknown(),
         "row_spectrum_peak": line_peak(row_power, n, frames - 1),

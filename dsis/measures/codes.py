@@ -103,16 +103,22 @@ class CodeCounts:
 
     def add(self, frame: NDArray[np.float32], *, whole: bool, low: int, high: int) -> None:
         """Count the codes of a frame: whether they are whole, the lowest and the highest."""
+        self.add_all(frame[np.newaxis], whole=whole, low=low, high=high)
+
+    def add_all(self, frames: NDArray[np.float32], *, whole: bool, low: int, high: int) -> None:
+        """Count the codes of frames (frame, row, column) that are whole, or not, in all of them."""
         self.whole = self.whole and whole and low >= LOWEST_CODE and high < LOWEST_CODE + CODES
         if self.whole:
             self._make_room(low, high)
-            count_codes(frame, self.counts, self.lowest)
+            for frame in frames:
+                count_codes(frame, self.counts, self.lowest)
 
     def of(self, phases: tuple[tuple[int, int], ...]) -> "Codes | None":
         """Return the histogram of some phases; None where frames held other values."""
         if not self.whole:
             return None
-        return Codes.of(self.lowest, np.sum([self.counts[phase] for phase in phases], axis=0))
+        own = [self.counts[phase] for phase in phases]
+        return Codes.of(self.lowest, np.sum(own, axis=0) if len(own) > 1 else own[0])
 
     def _make_room(self, low: int, high: int) -> None:
         size = self.counts.shape[2]

@@ -62,6 +62,43 @@ def first_pass(
     )
 
 
+class AllPassed(NamedTuple):
+    """What passes over all frames found: as `Passed`, by frame, the range of all together."""
+
+    by_row: Sums
+    by_column: Sums
+    squares: Sums
+    whole: NDArray[np.bool_]
+    lowest: int
+    highest: int
+
+
+def passes(frames: Frame) -> tuple[Frame, AllPassed]:
+    """Return the differences of all frames (frame, row, column) from the first, and their sums."""
+    count, rows, columns = frames.shape
+    blocks = -(-rows // _BLOCK)
+    differences = np.empty_like(frames)
+    differences[0] = 0
+    by_row, by_column = np.zeros((count, rows, 2)), np.zeros((count, blocks, 2, columns))
+    squares, limits = np.zeros((count, blocks, 2, 2)), np.zeros((count, blocks, 3), np.int64)
+    limits[:, :, 1], limits[:, :, 2] = _FAR, -_FAR
+    lines = np.zeros((3, columns))
+    _limits(frames[0], limits[0, 0])
+    for i in range(1, count):
+        _first_pass(
+            frames[i], frames[0], differences[i - 1], differences[i], 0, rows, by_row[i],
+            by_column[i], squares[i], limits[i], lines,
+        )  # fmt: skip
+    return differences, AllPassed(
+        by_row,
+        by_column.sum(1),
+        squares.sum(1),
+        limits[:, :, 0].max(1) == 0,
+        int(limits[:, :, 1].min()),
+        int(limits[:, :, 2].max()),
+    )
+
+
 def no_change(frame: Frame) -> Passed:
     """Return what a pass over the first frame finds, which differs from itself by nothing."""
     rows, columns = frame.shape

@@ -82,6 +82,23 @@ def offsets(by_row: Sums, by_column: Sums, single: bool) -> tuple[Sums, Sums, Su
     return by_row / across, of_columns, means
 
 
+def offsets_of_all(by_row: Sums, by_column: Sums, single: bool) -> tuple[Sums, Sums, Sums]:
+    """Return the same as `offsets` of all frames, from and by (frame, ..)."""
+    frames, rows, columns = by_row.shape[0], by_row.shape[1], by_column.shape[2]
+    if single:
+        by_line = by_row[:, :, 0] + by_row[:, :, 1]
+        mean = by_line.sum(1) / (rows * columns)
+        of_rows, of_columns = np.empty((frames, rows, 2)), np.empty((frames, 2, columns))
+        of_rows[:] = (by_line / columns)[:, :, np.newaxis]
+        whole = (by_column[:, 0] + by_column[:, 1]) / rows - mean[:, np.newaxis]
+        of_columns[:] = whole[:, np.newaxis]
+        return of_rows, of_columns, np.tile(mean[:, np.newaxis, np.newaxis], (1, 2, 2))
+    down, across, pixels, parity = _of_parity(rows, columns)
+    means = np.stack([by_row[:, 0::2].sum(1), by_row[:, 1::2].sum(1)], 1) / pixels
+    of_columns = by_column / down - means[:, :, parity]
+    return by_row / across, of_columns, means
+
+
 @lru_cache(maxsize=32)
 def _of_parity(rows: int, columns: int) -> tuple[NDArray[np.int_], ...]:
     """Return how many rows (2, 1), columns (2,) and pixels (2, 2) are even and odd; of each column.

@@ -30,13 +30,29 @@ def lag_products(image: NDArray[np.float32], reach: int, threads: int) -> Sums:
     sums = np.zeros((-(-rows // _BLOCK), len(half_plane(reach)), 2, 2))
 
     def block(first: int, last: int) -> None:
-        wide = columns + 2 * reach + 3
-        margin = np.zeros((_BLOCK + reach + 8) * wide, np.float32)
-        _lag_products(image, reach, first, last, margin, np.empty((3, columns), np.float32), sums)
+        by_column = np.empty((3, columns), np.float32)
+        _lag_products(image, reach, first, last, _margin(columns, reach), by_column, sums)
 
     over_rows(block, rows, threads)
     total: Sums = sums.sum(0)
     return total
+
+
+def lag_products_of_all(images: NDArray[np.float32], reach: int) -> Sums:
+    """Return the sum of `lag_products` over images (image, row, column)."""
+    count, rows, columns = images.shape
+    sums = np.zeros((count, -(-rows // _BLOCK), len(half_plane(reach)), 2, 2))
+    margin = _margin(columns, reach)
+    by_column = np.empty((3, columns), np.float32)
+    for image, own in zip(images, sums, strict=True):
+        _lag_products(image, reach, 0, rows, margin, by_column, own)
+    total: Sums = sums.sum(1).sum(0)
+    return total
+
+
+def _margin(columns: int, reach: int) -> NDArray[np.float32]:
+    """Return room for a block of rows, zeros on all its sides."""
+    return np.zeros((_BLOCK + reach + 8) * (columns + 2 * reach + 3), np.float32)
 
 
 @kernel

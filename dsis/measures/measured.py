@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,6 +70,22 @@ class Channel:
     codes: Codes | None
     clipped_low: float
     clipped_high: float
+
+    @cached_property
+    def moving_rows(self) -> Array:
+        """Row means less the frame's, about their mean over frames, DN: (frame, row)."""
+        return _moving(self.row_means, self.frame_means)
+
+    @cached_property
+    def moving_columns(self) -> Array:
+        """The same of columns: (frame, column)."""
+        return _moving(self.column_means, self.frame_means)
+
+
+def _moving(means: Array, frame_means: Array) -> Array:
+    moved = means - frame_means[:, np.newaxis]
+    moved -= moved.sum(0) / len(moved)
+    return moved
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,7 @@
 """The colour channels of a mosaic as planes, and what is summed over planes of one size."""
 
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
 import scipy.fft
@@ -121,14 +122,21 @@ class Sheets:
 
 def planes(cfa: Cfa, region: Region) -> tuple[Plane, ...]:
     """Return one plane per channel; raise ValueError where one has fewer than 2 x 2 pixels."""
-    rows, columns = (part.stop - part.start for part in region)
+    starts = region[0].start % 2, region[1].start % 2
+    return _planes(cfa, starts, tuple(part.stop - part.start for part in region))
+
+
+@lru_cache(maxsize=32)
+def _planes(cfa: Cfa, starts: tuple[int, int], shape: tuple[int, ...]) -> tuple[Plane, ...]:
+    """Return the planes of an array of a shape, whose first row and column have a parity each."""
+    rows, columns = shape
     if cfa is Cfa.MONO:
         return (_plane("MONO", (0, 0), 1, (rows, columns)),)
     colours = pattern(cfa)
     found = []
     for y in (0, 1):
         for x in (0, 1):
-            row, column = (region[0].start + y) % 2, (region[1].start + x) % 2
+            row, column = (starts[0] + y) % 2, (starts[1] + x) % 2
             name = "RGB"[colours[row, column]]
             if name == "G":
                 name += "r" if 0 in colours[row] else "b"

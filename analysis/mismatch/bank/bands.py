@@ -53,10 +53,9 @@ class Bands:
             series = np.zeros((frames, self.rows))
             noise = told = 0.0
             for name, channel in channels.items():
-                moved = channel.row_means - channel.frame_means[:, None]
                 lines, across = channel.mean_frame.shape
                 own = max(shape[name], 0.0) * across / variance_dn2[name]
-                series[:, self.sites[name][0] :: 2][:, :lines] += own * (moved - moved.mean(0))
+                series[:, self.sites[name][0] :: 2][:, :lines] += own * channel.moving_rows
                 noise += lines * own**2 * channel.estimates["pixel_variance"].value / across
                 told += lines * own * max(shape[name], 0.0)
             if noise > 0:

@@ -157,9 +157,7 @@ class CarryOverSums:
 
     def __init__(self) -> None:
         self.samples: dict[str, tuple[Samples, ...]] = dict.fromkeys(AXES, ())
-        shape = (len(PERIODS), len(PHASES))
-        self.top = {axis: np.zeros(shape) for axis in AXES}
-        self.bottom = {axis: np.zeros(shape) for axis in AXES}
+        self.top, self.bottom = np.zeros((2, len(AXES), len(PERIODS), len(PHASES)))
 
     def add(self, own: CarryOver, *, still: bool = False) -> None:
         """Take one exposure; frames that are `still` say nothing."""
@@ -168,32 +166,34 @@ class CarryOverSums:
         for axis in AXES:
             kept = own.samples(axis)
             self.samples[axis] += (kept,) if kept is not None else ()
+        sums = [own.sums(axis) for axis in AXES]
+        count, square, product, before = np.array([all_ for _, all_ in sums]).T[..., None, None]
+        told = np.minimum(square, before) > 0
+        before = np.where(told, before, 1.0)
         # n - 1 differences of successive frames, which share frames, say as much as fewer apart.
         weight = (2 * own.frames - 2) / (3 * own.frames - 4)
         signs = np.array([1.0, -1.0])  # of cosines, of sines
-        for axis in AXES:
-            by_code, (count, square, product, before) = own.sums(axis)
-            if min(square, before) <= 0:
-                continue
-            cosines, sines, doubled = (by_code @ _waves()).T.reshape(3, len(PERIODS), -1)
-            codes, differences, sums = doubled[:, :1], cosines[:, 1:2], cosines[:, 2:3]
-            moved, through = np.stack([cosines[:, 3:], sines[:, 3:]]).T
-            # Of cosines (cos a - cos b)^2, of sines (sin a - sin b)^2, from a - b and a + b.
-            whole = count + signs * codes / 2 - (differences + signs * sums)
-            left = whole - through**2 / before
-            known = left > _LEAST / own.size[axis] * np.abs(whole)
-            top = moved - through * product / before
-            scale = weight / (max(square - product**2 / before, 1e-12) / count)
-            self.top[axis] += np.where(known, top * scale, 0.0)
-            self.bottom[axis] += np.where(known, left * scale, 0.0)
+        size = np.array([own.size[axis] for axis in AXES])[:, None, None]
+        waves = np.stack([(by_code @ _waves()).T for by_code, _ in sums])
+        cosines, sines, doubled = waves.reshape(len(AXES), 3, len(PERIODS), -1).swapaxes(0, 1)
+        codes, apart, joined = doubled[..., :1], cosines[..., 1:2], cosines[..., 2:3]
+        moved, through = (np.stack([cosines[..., k], sines[..., k]], -1) for k in (3, 4))
+        # Of cosines (cos a - cos b)^2, of sines (sin a - sin b)^2, from a - b and a + b.
+        whole = count + signs * codes / 2 - (apart + signs * joined)
+        left = whole - through**2 / before
+        known = told & (left > _LEAST / size * np.abs(whole))
+        top = moved - through * product / before
+        scale = weight / (np.maximum(square - product**2 / before, 1e-12) / np.maximum(count, 1))
+        self.top += np.where(known, top * scale, 0.0)
+        self.bottom += np.where(known, left * scale, 0.0)
 
     def numbers(self) -> dict[str, Number]:
         """Return amplitudes and their errors in white noise, DN, by name."""
         found: dict[str, Number] = {}
-        for axis in AXES:
+        for a, axis in enumerate(AXES):
             for p, period in enumerate(PERIODS):
                 for k, phase in enumerate(PHASES):
-                    top, bottom = self.top[axis][p, k], self.bottom[axis][p, k]
+                    top, bottom = self.top[a, p, k], self.bottom[a, p, k]
                     name = f"carry_over along {detail(axis, period, phase)}"
                     known = bottom > 0
                     found[name] = (float(top / bottom), 1 / sqrt(bottom)) if known else UNKNOWN

@@ -311,10 +311,8 @@ def _line(power: Array, samples: int) -> Array:
 
 def _half_bins(channel: Channel, seen: int) -> Array:
     """Return the temporal power of row means as `row_spectrum`, at half bins too: (rows + 1,)."""
-    moved = channel.row_means - channel.frame_means[:, None]
-    moved = moved - moved.mean(0)
-    lines = moved.shape[1]
-    power = np.abs(np.fft.rfft(moved, 2 * lines, axis=1)) ** 2
+    lines = channel.moving_rows.shape[1]
+    power = np.abs(np.fft.rfft(channel.moving_rows, 2 * lines, axis=1)) ** 2
     return np.asarray(power.sum(0) * (channel.mean_frame.shape[1] / lines / max(seen, 1)))
 
 

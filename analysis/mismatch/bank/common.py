@@ -54,20 +54,25 @@ def common(
     # Rows and columns that move carry the frame's mean along.
     still = max(rows[0] + columns[0] - 1, 1.0)
     alike = dict.fromkeys(channels, 1.0)
+    moved = {name: c.frame_means - c.frame_means.sum() / frames for name, c in channels.items()}
+
+    def along(shape: Mapping[str, float]) -> Number:
+        return _frames(channels, pixel, shape, moved, still)
+
     found = {
         "row_variance": ratio_root(*rows),
         "column_variance": ratio_root(*columns),
-        "frame_variance": _frames(channels, pixel, alike, still, frames),
+        "frame_variance": along(alike),
         "frame_variance of light": UNKNOWN,
     }
     # What alternates from site to site is constant in every plane, but for its sign.
     for name, odd in SIGNS.items():
         signs = {channel: 1.0 - 2.0 * odd(*sites[channel]) for channel in channels}
-        found[f"alternation_variance of {name}"] = _frames(channels, pixel, signs, still, frames)
+        found[f"alternation_variance of {name}"] = along(signs)
     if all(value > 0 for value in signal_dn.values()):
         top = max(signal_dn.values())
         shares = {name: signal_dn[name] / top for name in channels}
-        found["frame_variance of light"] = _frames(channels, pixel, shares, still, frames)
+        found["frame_variance of light"] = along(shares)
     return found
 
 
@@ -75,15 +80,16 @@ def _frames(
     channels: Mapping[str, Channel],
     pixel: Mapping[str, float],
     shape: Mapping[str, float],
+    moved: Mapping[str, Array],
     still: float,
-    frames: int,
 ) -> Number:
     """Return the mean square of the frame means' amplitude along a shape over the channels."""
+    frames = min(map(len, moved.values()))
     top = np.zeros(frames)
     weight = 0.0
     for name, channel in channels.items():
         own = shape[name] * channel.mean_frame.size / pixel[name]
-        top += own * (channel.frame_means - channel.frame_means.mean())
+        top += own * moved[name]
         weight += own * shape[name]
     square = float((top**2).sum()) / weight / (frames - 1)
     return ratio_root(square / still, frames - 1)
@@ -105,11 +111,9 @@ def _lines(
         weight = 0.0
         for name in names:
             channel = channels[name]
-            means = channel.row_means if axis == 0 else channel.column_means
-            moved = means - channel.frame_means[:, None]
-            moved = (moved - moved.mean(0))[:, :count]
+            moved = channel.moving_rows if axis == 0 else channel.moving_columns
             own = channel.mean_frame.shape[1 - axis] / pixel[name]
-            top += own * moved
+            top += own * moved[:, :count]
             weight += own
         total += float((top**2).sum()) / weight
         dof += (frames - 1) * (count - 1)

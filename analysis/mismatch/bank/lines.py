@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.special import betainc, gammaincc, gammainccinv, gammaln, log_ndtr, polygamma
 
 from analysis.mismatch.bank.scalars import UNKNOWN, Number, middle_of_gamma, score_of_log
-from dsis.compiled import kernel
+from dsis.compiled import inlined, kernel
 
 Array = NDArray[np.float64]
 Places = NDArray[np.int_]
@@ -156,20 +156,31 @@ def _log_above(shape: float, x: float) -> float:
 def _around(power: Array, y: Places, x: Places) -> Array:
     """Return the larger median of the `_AROUND` bins around each along either axis."""
     rows, half = power.shape
-    found, near = np.empty(y.size), np.empty((2, _AROUND))
+    found, beside, below = np.empty(y.size), np.empty(_AROUND), np.empty(_AROUND)
     for i in range(y.size):
         for k in range(_AROUND):
-            apart = k - _AROUND // 2
-            u = abs(x[i] + apart)
-            u = min(u, 2 * (half - 1) - u) % half  # beyond its ends a half plane is mirrored
-            for axis, value in ((0, power[(y[i] + apart) % rows, x[i]]), (1, power[y[i], u])):
-                line, place = near[axis], k
-                while place > 0 and line[place - 1] > value:
-                    line[place] = line[place - 1]
-                    place -= 1
-                line[place] = value
-        found[i] = max(near[0, _AROUND // 2], near[1, _AROUND // 2])
+            v, u = y[i] + k - _AROUND // 2, abs(x[i] + k - _AROUND // 2)
+            u = min(u, 2 * (half - 1) - u)  # beyond its ends a half plane is mirrored
+            while v < 0:  # a division takes longer
+                v += rows
+            while v >= rows:
+                v -= rows
+            while u < 0:
+                u += half
+            _insert(below, k, power[v, x[i]])
+            _insert(beside, k, power[y[i], u])
+        found[i] = max(below[_AROUND // 2], beside[_AROUND // 2])
     return found
+
+
+@inlined
+def _insert(line: Array, count: int, value: float) -> None:
+    """Put a value where it belongs among the first, which ascend."""
+    place = count
+    while place > 0 and line[place - 1] > value:
+        line[place] = line[place - 1]
+        place -= 1
+    line[place] = value
 
 
 def _highest(power: Array) -> tuple[Places, Places]:
@@ -181,13 +192,16 @@ def _highest(power: Array) -> tuple[Places, Places]:
 
 
 def _leak(distance: Places, size: int) -> Array:
-    """Return the largest amplitude that leaks so many bins away, relative to the larger bin."""
-    return _leaks(size)[distance % size]
+    """Return the largest amplitude that leaks so many bins away, relative to the larger bin.
+
+    Distances are less than twice the size, to either side.
+    """
+    return _leaks(size)[distance]
 
 
 @lru_cache(maxsize=64)
 def _leaks(size: int) -> Array:
-    """Return what `_leak` does for each distance of 0 to the size."""
+    """Return what `_leak` does for each distance of 0 to twice the size; negative ones wrap."""
     around = np.abs((np.arange(size) + size // 2) % size - size // 2)
     farther = np.sin(np.pi / (2 * size)) / np.sin(np.pi * (np.maximum(around, 1) - 0.5) / size)
-    return np.where(around > 0, farther, 1.0)
+    return np.tile(np.where(around > 0, farther, 1.0), 2)

@@ -89,7 +89,7 @@ class PatternSums:
     def add(self, exposure: str, mean_frame: Array, variance_dn2: float, frames: int) -> None:
         """Take the mean frame of an exposure and the variance of a pixel over time."""
         row, weight = self.regressors.rows[exposure], self.regressors.weights[exposure]
-        _add(mean_frame, float(mean_frame.mean()), weight * row, self.moments)
+        _add(mean_frame, float(mean_frame.sum()) / mean_frame.size, weight * row, self.moments)
         self.gram += weight * np.outer(row, row)
         self.noise += weight**2 * np.outer(row, row) * variance_dn2 / frames
 

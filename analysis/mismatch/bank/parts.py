@@ -52,7 +52,7 @@ def parts(image: Array, noise: float) -> Parts:
     """Return the hierarchy of a map (row, column) whose noise per pixel is known."""
     n, m = image.shape
     smooth = Smooth.of(n, m)
-    unit = (image - image.mean()) / noise
+    unit = (image - image.sum() / image.size) / noise
     coefficients = smooth.coefficients(unit)
     by_row, by_column, pixels, squares, scatter = pixel_residuals(
         unit, smooth.weights(coefficients), smooth.across

@@ -28,12 +28,12 @@ class VarianceSums:
 
     def add(self, variance_map: Array, weight: float) -> None:
         """Take the variance of each pixel (row, column) of one exposure."""
-        mean = float(variance_map.mean())
+        mean = float(variance_map.sum()) / variance_map.size
         if not mean > 0:
             return
         part = weight * (variance_map / mean - 1)
         self.total += part
-        square = float((part**2).mean())
+        square = float((part**2).sum()) / part.size
         self.squares += square
         self.fourths += square**2
 

@@ -25,6 +25,7 @@ Array = NDArray[np.float64]
 Image = NDArray[np.float32]
 Amplitudes = NDArray[np.complexfloating]
 _SAMPLE = 8192  # values of which a median is taken
+_TOGETHER = 2**17  # pixels of small frames that are transformed in one call
 _PAIRED = {"rows": (("R", "Gr"), ("Gb", "B")), "columns": (("R", "Gb"), ("Gr", "B"))}
 """Channels that take turns along a line."""
 
@@ -42,13 +43,26 @@ class Waves:
     def watching(self, frames: Iterable[NDArray[np.generic]]) -> Iterator[NDArray[np.generic]]:
         """Yield frames (row, column) as they come, and take their spectra."""
         first: Image | None = None
+        waiting: list[Image] = []
         for frame in frames:
             image = np.asarray(frame, np.float32)
             if first is None:
                 first = image
             else:
-                self.take(scipy.fft.rfft2(image - first, overwrite_x=True))
+                waiting.append(image - first)
+            if len(waiting) * self.pixels > _TOGETHER:
+                self._take_all(waiting)
             yield frame
+        if waiting:
+            self._take_all(waiting)
+
+    def _take_all(self, changes: list[Image]) -> None:
+        """Take the spectra of some frames less the first, and forget these."""
+        alone = len(changes) == 1  # a large one is not copied
+        images = changes[0][np.newaxis] if alone else np.stack(changes)
+        for transform in scipy.fft.rfft2(images, overwrite_x=True):
+            self.take(transform)
+        changes.clear()
 
     def take(self, transform: Amplitudes) -> None:
         """Take the transform (row, column // 2 + 1) of a frame less the first."""

@@ -31,6 +31,7 @@ ONLY = {
         "spectral_peak",
         "line_correlation",
         "alternation_variance",
+        "patch_variance",
         "fixed_spectral_peak",
     },
     NEIGHBOURS: {

@@ -1,0 +1,55 @@
+"""Spreads of one name that differ as chance does not make them say less of each other."""
+
+import numpy as np
+import pytest
+
+from analysis.mismatch import find_mismatch
+from analysis.mismatch.bank.key import Key
+from analysis.mismatch.null import _by_name, _unlike
+from dsis.effects import registry
+from mismatch_recordings import camera, recorded
+
+DOF = 15
+
+
+@pytest.mark.parametrize("worth", [3.0, 8.0])
+def test_prior_variance_and_degrees_are_those_drawn_from(worth: float) -> None:
+    """Smyth 2004, section 6.2: variances are drawn as d0 s0^2 / chi^2(d0), and seen with 15."""
+    rng = np.random.default_rng(int(worth))
+    true = 2.0 * worth / rng.chisquare(worth, 20_000)
+    found = _unlike(true * rng.chisquare(DOF, true.size) / DOF, DOF)
+    assert found is not None
+    typical, degrees = found
+    assert typical == pytest.approx(2.0, rel=0.03)
+    assert degrees == pytest.approx(worth, rel=0.05)
+
+
+def test_spreads_of_one_law_are_alike() -> None:
+    """All but one in ten thousand, by the rule: of 2000 draws of ten, 0.2 on average."""
+    rng = np.random.default_rng(1)
+    unlike = [_unlike(rng.chisquare(DOF, 10) / DOF, DOF) is not None for _ in range(2000)]
+    assert sum(unlike) <= 3
+
+
+def test_one_that_spreads_a_hundred_times_as_far_leaves_others_as_they_are() -> None:
+    rng = np.random.default_rng(2)
+    own = rng.chisquare(DOF, 10) / DOF
+    own[0] *= 1e4
+    keys = [Key("skewness", "exposure", f"flat-{i}", "MONO") for i in range(10)]
+    scale, worth, tails = _by_name(keys, own, np.ones(10, bool), DOF)
+    variance = tails**2 * (worth * scale + DOF * own) / (worth + DOF)
+    assert (variance[1:] < 4).all()
+    assert variance[0] > 3000
+    assert (tails > 1).all()
+    assert (tails < 1.5).all()
+
+
+def test_photons_are_named_beside_few_pixels_that_jump() -> None:
+    """Few jumping pixels make the skewness of darks anything; that of lit frames is the light's."""
+    counted = camera(registry()["rts"](pixel_fraction=0.001, amplitude_dn=25.0))
+    counted = counted.model_copy(
+        update={"noise": counted.noise.model_copy(update={"shot": "poisson"})}
+    )
+    levels = (30.0, 60.0, 120.0, 250.0, 500.0, 900.0)
+    found = find_mismatch(camera(), recorded(counted, 5, levels=levels), seed=1)
+    assert {one.effect for one in found.omitted_physics} == {"rts", "poisson_shot_noise"}

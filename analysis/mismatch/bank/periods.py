@@ -4,11 +4,13 @@ What a sensor repeats over two, four or eight pixels or lines, as channels that 
 frequencies that are multiples of an eighth of a cycle per pixel: so few that a line there stands
 out where among all frequencies it would be one of many. Cells know them exactly, whatever the size
 of a sensor; what is beyond whole cells is left out. The axes hold what rows and columns have in
-common, on a mosaic those of each colour.
+common, on a mosaic those of each colour. Few pixels that move farther than all others ever do count
+as moving so far.
 """
 
 from collections.abc import Iterable, Iterator
 from functools import lru_cache
+from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,30 +20,66 @@ from analysis.mismatch.bank.lines import any_of, log_chance
 from analysis.mismatch.bank.scalars import UNKNOWN, Number, score_of_log
 
 Array = NDArray[np.float64]
+Image = NDArray[np.float32]
 CELL = 8
 FEW_PIXELS = "few pixels"
 _LEAST = 4  # cells along each axis
+_SAMPLE = 4096  # of which a quantile is taken
+_MANY = 0.98  # of pixels: few are beyond
+_FAR_OUT = 2.2  # times as far as that, five standard deviations, normal noise hardly moves
 
 
 class Periods:
-    """Cells (frame, row, column) of the frames of one exposure: means over what repeats them."""
+    """Cells (frame, row, column) of the frames of one exposure: means over what repeats them.
+
+    Less those of the first frame.
+    """
 
     def __init__(self) -> None:
         self.cells: list[Array] = []
+        self.first: Image | None = None
+        self.farthest = inf
+        self.squares = [0.0, 0.0]
 
     def watching(self, frames: Iterable[NDArray[np.generic]]) -> Iterator[NDArray[np.generic]]:
         """Yield frames (row, column) as they come, and fold them."""
         for frame in frames:
-            rows, columns = (size // CELL for size in frame.shape)
-            whole = frame[: rows * CELL, : columns * CELL].reshape(rows * CELL, columns, CELL)
-            lines = whole.sum(1, dtype=np.float64)
-            self.cells.append(lines.reshape(rows, CELL, CELL).sum(0) / max(rows * columns, 1))
+            own = np.asarray(frame, np.float32)
+            if self.first is None:
+                self.first = own
+                self.cells.append(np.zeros((CELL, CELL)))
+            else:
+                self._take(own - self.first)
             yield frame
+
+    def _take(self, moved: Image) -> None:
+        if len(self.cells) == 1:
+            self.farthest = _farthest(moved)
+        self.squares[0] += float(np.vdot(moved, moved))
+        np.clip(moved, -self.farthest, self.farthest, out=moved)
+        self.squares[1] += float(np.vdot(moved, moved))
+        rows, columns = (size // CELL for size in moved.shape)
+        whole = moved[: rows * CELL, : columns * CELL].reshape(rows * CELL, columns, CELL)
+        lines = whole.sum(1, dtype=np.float64)
+        self.cells.append(lines.reshape(rows, CELL, CELL).sum(0) / max(rows * columns, 1))
+
+    @property
+    def kept(self) -> float:
+        """Which share of the squares is left of those that move farthest."""
+        before, after = self.squares
+        return after / before if before > 0 else 1.0
 
     def power(self) -> Array:
         """Return the power over time (row, column), summed over frames: of a mean of cells."""
         cells = np.array(self.cells)
         return np.asarray((np.abs(np.fft.fft2(cells - cells.mean(0))) ** 2).sum(0))
+
+
+def _farthest(moved: Image) -> float:
+    """Return how far all but few pixels ever move between two frames; inf where few move at all."""
+    flat = np.abs(moved.reshape(-1)[:: max(moved.size // _SAMPLE, 1) | 1])
+    far = float(np.quantile(flat, _MANY))
+    return _FAR_OUT * far if far > 0 else inf
 
 
 class PeriodSums:
@@ -67,7 +105,7 @@ class PeriodSums:
         if degrees < 1 or not variance_dn2 > 0 or min(self.shape) < _LEAST * CELL:
             return
         weight = degrees / expected_dn2
-        white = variance_dn2 * degrees * CELL**2 / self.repeats
+        white = variance_dn2 * seen.kept * degrees * CELL**2 / self.repeats
         self.power += weight * seen.power() / white
         self.weight += weight
         self.squares += weight**2 / degrees

@@ -113,3 +113,14 @@ def test_what_lines_move_by_leaves_what_they_share_as_it_is() -> None:
     grown = 1 + (0.09 + 1e-8 * SIGNAL_DN**2) / noise
     assert _shared(whole, grown, SIGNAL_DN) == pytest.approx((0.09, 1e-8))
     assert _shared(still, grown, SIGNAL_DN) == pytest.approx((0.09, 1e-8))
+
+
+def test_of_darks_alone_an_own_gain_says_nothing() -> None:
+    """Signals are 0, and lines noisy: odds are numbers all the same."""
+    whole, some = _recorded(7, lambda _: 0.0)
+    loud = [
+        [LineMeans(o.frames, 100 * o.fixed, 1e4 * o.moving, o.noise_dn2, o.parts) for o in those]
+        for those in (whole, some)
+    ]
+    found = odds_of_lines(*loud, np.zeros(3), np.full(3, 0.05), (0.0, 0.0))
+    assert all(np.isfinite(one).all() for one in found)

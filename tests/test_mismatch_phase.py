@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from analysis.mismatch.phase import WholeFrames, aliases, look, strongest
+from analysis.mismatch.aliases import aliases, strongest
+from analysis.mismatch.phase import WholeFrames, look
 from dsis.effects.bistable_pattern import BistablePattern
 from dsis.effects.dsnu import Dsnu
 from dsis.effects.periodic_noise import PeriodicNoise
@@ -206,3 +207,29 @@ def test_noise_holds_as_few_patterns_of_single_pixels_as_chance_allows(
         of = {e.name: 100 + rng.normal(0, SD, (8, ROWS, COLUMNS)) for e in LAYOUT.uniform}
         found += not look(LAYOUT, lambda name, of=of: iter(of[name]), at).absent
     assert found <= 6  # more in one of a thousand
+
+
+def test_what_repeats_over_eight_pixels_lies_where_it_lies() -> None:
+    at = (0.125, -0.375)
+    seen = look(LAYOUT, _frames(at, free=False), at)
+    assert seen.exact
+    assert seen.kept
+    assert seen.frequency is None
+
+
+@pytest.mark.parametrize(("across", "down"), [(0.2, 0.2), (0.3, 0.0), (0.0, -0.3)])
+def test_interference_beside_an_eighth_is_looked_for_there(across: float, down: float) -> None:
+    """A fifth of a bin off is no pattern of eight pixels: its frequency is measured."""
+    at = (0.125 + across / COLUMNS, 0.375 + down / ROWS)
+    seen = look(LAYOUT, _frames(at, free=True), (0.125, 0.375))
+    assert not seen.exact
+    assert seen.frequency is not None
+    off = [(a - b) * n for a, b, n in zip(seen.frequency, at, (COLUMNS, ROWS), strict=True)]
+    assert max(map(abs, off)) < 0.1
+
+
+def test_a_weak_line_of_eight_pixels_is_not_named_where_few_frames_know_no_phase() -> None:
+    at = (0.125, 0.375)
+    whole = WholeFrames(LAYOUT, _frames(at, free=True, frames=3))
+    line: Any = {"kind": "bistable_pattern", "amplitude_dn": 1.0, "frequency": at}
+    assert whole.denial(BistablePattern(**line)) == "frames do not tell whether its phase is kept"

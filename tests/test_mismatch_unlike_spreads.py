@@ -14,13 +14,16 @@ DOF = 15
 
 @pytest.mark.parametrize("worth", [3.0, 8.0])
 def test_prior_variance_and_degrees_are_those_drawn_from(worth: float) -> None:
-    """Smyth 2004, section 6.2: variances are drawn as d0 s0^2 / chi^2(d0), and seen with 15."""
+    """Smyth 2004, section 6.2: variances are drawn as d0 s0^2 / chi^2(d0), and seen with 15.
+
+    Far above the least spread that counts.
+    """
     rng = np.random.default_rng(int(worth))
-    true = 2.0 * worth / rng.chisquare(worth, 20_000)
+    true = 50.0 * worth / rng.chisquare(worth, 20_000)
     found = _unlike(true * rng.chisquare(DOF, true.size) / DOF, DOF)
     assert found is not None
     typical, degrees = found
-    assert typical == pytest.approx(2.0, rel=0.03)
+    assert typical == pytest.approx(50.0, rel=0.03)
     assert degrees == pytest.approx(worth, rel=0.05)
 
 
@@ -29,6 +32,14 @@ def test_spreads_of_one_law_are_alike() -> None:
     rng = np.random.default_rng(1)
     unlike = [_unlike(rng.chisquare(DOF, 10) / DOF, DOF) is not None for _ in range(2000)]
     assert sum(unlike) <= 3
+
+
+@pytest.mark.parametrize("little", [0.0, 1e-31, 0.005])
+def test_one_that_hardly_spreads_leaves_others_together(little: float) -> None:
+    own = np.random.default_rng(4).chisquare(DOF, 12) / DOF
+    own[0] = little
+    found = _unlike(own, DOF)
+    assert found is None or found[1] > 8
 
 
 def test_one_that_spreads_a_hundred_times_as_far_leaves_others_as_they_are() -> None:

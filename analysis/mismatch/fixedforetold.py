@@ -92,7 +92,7 @@ def odds_of_lines(
     without = np.diag(moving[which] / np.array(frames))
     without += shared[0] + shared[1] * np.outer(signal, signal)
     same = (which[:, np.newaxis] == which).astype(np.float64)
-    own = np.stack([same, same * np.outer(signal, signal)])
+    own = np.stack([same, same * np.outer(signal, signal)][: 1 + bool(signal.any())])
     beside = without + np.outer(deviation, deviation)
     without, beside = (_with_own(seen, one, own) for one in (without, beside))
     first = len(whole)

@@ -171,9 +171,13 @@ def _unlike(own: Array, dof: int) -> tuple[float, float] | None:
 
     None: they are as like as chance lets them be.
     """
-    if len(own) < _SEVERAL or not (own > 0).all():
+    if len(own) < _SEVERAL:
         return None
-    logs = np.log(own) - float(scipy.special.digamma(dof / 2)) + log(dof / 2)
+    logs = (
+        np.log(np.maximum(own, _LEAST_SCALE**2))
+        - float(scipy.special.digamma(dof / 2))
+        + log(dof / 2)
+    )
     by_chance = float(scipy.special.polygamma(1, dof / 2))
     scatter = float(logs.var(ddof=1))
     if (len(own) - 1) * scatter / by_chance < scipy.stats.chi2.isf(_UNLIKE, len(own) - 1):

@@ -6,13 +6,14 @@ Where noise hides that, the likelihoods of both decide. In white noise |c|^2 is 
 the chance of the largest of all frequencies is known.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.mismatch.aliases import aliases, strongest
 from analysis.mismatch.bandgain import gain_of_bands, place_of_bands
 from analysis.mismatch.instance import Frequency, frequency_of, same_line
 from analysis.mismatch.layout import Layout
@@ -28,12 +29,12 @@ from dsis.effects.rts import Rts
 Measured = tuple[Mapping[str, object], Mapping[str, float]]
 """Parameters, and their standard errors."""
 _CLEAR_POWER = 3.0  # standard errors of a line's power from which its amplitude is known
-_ASIDE = 3  # bins to the neighbours that say what is around
 _NEAR = (-2, -1, 1, 2)  # bins to those that a line leaves as they are
 _FAR = (-23, -17, -13, -9, 9, 13, 17, 23)  # bins to those that say what lines have in common
 _CROSS = ((-1 / 3, 0.0), (1 / 3, 0.0), (0.0, -1 / 3), (0.0, 1 / 3))  # bins, beside the best
 _MOST_CREST = 1.21  # power between steps: sinc(1/6)^-4, a sixth of a bin off on both axes
 _BETWEEN = (-1 / 3, 0.0, 1 / 3)  # bins by which a frequency may be off
+_BESIDE = 3.0  # errors by which the top of a line lies beside a frequency of few pixels
 _CHANCE = 0.05  # of a line as strong among all frequencies
 _SLOWEST = 3.0  # waves of a frame, beside which noise may rise as 1 / f
 _SHORTER = 5, 24  # waves of a frame, that say by how much
@@ -44,6 +45,7 @@ _PHASE_WORDS = {
 }
 ABSENT = "the frames show nothing there that noise does not show at some frequency"
 _BY_CHANCE = "it would be at a frequency of single pixels by chance only"
+_UNTOLD = "frames do not tell whether its phase is kept"
 _BROAD = "frequencies beside it are raised as well: it is no line"
 
 
@@ -91,14 +93,18 @@ class WholeFrames:
         if frequency not in self._looks:
             self._looks[frequency] = look(self.layout, self.frames_of, frequency)
         seen = self._looks[frequency]
-        if seen.absent:
-            return ABSENT
-        if seen.broad:
-            return _BROAD
-        kept = effect.kind == "bistable_pattern"
+        if seen.absent or seen.broad:
+            return ABSENT if seen.absent else _BROAD
+        return self._other_phase(seen, frequency, kept=effect.kind == "bistable_pattern")
+
+    def _other_phase(self, seen: "Look", frequency: Frequency, *, kept: bool) -> str | None:
+        """Return why a line is none whose phase is kept, or is not; None: it may be."""
         if seen.kept is not None:
-            return None if seen.kept == kept else _PHASE_WORDS[effect.kind]
-        if not kept and _of_pixels(frequency) and seen.line is not None:
+            kind = "bistable_pattern" if kept else "periodic_noise"
+            return None if seen.kept == kept else _PHASE_WORDS[kind]
+        if kept and seen.exact and not _of_pixels(frequency, 4):
+            return _UNTOLD
+        if not kept and seen.exact and seen.line is not None:
             odds = self._gain(frequency, kept=True) - self._gain(frequency, kept=False)
             return _BY_CHANCE if odds > SURE else None
         return None
@@ -199,7 +205,7 @@ class WholeFrames:
         real = all((2 * f) % 1 == 0 for f in frequency)
         share = min(2 * np.pi * line.bins(power) ** 2, 1.0)
         anywhere = float(np.log(self.layout.rows * self.layout.columns / 2 / share))
-        chosen = float(np.log(_FEW)) if kept and _of_pixels(frequency) else anywhere
+        chosen = float(np.log(_FEW)) if kept and self._looks[frequency].exact else anywhere
         return line.there(power, kept=kept, real=real) - chosen
 
     @cached_property
@@ -256,6 +262,8 @@ class Look:
         Power between the frequencies looked at over that of `line`, 1 or more.
     frequency
         Where that is; None: where it was looked for.
+    exact
+        Whether it is of what repeats over two, four or eight pixels, and nowhere beside that.
     """
 
     absent: bool
@@ -264,19 +272,25 @@ class Look:
     line: "Power | None" = None
     crest: float = 1.0
     frequency: Frequency | None = None
+    exact: bool = False
 
 
-def look(layout: Layout, frames_of: FramesOf, frequency: Frequency) -> Look:
-    """Return what whole frames show at a frequency, cycles per pixel along x and y."""
+def look(
+    layout: Layout, frames_of: FramesOf, frequency: Frequency, *, anywhere: bool = False
+) -> Look:
+    """Return what whole frames show at a frequency, cycles per pixel along x and y.
+
+    What repeats over few pixels lies where it lies, unless it is to be looked for `anywhere` near:
+    so is what shows beside that.
+    """
     fx, fy = frequency
     columns, rows = layout.columns, layout.rows
-    # Stripes and checkerboards of single pixels lie where they lie.
-    exact = _of_pixels(frequency)
+    exact = _of_pixels(frequency) and not anywhere
     steps = (0.0,) if exact else _BETWEEN
     tried = [(fx + u / columns, fy + w / rows) for u in steps for w in steps]
     power = Power.of(layout, projections(layout, frames_of, tried))
     if power.frames < LEAST:
-        return Look(absent=False, broad=False, kept=None)
+        return Look(absent=False, broad=False, kept=None, exact=exact)
     best = int(power.excess.argmax())
     own, (fx, fy) = power.at([best]), tried[best]
     axes = [
@@ -311,7 +325,11 @@ def look(layout: Layout, frames_of: FramesOf, frequency: Frequency) -> Look:
     absent = own.chance(real=real) * bins > _CHANCE
     kept = own.keeps_phase(real=real)
     if exact:
-        return Look(absent, broad, kept, own)
+        found = float(own.excess[0])
+        error = own.bins(found) if found > 0 else np.inf
+        if not real and float(np.linalg.norm(off)) > _BESIDE * error:
+            return look(layout, frames_of, frequency, anywhere=True)
+        return Look(absent, broad, kept, own, exact=True)
     there = (fx + off[0] / columns, fy + off[1] / rows)
     # What lies along an axis of the frequencies, as stripes do, stays there.
     asked = zip(frequency, there, strict=True)
@@ -356,39 +374,12 @@ def _top(at: float, beside: NDArray[np.float64]) -> tuple[float, list[float]]:
     return min(found, _MOST_CREST), off
 
 
-def _of_pixels(frequency: Frequency) -> bool:
-    """Return whether a frequency is that of what repeats over two, four or eight pixels."""
-    return all((8 * f) % 1 == 0 for f in frequency)
+def _of_pixels(frequency: Frequency, most: int = 8) -> bool:
+    """Return whether a frequency is that of what repeats over two, four, `most` pixels."""
+    return all((most * f) % 1 == 0 for f in frequency)
 
 
 def _apart(layout: Layout, one: Frequency, other: Frequency) -> bool:
     """Return whether two frequencies are more than half a bin apart along an axis."""
     across, down = ((a - b + 0.5) % 1 - 0.5 for a, b in zip(one, other, strict=True))
     return abs(across) * layout.columns > 0.5 or abs(down) * layout.rows > 0.5
-
-
-def strongest(layout: Layout, frames_of: FramesOf, frequencies: Sequence[Frequency]) -> Frequency:
-    """Return the frequency at which frames vary most: one plane of a mosaic cannot tell aliases.
-
-    What rows or columns of bins have in common, as row noise has, is no line.
-    """
-    across, down = _ASIDE / layout.columns, _ASIDE / layout.rows
-    steps = ((0.0, 0.0), (-across, 0.0), (across, 0.0), (0.0, -down), (0.0, down))
-    looked_at = [(fx + u, fy + w) for fx, fy in frequencies for u, w in steps]
-    power = np.zeros(len(looked_at))
-    for found in projections(layout, frames_of, looked_at):
-        power += (np.abs(found) ** 2).sum(0)
-    own, left, right, below, above = power.reshape(-1, len(steps)).T
-    around = np.maximum(left + right, below + above) / 2
-    return frequencies[int((own - around).argmax())]
-
-
-def aliases(frequency: Frequency) -> list[Frequency]:
-    """Return the frequencies that planes of every second pixel see as this one; not the mean's."""
-    found = []
-    for ax in (0.0, 0.5):
-        for ay in (0.0, 0.5):
-            fx, fy = ((f + a + 0.5) % 1 - 0.5 for f, a in zip(frequency, (ax, ay), strict=True))
-            if abs(fx) + abs(fy) > 0:
-                found.append((fx, fy))
-    return found

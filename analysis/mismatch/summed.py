@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from itertools import chain, islice
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +20,7 @@ from analysis.mismatch.bank.waves import Waves, WaveSums
 from analysis.mismatch.layout import Layout
 from analysis.mismatch.touches import ALL_SUMS, CARRY_OVER, NEIGHBOURS, SPECTRA
 from dsis.measures import Accumulator, Channel, Measured
-from dsis.measures.accumulator import LAGS
+from dsis.measures.accumulator import AT_ONCE, LAGS
 from dsis.measures.plane import Transforms
 
 _FEW_LAGS = 2  # of neighbours: the bank asks for no farther ones
@@ -48,11 +49,13 @@ def measure(
         power=SPECTRA in made,
         neighbours=NEIGHBOURS in made,
     )
-    if layout.rows * layout.columns > _SMALL_PIXELS:
-        for frame in frames:
-            sums.add(frame)
+    pixels, left = layout.rows * layout.columns, iter(frames)
+    first = list(islice(left, AT_ONCE // pixels + 1)) if pixels <= _SMALL_PIXELS else []
+    if first and len(first) <= AT_ONCE // pixels:
+        sums.add_all(first)
     else:
-        sums.add_all(list(frames))
+        for frame in chain(first, left):
+            sums.add(frame)
     return sums.result()
 
 

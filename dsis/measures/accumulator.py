@@ -25,7 +25,7 @@ from dsis.measures.measured import Measured
 from dsis.measures.plane import Region, Transforms, planes, sheets
 
 LAGS = 4
-_AT_ONCE = 1 << 20  # samples: with what is made of them they take 20 MB
+AT_ONCE = 1 << 20  # samples: with what is made of them they take 20 MB
 
 
 class Accumulator:
@@ -132,7 +132,7 @@ class Accumulator:
             if frame.shape != self.frame_shape:
                 message = f"frame {number} is {frame.shape}, must be {self.frame_shape}"
                 raise ValueError(message)
-        if self.frames or len(frames) < 2 or len(frames) * prod(self.shape) > _AT_ONCE:
+        if self.frames or len(frames) < 2 or len(frames) * prod(self.shape) > AT_ONCE:
             for frame in frames:
                 self.add(frame)
             return

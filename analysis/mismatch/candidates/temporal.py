@@ -237,7 +237,7 @@ def _strongest(clues: Clues, kind: str) -> Iterator[tuple[str, str, Peak]]:
         return _settled(clues, kind, at, 1 if _whole(name, channel) else step)
 
     ranks = [line_name(rank) for rank in range(1, RANKS[-1] + 2)]
-    cells = [_OF_CELLS] if _seen_in_cells(clues) else []
+    cells = [_OF_CELLS] if kind == "bistable_pattern" and _seen_in_cells(clues) else []
     for names in (["spectrum", *ranks], cells, ["rows"], ["columns"]):
         seen = ((name, clearest(clues, name)) for name in names)
         lines = ((name, *line) for name, line in seen if line is not None)

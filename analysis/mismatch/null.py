@@ -22,6 +22,7 @@ _OWN = 40.0  # degrees of freedom that the closed form, scaled by name, is worth
 _POOLED = 160.0  # and for the tails: a scale is shared by all numbers of a name
 _LEAST_SCALE = 0.8
 _SEVERAL = 5  # numbers of a name that tell whether they are alike
+_RARE = 1e-5  # chance of a departure that counts, among some hundred numbers
 _UNLIKE = 1e-4  # chance of spreads that differ so
 _ODD = 1e-3  # chance of simulations so far off that a score is not normal under the model
 _COMB = 0.4  # relative error of the codes' imbalance that a model predicts
@@ -197,7 +198,7 @@ def _with_trigamma(value: float) -> float:
 
 def _farther(dof: float) -> float:
     """Return how far out a Student's variate lies at a small chance."""
-    return float(scipy.stats.t.isf(_ODD, dof))
+    return float(scipy.stats.t.isf(_RARE, dof))
 
 
 def adjusted(chances: Array, weights: Array) -> Array:

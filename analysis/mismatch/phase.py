@@ -34,7 +34,7 @@ _FAR = (-23, -17, -13, -9, 9, 13, 17, 23)  # bins to those that say what lines h
 _CROSS = ((-1 / 3, 0.0), (1 / 3, 0.0), (0.0, -1 / 3), (0.0, 1 / 3))  # bins, beside the best
 _MOST_CREST = 1.21  # power between steps: sinc(1/6)^-4, a sixth of a bin off on both axes
 _BETWEEN = (-1 / 3, 0.0, 1 / 3)  # bins by which a frequency may be off
-_BESIDE = 3.0  # errors by which the top of a line lies beside a frequency of few pixels
+_BESIDE = 4.0  # errors by which the top of a line lies beside a frequency of few pixels
 _CHANCE = 0.05  # of a line as strong among all frequencies
 _SLOWEST = 3.0  # waves of a frame, beside which noise may rise as 1 / f
 _SHORTER = 5, 24  # waves of a frame, that say by how much
@@ -327,7 +327,8 @@ def look(
     if exact:
         found = float(own.excess[0])
         error = own.bins(found) if found > 0 else np.inf
-        if not real and float(np.linalg.norm(off)) > _BESIDE * error:
+        single = _of_pixels(frequency, 4)  # one or two pixels: interference is hardly there
+        if not single and float(np.linalg.norm(off)) > _BESIDE * error:
             return look(layout, frames_of, frequency, anywhere=True)
         return Look(absent, broad, kept, own, exact=True)
     there = (fx + off[0] / columns, fy + off[1] / rows)

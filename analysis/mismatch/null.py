@@ -22,6 +22,8 @@ _OWN = 40.0  # degrees of freedom that the closed form, scaled by name, is worth
 _POOLED = 160.0  # and for the tails: a scale is shared by all numbers of a name
 _LEAST_SCALE = 0.8
 _SEVERAL = 5  # numbers of a name that tell whether they are alike
+# Of single pixels, which channels do not share: what lines and frames move by, they do.
+_OF_PIXELS = frozenset({"skewness", "kurtosis", "kurtosis_within_pixels", "variance_spread"})
 _RARE = 1e-5  # chance of a departure that counts, among some hundred numbers
 _UNLIKE = 1e-4  # chance of spreads that differ so
 _ODD = 1e-3  # chance of simulations so far off that a score is not normal under the model
@@ -160,7 +162,8 @@ def _by_name(
     for which in groups.values():
         # Few numbers leave the closed form its say.
         scale[which] = (own[which].sum() + 4.0) / (len(which) + 4.0)
-        unlike = _unlike(own[which], dof)
+        single = keys[which[0]].statistic in _OF_PIXELS
+        unlike = _unlike(own[which], dof) if single else None
         if unlike:
             scale[which], worth[which] = unlike
             tails[which] = _farther(unlike[1] + dof) / _farther(_OWN + dof)

@@ -5,7 +5,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.stats import norm
 
-from analysis.mismatch.bank.coherent import Peak
+from analysis.mismatch.bank.peaks import Peak
 from analysis.mismatch.bank.scalars import Number
 from analysis.mismatch.bank.standing import NAME, standing
 from analysis.mismatch.bank.waves import Waves, WaveSums

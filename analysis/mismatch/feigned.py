@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import binom
 
-from analysis.mismatch.bank.coherent import white_level
 from analysis.mismatch.bank.edges import edge_shapes
 from analysis.mismatch.bank.parts import parts
+from analysis.mismatch.bank.peaks import white_level
 from analysis.mismatch.bank.sawtooth import PLACES, sawteeth
 from analysis.mismatch.bank.seams import SMOOTH_DEGREE, beyond_smooth, seam_shapes
 from analysis.mismatch.bank.standing import NAME as FIXED_WAVE

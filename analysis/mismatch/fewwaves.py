@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from analysis.mismatch.bank.coherent import white_level
+from analysis.mismatch.bank.peaks import white_level
 from analysis.mismatch.bank.standing import NAME
 from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.fewpatches import gains_for, unlike_drawn, white_of

@@ -11,11 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.bank.bulk import Bulk
-from analysis.mismatch.bank.coherent import Peak, SpectrumSums
+from analysis.mismatch.bank.coherent import SpectrumSums
 from analysis.mismatch.bank.common import common
 from analysis.mismatch.bank.linemeans import AXES, Axis, LineMeans
 from analysis.mismatch.bank.local import local_scalars, variances, widened
 from analysis.mismatch.bank.motion import MotionSums, Shifts
+from analysis.mismatch.bank.peaks import Peak
 from analysis.mismatch.bank.sawtooth import Samples
 from analysis.mismatch.bank.scalars import NAMES, UNKNOWN, Number, scalars
 from analysis.mismatch.bank.surfaces import Leaning, leaning

@@ -5,9 +5,9 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.mismatch.bank.coherent import Peak
 from analysis.mismatch.bank.maps import ALONE
 from analysis.mismatch.bank.parts import Parts, parts
+from analysis.mismatch.bank.peaks import Peak
 from analysis.mismatch.bank.scalars import Number
 from analysis.mismatch.bank.standing import NAME as FIXED_WAVE
 from analysis.mismatch.bank.standing import standing

@@ -9,14 +9,15 @@ from numpy.typing import NDArray
 
 from analysis.mismatch.bank.bands import Bands
 from analysis.mismatch.bank.carryover import CarryOver, CarryOverSums
-from analysis.mismatch.bank.coherent import Peak, SpectrumSums
+from analysis.mismatch.bank.coherent import SpectrumSums
 from analysis.mismatch.bank.common import common
 from analysis.mismatch.bank.linemeans import Axis, LineMeans, line_means
 from analysis.mismatch.bank.maps import PatternSums, Regressors
+from analysis.mismatch.bank.peaks import Peak
 from analysis.mismatch.bank.periods import FEW_PIXELS, Periods, PeriodSums
 from analysis.mismatch.bank.persistent import VarianceSums
 from analysis.mismatch.bank.scalars import Number
-from analysis.mismatch.bank.waves import Waves, WaveSums
+from analysis.mismatch.bank.waves import Waves, WaveSums, of_sensor
 from analysis.mismatch.layout import Layout
 from analysis.mismatch.touches import ALL_SUMS, CARRY_OVER, NEIGHBOURS, SPECTRA
 from dsis.measures import Accumulator, Channel, Measured
@@ -140,10 +141,7 @@ class SensorSums:
         places = {name: (one.exposure, name) for name in found}
         expected = {name: self.layout.variance_dn2[place] for name, place in places.items()}
         self.waves.add(one.lines, found, expected)
-        sizes = [c.mean_frame.size for c in found.values()]
-        own = [c.estimates["pixel_variance"].value for c in found.values()]
-        wanted = [expected[name] for name in found]
-        self.periods.add(one.cells, *(float(np.average(v, weights=sizes)) for v in (own, wanted)))
+        self.periods.add(one.cells, *of_sensor(found, expected))
         if self.mosaic:
             signals = {name: self.layout.signal_dn[place] for name, place in places.items()}
             sites = self.layout.sites

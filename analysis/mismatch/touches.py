@@ -56,7 +56,7 @@ _FOLLOWS = {
     "fixed_smooth_variance": frozenset({"fixed_smooth_variance"}) | _LINES,
     "fixed_correlation_0_1": frozenset({"fixed_correlation_0_1"}) | _CORRELATIONS,
     "fixed_correlation_1_0": frozenset({"fixed_correlation_1_0"}) | _CORRELATIONS,
-    # Where light falls off, bands and frames that follow it have slow waves.
+    # Where light falls off, bands of it have slow waves.
     "patch_variance": frozenset({"spectral_peak", "row_spectrum_peak"}) | _CORRELATIONS,
     "fixed_patch_variance": frozenset({"fixed_correlation_0_1", "fixed_correlation_1_0"})
     | _CORRELATIONS,

@@ -8,8 +8,7 @@ from math import inf, isfinite, log, nan, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.mismatch.bank.coherent import split_name
-from analysis.mismatch.bank.key import MOSAIC, Key
+from analysis.mismatch.bank.key import MOSAIC, Key, split_name
 from analysis.mismatch.bank.local import LOCAL_NAMES
 from analysis.mismatch.bank.scalars import NAMES, UNKNOWN, Number
 from analysis.mismatch.basefit import CLIPPED_SHARE, BaseFit, colour

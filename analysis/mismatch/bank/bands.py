@@ -10,7 +10,8 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.mismatch.bank.coherent import Peak, largest_line, line_top, slow_lines
+from analysis.mismatch.bank.coherent import slow_lines
+from analysis.mismatch.bank.peaks import Peak, largest_line, line_top
 from analysis.mismatch.bank.rowlags import row_lags
 from analysis.mismatch.bank.scalars import Number
 from dsis.measures import Channel

@@ -1,8 +1,7 @@
 """What a channel shows over all exposures: spectra, lines of them, and lags along lines."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property, reduce
+from collections.abc import Sequence
+from functools import cached_property
 from itertools import islice
 from math import sqrt
 
@@ -16,40 +15,31 @@ from analysis.mismatch.bank.lines import (
     separate,
     without_lines,
 )
+from analysis.mismatch.bank.peaks import (
+    LEAST_BINS,
+    Peak,
+    frequency,
+    largest,
+    largest_line,
+    line_top,
+    summed,
+    white_level,
+    within_bin,
+)
 from analysis.mismatch.bank.rowlags import row_lags
 from analysis.mismatch.bank.scalars import (
     UNKNOWN,
     Number,
-    middle_of_gamma,
     ratio_root,
     score_of_log,
 )
 from dsis.measures import Channel
-from dsis.measures.median import median
 
 Array = NDArray[np.float64]
-_SINGLE = ((1, 1),)
-_BLOCKS = (*_SINGLE, (1, 2), (2, 1), (2, 2))
-_LEAST_BINS = 8
-_ALTERNATES = 0.1  # bins from half a cycle per pixel: phases of a line drift by less than a tenth
 _ALONE = 2.0  # times as high a bin elsewhere is the peak, whatever a block sums up to
 LAGS = 16  # along a line, pixels of the plane
 RANKS = (2, 3, 4)  # of lines beside the strongest
 PATCHES = (4, 8, 16)  # pixels of the plane, that share noise
-
-
-@dataclass(frozen=True)
-class Peak:
-    """The largest bin of a spectrum: cycles per pixel of the plane along x and y, its height.
-
-    `off` says where in the bin the frequency lies, -0.5 to 0.5 of a bin along y, by the larger
-    neighbour: a sinusoid of bin k + d has (d / (1 - d))^2 as much power in bin k + 1 as in k.
-    """
-
-    fx: float
-    fy: float
-    power: float
-    off: float = 0.0
 
 
 class SpectrumSums:
@@ -126,10 +116,10 @@ class SpectrumSums:
             # The axes hold what rows, columns and frames have in common.
             edge = self.power[1 : (n + 1) // 2, m // 2 :] if m % 2 == 0 else None
             inner = self.power[1:, 1 : (m + 1) // 2]
-            found["spectral_peak"] = _largest(inner, degrees, edge)
+            found["spectral_peak"] = largest(inner, degrees, edge)
             found |= self._further(degrees)
             columns = _line(self.columns, m)
-            found["column_spectrum_peak"] = _largest(columns, degrees)
+            found["column_spectrum_peak"] = largest(columns, degrees)
             found["column_spectrum_peak of colour"] = of_colour(columns[0], degrees)
             found |= self._lags()
             found |= self._corners(degrees)
@@ -146,7 +136,7 @@ class SpectrumSums:
             return None
         power = self.power / self.weight[""][0]
         inner = power[1:, 1:]
-        sums = _summed(inner, (2, 2))
+        sums = summed(inner, (2, 2))
         y, x = np.unravel_index(int(sums.argmax()), sums.shape)
         block = inner[y : y + 2, x : x + 2]
         if inner.max() > _ALONE * block.max():
@@ -160,8 +150,8 @@ class SpectrumSums:
         """Return the line about a bin off the axes, between bins."""
         n, m = self.shape
         inner = power[1:, 1:]
-        fx = frequency(x + _within_bin(inner[y - 1], x - 1), m)
-        fy = frequency(y + _within_bin(inner[:, x - 1], y - 1), n)
+        fx = frequency(x + within_bin(inner[y - 1], x - 1), m)
+        fy = frequency(y + within_bin(inner[:, x - 1], y - 1), n)
         fy -= float(fy > 1 / 2)
         return Peak(float(fx), float(fy), float(power[y, x]))
 
@@ -208,7 +198,7 @@ class SpectrumSums:
             return None
         inner = _line(self.columns, m)[0] / total
         place = clearest_bin(inner, self.degrees(""))
-        across = place + 1 + _within_bin(inner, place)
+        across = place + 1 + within_bin(inner, place)
         return Peak(frequency(across, m), 0.0, float(inner[place]))
 
     def row_peak(self, key: str) -> Peak | None:
@@ -228,7 +218,7 @@ class SpectrumSums:
         for rank in RANKS:
             label = f"spectral_peak of {_rank(rank)}"
             found[label] = UNKNOWN
-            if rank <= len(heights) and bins >= _LEAST_BINS:
+            if rank <= len(heights) and bins >= LEAST_BINS:
                 chance = log_chance(heights[rank - 1], rank, bins, degrees)
                 found[label] = (score_of_log(chance), 1.0)
         return found
@@ -316,14 +306,6 @@ def _half_bins(channel: Channel, seen: int) -> Array:
     return np.asarray(power.sum(0) * (channel.mean_frame.shape[1] / lines / max(seen, 1)))
 
 
-def largest_line(power: Array, degrees: float) -> Number:
-    """Return the normal score of the largest of half bins, from 0 to half a cycle per line.
-
-    From one cycle a frame on: less is much like the frame's mean, which is off.
-    """
-    return _largest(power[np.newaxis, 2:-1], max(round(degrees), 1), blocks=_SINGLE)
-
-
 def slow_lines(power: Array, degrees: float) -> Number:
     """Return the cube root of the power of waves down the frame, one of k cycles by 1 / k.
 
@@ -335,83 +317,3 @@ def slow_lines(power: Array, degrees: float) -> Number:
     weights = 1 / np.arange(1, whole.size + 1)
     ratio = float(weights @ whole) / weights.sum()
     return ratio_root(ratio, 2 * degrees * weights.sum() ** 2 / (weights @ weights))
-
-
-def line_top(power: Array) -> tuple[float, float, float]:
-    """Return cycles a frame of the largest of half bins, what is beyond it, and its power."""
-    place = int(power[2:].argmax())
-    return place / 2 + 1, top(power[2:], place) / 2, float(power[place + 2])
-
-
-def top(power: Array, place: int) -> float:
-    """Return where the parabola through a bin and its neighbours is highest, -0.5 to 0.5."""
-    if not 0 < place < power.size - 1:
-        return 0.0
-    below, at, above = (float(p) for p in power[place - 1 : place + 2])
-    bend = below - 2 * at + above
-    return float(np.clip((below - above) / (2 * bend), -0.5, 0.5)) if bend < 0 else 0.0
-
-
-def _largest(
-    inner: Array,
-    degrees: int,
-    edge: Array | None = None,
-    blocks: Sequence[tuple[int, int]] = _BLOCKS,
-) -> Number:
-    """Return the normal score of the largest bin, or block of two bins a side.
-
-    A sinusoid between bins shows in all of a block, in a single one by 0.4 per axis at worst. White
-    noise is the median bin, over that of Gamma(degrees) / degrees; `edge` are further bins.
-    """
-    if inner.size < _LEAST_BINS:
-        return UNKNOWN
-    white = white_level(inner, degrees)
-    if not white > 0:
-        return UNKNOWN
-    shape = inner.shape
-    parts = [(b, _summed(inner, b)) for b in blocks if b[0] <= shape[0] and b[1] <= shape[1]]
-    if edge is not None and edge.size:
-        parts.append(((1, 1), edge))
-    least = min(
-        log_chance(float(power.max()) / white / (high * wide), 1, power.size, degrees * high * wide)
-        for (high, wide), power in parts
-    )
-    return score_of_log(least), 1.0
-
-
-def white_level(power: Array, degrees: float) -> float:
-    """Return the power of a bin of white noise, Gamma(degrees): by the median, without lines."""
-    return median(power) * degrees / middle_of_gamma(degrees)
-
-
-def _summed(power: Array, block: tuple[int, int]) -> Array:
-    """Return the sum of every block (rows, columns) of bins."""
-    rows, columns = (size - own + 1 for size, own in zip(power.shape, block, strict=True))
-    parts = [power[y : y + rows, x : x + columns] for y in range(block[0]) for x in range(block[1])]
-    return reduce(np.add, parts)
-
-
-def _within_bin(power: Array, place: int) -> float:
-    """Return where between bins a sinusoid in white noise of power 1 lies, -0.5 to 0.5."""
-    excess = sqrt(max(float(power[place]) - 1, 0.0))
-    below = sqrt(max(float(power[place - 1]) - 1, 0.0)) if place else 0.0
-    above = sqrt(max(float(power[place + 1]) - 1, 0.0)) if place + 1 < power.size else 0.0
-    side, larger = (1.0, above) if above >= below else (-1.0, below)
-    return side * larger / (excess + larger) if excess > 0 else 0.0
-
-
-def frequency(at: float, size: int) -> float:
-    """Return cycles per pixel of cycles in all; what nearly alternates by pixel does so exactly."""
-    return 0.5 if abs(at - size / 2) < _ALTERNATES else at / size
-
-
-def split_name(name: str) -> tuple[str, str]:
-    """Return statistic and detail of a name such as `parity of rows`."""
-    for mark in (" of ", " along "):
-        if mark in name:
-            statistic, detail = name.split(mark, 1)
-            return statistic, detail
-    return name, ""
-
-
-Numbers = Mapping[str, Number]

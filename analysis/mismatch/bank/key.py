@@ -39,3 +39,12 @@ class Key:
     def place(self) -> tuple[str, str]:
         """Exposure and channel; of a range of signal in a scene: exposure, channel and range."""
         return self.exposure, f"{self.channel} {self.detail}".strip()
+
+
+def split_name(name: str) -> tuple[str, str]:
+    """Return statistic and detail of a name such as `parity of rows`."""
+    for mark in (" of ", " along "):
+        if mark in name:
+            statistic, detail = name.split(mark, 1)
+            return statistic, detail
+    return name, ""

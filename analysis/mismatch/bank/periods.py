@@ -15,8 +15,8 @@ from math import inf
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.mismatch.bank.coherent import Peak
 from analysis.mismatch.bank.lines import any_of, log_chance
+from analysis.mismatch.bank.peaks import Peak
 from analysis.mismatch.bank.scalars import UNKNOWN, Number, score_of_log
 
 Array = NDArray[np.float64]

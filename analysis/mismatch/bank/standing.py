@@ -21,8 +21,8 @@ import scipy.fft
 from numpy.typing import NDArray
 from scipy.special import betainc, betaln, gammainccinv
 
-from analysis.mismatch.bank.coherent import Peak, frequency
 from analysis.mismatch.bank.lines import any_of
+from analysis.mismatch.bank.peaks import Peak, frequency
 from analysis.mismatch.bank.robust import typical_square
 from analysis.mismatch.bank.scalars import UNKNOWN, Number, score_of_log
 from analysis.mismatch.bank.waves import Moving, WaveSums, add_power, looked_at, some

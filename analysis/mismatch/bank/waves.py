@@ -6,7 +6,7 @@ loses 34 % at most of a sinusoid that lies there. Of a mosaic all colours are ta
 that channels add by amplitude, not by power, and a frequency has no aliases.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -14,8 +14,9 @@ import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
-from analysis.mismatch.bank.coherent import LAGS, Peak, frequency, top, white_level
+from analysis.mismatch.bank.coherent import LAGS
 from analysis.mismatch.bank.lines import any_of, log_chance, without_lines
+from analysis.mismatch.bank.peaks import Peak, frequency, top, white_level
 from analysis.mismatch.bank.scalars import UNKNOWN, Number, score_of_log
 from dsis.compiled import inlined, kernel
 from dsis.measures import Channel
@@ -137,12 +138,9 @@ class WaveSums:
         self, waves: Waves, channels: Mapping[str, Channel], variance_dn2: Mapping[str, float]
     ) -> None:
         """Take one exposure; the variance that is expected of each channel weighs it."""
-        sizes = [c.mean_frame.size for c in channels.values()]
-        own = [c.estimates["pixel_variance"].value for c in channels.values()]
-        white = _mean(own, sizes)
+        white, expected = of_sensor(channels, variance_dn2)
         if waves.frames < 2 or not white > 0:
             return
-        expected = _mean([variance_dn2[name] for name in channels], sizes)
         seen = waves.frames - 1
         weight = seen / expected
         self._moving = None
@@ -253,9 +251,18 @@ class WaveSums:
         ]
 
 
-def _mean(values: Sequence[float], weights: Sequence[float]) -> float:
-    """Return the weighted mean of few values."""
-    return sum(v * w for v, w in zip(values, weights, strict=True)) / sum(weights)
+def of_sensor(
+    channels: Mapping[str, Channel], variance_dn2: Mapping[str, float]
+) -> tuple[float, float]:
+    """Return the variance of the pixels of all channels, DN^2: measured, and expected."""
+    sizes = [c.mean_frame.size for c in channels.values()]
+    own = [c.estimates["pixel_variance"].value for c in channels.values()]
+    expected = [variance_dn2[name] for name in channels]
+    first, second = (
+        sum(v * n for v, n in zip(values, sizes, strict=True)) / sum(sizes)
+        for values in (own, expected)
+    )
+    return first, second
 
 
 def looked_at(shape: tuple[int, int], step: int) -> NDArray[np.bool_]:

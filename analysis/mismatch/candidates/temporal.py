@@ -6,7 +6,8 @@ from math import inf, isfinite, log, pi, sqrt
 
 import numpy as np
 
-from analysis.mismatch.bank.coherent import RANKS, Peak, line_name
+from analysis.mismatch.bank.coherent import RANKS, line_name
+from analysis.mismatch.bank.peaks import Peak
 from analysis.mismatch.bank.periods import FEW_PIXELS
 from analysis.mismatch.bank.scalars import UNKNOWN
 from analysis.mismatch.candidates.candidate import Candidate, Proposal, measured, proposals

@@ -14,7 +14,7 @@ from analysis.mismatch.bank.common import common
 from analysis.mismatch.bank.linemeans import Axis, LineMeans, line_means
 from analysis.mismatch.bank.maps import PatternSums, Regressors
 from analysis.mismatch.bank.peaks import Peak
-from analysis.mismatch.bank.periods import FEW_PIXELS, Periods, PeriodSums
+from analysis.mismatch.bank.periods import NUMBER, PLACE, Periods, PeriodSums
 from analysis.mismatch.bank.persistent import VarianceSums
 from analysis.mismatch.bank.scalars import Number
 from analysis.mismatch.bank.waves import Waves, WaveSums, of_sensor
@@ -156,11 +156,11 @@ class SensorSums:
         """Return spectra and memories of the whole sensor."""
         own = self.bands.numbers() if self.mosaic else {}
         waves = {"spectral_peak": self.waves.number(), **self.waves.odd_lags()}
-        waves[f"spectral_peak of {FEW_PIXELS}"] = self.periods.number()
+        waves[NUMBER] = self.periods.number()
         return {**own, **self.memory.numbers(), **waves}
 
     def peaks(self) -> dict[str, Peak]:
         """Return where its spectra are largest, by kind."""
         own = self.bands.peaks() if self.mosaic else {}
-        whole = {"spectrum": self.waves.peak(), f"spectrum, {FEW_PIXELS}": self.periods.peak()}
+        whole = {"spectrum": self.waves.peak(), PLACE: self.periods.peak()}
         return {**own, **{kind: peak for kind, peak in whole.items() if peak is not None}}

@@ -29,9 +29,8 @@ _TOGETHER = (
     *((k, k + 2) for k in range(_SLOWEST)),
     *((0, k + 1) for k in (2, 4, 8, _SLOWEST)),
 )
-_INDEPENDENT = (
-    20  # chances whose least is one in a hundred as often as that of these, which overlap
-)
+# Chances whose least is one in a hundred as often as that of these, which overlap.
+_INDEPENDENT = 20
 _LEAST_ROWS = 48  # of fewer no wave is the measure of others
 _RAREST = -690.0  # logarithm of a chance that is told from none
 

@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 Image = NDArray[np.float32]
 CELL = 8
 FEW_PIXELS = "few pixels"
+NUMBER, PLACE = f"spectral_peak of {FEW_PIXELS}", f"spectrum, {FEW_PIXELS}"
 _LEAST = 4  # cells along each axis
 _SAMPLE = 4096  # of which a quantile is taken
 _MANY = 0.98  # of pixels: few are beyond

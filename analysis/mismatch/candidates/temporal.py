@@ -6,9 +6,9 @@ from math import inf, isfinite, log, pi, sqrt
 
 import numpy as np
 
+from analysis.mismatch.bank import periods
 from analysis.mismatch.bank.coherent import RANKS, line_name
 from analysis.mismatch.bank.peaks import Peak
-from analysis.mismatch.bank.periods import FEW_PIXELS
 from analysis.mismatch.bank.scalars import UNKNOWN
 from analysis.mismatch.candidates.candidate import Candidate, Proposal, measured, proposals
 from analysis.mismatch.clues import Clues, alike
@@ -28,7 +28,6 @@ _SLOW = ("row_variance", "slow_row_variance", "row_correlation", "line_correlati
          "frame_variance", "row_spectrum_peak", "column_variance",
          "column_spectrum_peak")  # fmt: skip
 _CLEAR = 3.0  # standard errors of what columns vary by
-_OF_CELLS = f"spectrum, {FEW_PIXELS}"
 _BANDS = {"rows of light": "row_spectrum_peak of light", "rows": "row_spectrum_peak"}
 _PERSISTS = 1.0  # of log-likelihood: more than a parameter gains by chance (Akaike, 1974)
 _TINY = 1e-300
@@ -223,7 +222,7 @@ def _settled(clues: Clues, kind: str, at: Frequency, step: int) -> bool:
 
 def _whole(name: str, channel: str) -> bool:
     """Return whether a spectrum is that of a whole mosaic, in phase: its lines have no aliases."""
-    return name in ("spectrum", _OF_CELLS) and not channel
+    return name in ("spectrum", periods.PLACE) and not channel
 
 
 def _strongest(clues: Clues, kind: str) -> Iterator[tuple[str, str, Peak]]:
@@ -238,7 +237,7 @@ def _strongest(clues: Clues, kind: str) -> Iterator[tuple[str, str, Peak]]:
         return _settled(clues, kind, at, 1 if _whole(name, channel) else step)
 
     ranks = [line_name(rank) for rank in range(1, RANKS[-1] + 2)]
-    cells = [_OF_CELLS] if kind == "bistable_pattern" and _seen_in_cells(clues) else []
+    cells = [periods.PLACE] if kind == "bistable_pattern" and _seen_in_cells(clues) else []
     for names in (["spectrum", *ranks], cells, ["rows"], ["columns"]):
         seen = ((name, clearest(clues, name)) for name in names)
         lines = ((name, *line) for name, line in seen if line is not None)
@@ -249,8 +248,8 @@ def _strongest(clues: Clues, kind: str) -> Iterator[tuple[str, str, Peak]]:
 
 def _seen_in_cells(clues: Clues) -> bool:
     """Return whether a pattern of few pixels stands out."""
-    label = f"spectral_peak of {FEW_PIXELS}"
-    return max(own.get(label, UNKNOWN)[0] for own in clues.seen.pooled.values()) > _CLEAR
+    pooled = clues.seen.pooled.values()
+    return max(own.get(periods.NUMBER, UNKNOWN)[0] for own in pooled) > _CLEAR
 
 
 def clearest(clues: Clues, kind: str) -> tuple[str, Peak] | None:

@@ -11,6 +11,7 @@ from dsis.compiled import inlined, kernel
 from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, Stage
 
 EXACT_BELOW_ELECTRONS = 64.0
+_MOST = 400.0  # electrons: none of a mean below that has so many
 
 
 class PoissonShotNoise(Effect):
@@ -40,12 +41,15 @@ class PoissonShotNoise(Effect):
     def reshape(self, deviates: Image, exposure: Exposure) -> Image:
         """Return (N - mean) / sqrt(mean) of a Poisson count of shot variance / m^2 electrons."""
         segments = exposure.read_out.segments
-        i = segments.index(exposure.expected_dn)
-        m = segments.slope_dn[i].astype(np.float64)
-        shot = np.maximum(m * exposure.expected_dn + np.minimum(segments.intercept_dn2[i], 0), 0)
-        electrons = np.divide(shot, m * m, out=np.zeros_like(shot), where=m > 0)
         out = np.empty_like(deviates, order="C")
-        _count(np.ascontiguousarray(deviates).reshape(-1), electrons.reshape(-1), out.reshape(-1))
+        _count(
+            np.ascontiguousarray(deviates).reshape(-1),
+            np.require(exposure.expected_dn, np.float32, ["C", "W"]).reshape(-1),
+            out.reshape(-1),
+            segments.lower_dn,
+            segments.slope_dn,
+            segments.intercept_dn2,
+        )
         return out
 
     def contributions(self, point: OperatingPoint) -> Mapping[str, float]:
@@ -59,7 +63,7 @@ def exact_quantile(probability: float, mean: float) -> float:
     """Return the smallest n whose Poisson distribution function reaches `probability`."""
     n, term = 0.0, math.exp(-mean)
     total = term
-    while total < probability and n < 400.0:
+    while total < probability and n < _MOST:
         n += 1.0
         term *= mean / n
         total += term
@@ -73,23 +77,100 @@ def expanded_quantile(z: float, mean: float) -> float:
     That sum has the cumulants mean, mean + 1/12, mean, mean - 1/120; rounding takes its uniform
     part away again, so that the moments are right to order mean^-3/2.
     """
+    sigma, g, k = _expansion(mean)
+    return _expanded(z, mean, sigma, g, k)
+
+
+@inlined
+def _expansion(mean: float) -> tuple[float, float, float]:
+    """Return standard deviation, skewness and excess kurtosis of that sum."""
     variance = mean + 1.0 / 12.0
     sigma = math.sqrt(variance)
-    g, k = mean / (variance * sigma), mean / (variance * variance)
+    return sigma, mean / (variance * sigma), mean / (variance * variance)
+
+
+@inlined
+def _expanded(z: float, mean: float, sigma: float, g: float, k: float) -> float:
     w = z + g * (z * z - 1) / 6 + k * (z * z - 3) * z / 24 - g * g * (2 * z * z - 5) * z / 36
     return float(np.rint(mean + sigma * w))
 
 
+@inlined
+def _from_table(probability: float, guess: float, table: NDArray[np.float64], count: int) -> float:
+    """Return the `exact_quantile` by the distribution function at 0 .. count - 1."""
+    n = min(max(int(guess), 0), count - 1)
+    while n < count and table[n] < probability:
+        n += 1
+    while n > 0 and table[n - 1] >= probability:
+        n -= 1
+    return float(n) if n < count else _MOST
+
+
+@inlined
+def _tabulate(mean: float, table: NDArray[np.float64]) -> int:
+    """Fill a table with the distribution function as far as it grows, and return how far that is.
+
+    Term by term as `exact_quantile` sums it.
+    """
+    n, term = 0, math.exp(-mean)
+    total = term
+    table[0] = total
+    while n < table.size - 1:
+        term *= mean / (n + 1.0)
+        if n > mean and total + term == total:
+            break
+        n += 1
+        total += term
+        table[n] = total
+    return n + 1
+
+
 @kernel
 def _count(
-    deviates: NDArray[np.float32], electrons: NDArray[np.float64], out: NDArray[np.float32]
+    deviates: NDArray[np.float32],
+    expected: NDArray[np.float32],
+    out: NDArray[np.float32],
+    lower: NDArray[np.float32],
+    slope: NDArray[np.float32],
+    intercept: NDArray[np.float32],
 ) -> None:
+    # Flat fields have one signal, or two by turns: what hangs on that alone is kept from pixel to
+    # pixel, and tables are made of what comes back.
+    signals = np.full(2, np.nan, np.float32)
+    means, roots = np.zeros(2), np.zeros(2)
+    sigmas, skews, kurtoses = np.zeros(2), np.zeros(2), np.zeros(2)
+    counts = np.zeros(2, np.int64)
+    tables = np.empty((2, int(_MOST) + 1))
+    last = 0
     for i in range(deviates.size):
-        mean, z = electrons[i], float(deviates[i])
+        own = last if expected[i] == signals[last] else 1 - last
+        known = expected[i] == signals[own]
+        last = own
+        if not known:
+            signals[own] = expected[i]
+            s = 0
+            while s + 1 < lower.size and lower[s + 1] <= expected[i]:
+                s += 1
+            m = np.float64(slope[s])
+            zero = np.float32(0)
+            shot = max(m * np.float64(expected[i]) + np.float64(min(intercept[s], zero)), 0.0)
+            means[own] = shot / (m * m) if m > 0 else 0.0
+            roots[own] = math.sqrt(means[own])
+            sigmas[own], skews[own], kurtoses[own] = _expansion(means[own])
+            counts[own] = 0
+        mean, z = means[own], float(deviates[i])
         if mean <= 0:
             out[i] = deviates[i]
-        elif mean < EXACT_BELOW_ELECTRONS:
-            n = exact_quantile(0.5 * math.erfc(-z / math.sqrt(2.0)), mean)
-            out[i] = np.float32((n - mean) / math.sqrt(mean))
+            continue
+        if mean < EXACT_BELOW_ELECTRONS:
+            probability = 0.5 * math.erfc(-z / math.sqrt(2.0))
+            if counts[own] == 0 and known:
+                counts[own] = _tabulate(mean, tables[own])
+            if counts[own]:
+                guess = mean + roots[own] * z
+                n = _from_table(probability, guess, tables[own], counts[own])
+            else:
+                n = exact_quantile(probability, mean)
         else:
-            out[i] = np.float32((expanded_quantile(z, mean) - mean) / math.sqrt(mean))
+            n = _expanded(z, mean, sigmas[own], skews[own], kurtoses[own])
+        out[i] = np.float32((n - mean) / roots[own])

@@ -150,11 +150,15 @@ def signals(levels: tuple[float, ...] = LEVELS) -> dict[str, Array]:
     return made | {"dark-0": np.zeros((2, 2)), "dark-1": np.zeros((2, 2))}
 
 
-def state_of(recording: InMemory, model: Camera) -> State:
-    """Return the state of a camera beside a recording."""
+def setting_of(recording: InMemory, *, nulls: int = 8) -> Setting:
+    """Return what stays the same of a recording; a draft is of eight simulations."""
     split, source = Split.of(recording), Source(recording)
     layout = layout_of(recording, split.development, source.frames)
     numbers = {e.name: e.numbers for e in layout.exposures}
     seen = observe(layout, lambda name: source.frames(name, numbers[name]))
-    setting = Setting(layout, seen, None, 1, 1, 8, 8, 2, 2, 2)
-    return State.of(setting, model, lambda: None)
+    return Setting(layout, seen, None, 1, 1, nulls, 8, 2, 2, 2)
+
+
+def state_of(recording: InMemory, model: Camera) -> State:
+    """Return the state of a camera beside a recording."""
+    return State.of(setting_of(recording), model, lambda: None)

@@ -5,12 +5,15 @@ Measured without dsis's own measures; tolerances are five standard errors.
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from scipy import stats
 
 from dsis.cfa import Cfa
 from dsis.draw import Draw
-from dsis.effects.poisson_shot_noise import exact_quantile, expanded_quantile
+from dsis.effects import Exposure, ReadOut
+from dsis.effects.poisson_shot_noise import PoissonShotNoise, exact_quantile, expanded_quantile
 from dsis.grid import PixelGrid
+from dsis.noise import Segments
 from exposing import P_MIN, Z_MAX, apply, camera, effect, flat, recorded
 
 MEANS = [0.02, 0.5, 3.0, 20.0, 63.9, 64.1, 300.0, 1e4]
@@ -32,6 +35,29 @@ def test_counts_are_poisson_quantiles(mean: float) -> None:
     wrong = float((weight * (found != oracle)).sum() / weight.sum())
     # Above: the error of the third-order expansion, 0.2 / mean, is the share of counts that differ.
     assert wrong <= (1e-6 if mean < 64 else 0.2 / np.sqrt(mean))
+
+
+@pytest.mark.parametrize("mean", MEANS)
+def test_a_count_hangs_on_its_own_pixel_alone(mean: float) -> None:
+    """Fields of one light, of two by turns, of many: pixel by pixel what a pixel alone counts."""
+    law = PoissonShotNoise()
+    rng = np.random.default_rng(5)
+    z = rng.standard_normal((16, 32)).astype(np.float32)
+    one = np.full(z.shape, 2 * mean, np.float32)
+    two, many = one.copy(), (one * rng.uniform(0.9, 1.1, z.shape)).astype(np.float32)
+    two[:, ::2] *= np.float32(1.5)
+    segments = Segments.of([(-np.inf, 2.0, 4.0), (4 * mean, 1.0, -0.01)])
+    for light in (one, two, many):
+        field = law.reshape(z, _exposed(light, segments))
+        alone = [law.reshape(z[[i]][:, [j]], _exposed(light[[i]][:, [j]], segments))
+                 for i, j in np.ndindex(z.shape)]  # fmt: skip
+        np.testing.assert_array_equal(field.ravel(), np.concatenate(alone).ravel())
+
+
+def _exposed(light: NDArray[np.float32], segments: Segments) -> Exposure:
+    grid = PixelGrid(*light.shape, Cfa.MONO)
+    read_out = ReadOut(Cfa.MONO, segments, 0.0, 4095.0)
+    return Exposure(grid, 0, Draw(1), Draw(2), light, read_out, lambda _: light)
 
 
 @pytest.mark.parametrize("electrons", [0.5, 5.0, 80.0, 2000.0])

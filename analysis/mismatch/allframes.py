@@ -34,7 +34,8 @@ def shown_by_all(search: Search, final: State, named: Named, without: Camera, tr
         return True
     if own.effect.kind in LINES:  # one number of the bank says less of them than frames do
         return False
-    state, bare = (State.of(search.whole, c, search.step) for c in (final.camera, without))
+    state = search.of_all(final.camera)
+    bare = State.of(search.whole, without, search.step, near=state)
     replicates = replicates_for(search.setting, [own.effect])
     return gained(state, bare, own.effect, replicates) - own.price >= SURE_GAIN
 

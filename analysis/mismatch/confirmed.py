@@ -44,7 +44,7 @@ def undenied_by_all(
     The last is the final state of all frames; None where nothing is named.
     """
     while search.named:
-        everything = State.of(whole.setting, final.camera, search.step)
+        everything = search.of_all(final.camera)
         denied = denied_by_rest(search, everything, whole)
         if denied is None:
             return final, gains, everything
@@ -140,7 +140,7 @@ def _foretold(search: Search, named: Named, without: Camera, trial: Trial, told:
     if any(same_place(effect, one, layout) for one in without.effect):
         return told
     if effect.kind in FIXED_LINES and search.whole is not None:
-        bare = State.of(search.whole, without, search.step)
+        bare = State.of(search.whole, without, search.step, near=search.of_whole)
         return trial.fixed_foretold(bare, effect) or told
     return trial.foretold(effect) or told
 

@@ -281,7 +281,7 @@ def _finding(
     known: Mapping[str, Array],
 ) -> Finding:
     """Return the finding; `known` are changes by effect asked for before all was settled."""
-    errors = parameter_errors(camera, final.calibrated, final.setting.layout, final.fits)
+    errors = parameter_errors(camera, final.calibrated, final.setting.layout, final.replicates.fits)
     errors += wrong_sizes(search.own)
     missing = [named for named in search.named if named.name not in known]
     more = changes(base, final, missing, partial(search.without, final))

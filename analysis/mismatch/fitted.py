@@ -48,8 +48,9 @@ class Fitted:
         The state that was fitted last.
     rough
         Whether a strong effect was taken in since.
-    whole
-        All frames of a small recording: they say whether anything differs.
+    whole, of_whole
+        All frames of a small recording: they say whether anything differs. The model of these that
+        was asked last.
     """
 
     setting: Setting
@@ -64,6 +65,7 @@ class Fitted:
     polished: State | None = None
     rough: bool = False
     whole: Setting | None = None
+    of_whole: State | None = None
 
     def settle(self, state: State) -> State:
         """Return the state with final parameters; their errors go into the effects named."""
@@ -79,6 +81,12 @@ class Fitted:
         self.own = [own for own in self.own if own.contradicted]
         self.camera = resized(self.camera, good)
         return State.of(self.setting, resized(camera, good), self.step, near=state)
+
+    def of_all(self, camera: Camera) -> State:
+        """Return the state of all frames of a small recording beside a camera."""
+        setting = self.whole or self.setting
+        self.of_whole = State.of(setting, camera, self.step, near=self.of_whole)
+        return self.of_whole
 
     def _parts(self, state: State) -> tuple[Camera, list[Proposal]]:
         """Return a state's camera without what is fitted, and that: own sizes, effects named."""
@@ -182,8 +190,7 @@ class Fitted:
                 break
         if state is before or self.named or self.whole is None:
             return state
-        whole = State.of(self.whole, self.camera, self.step)
-        return replace(state, mismatches=whole.mismatches)
+        return replace(state, mismatches=self.of_all(self.camera).mismatches)
 
     def _polished(self, state: State) -> State:
         """Fit the parameters of all effects together, and judge the result once more.

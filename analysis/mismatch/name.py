@@ -120,7 +120,7 @@ class Search(Fitted):
         if self.whole is None:
             return state
         asked = self.named or self.own  # else it was asked before
-        off = State.of(self.whole, state.camera, self.step) if asked else self.base
+        off = self.of_all(state.camera) if asked else self.base
         seen = replace(state, mismatches=off.mismatches)
         self.polished = seen if self.polished is state else self.polished
         self.asked = (seen, state)

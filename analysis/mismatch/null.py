@@ -76,13 +76,16 @@ class Null:
         return np.asarray(2 * scipy.stats.t.sf(np.abs(departures), self.degrees))
 
 
-def null_of(layout: Layout, simulated: Sequence[Vector], seen: Vector) -> Null:
+def null_of(
+    layout: Layout, simulated: Sequence[Vector], seen: Vector, unsure: Array | None = None
+) -> Null:
     """Return the null from simulated recordings.
 
     The closed-form errors are scaled, name by name, to the spread that the simulations show; each
     number's own spread counts by its degrees of freedom, and alone where spreads of a name differ
     as chance does not make them. Scores of the highest of many bins are
-    standard normal in white noise: so they are taken, unless the simulations deny it.
+    standard normal in white noise: so they are taken, unless the simulations deny it. `unsure`:
+    the square of what else leaves means unsure, if any.
     """
     values = np.stack([one.values for one in simulated])
     errors = np.stack([one.errors for one in simulated])
@@ -94,6 +97,8 @@ def null_of(layout: Layout, simulated: Sequence[Vector], seen: Vector) -> Null:
     scale, worth, tails = _by_name(seen.keys, own, known, count - 1)
     blended = tails**2 * (worth * scale + (count - 1) * own) / (worth + count - 1)
     sd = error * np.sqrt(np.maximum(blended, _LEAST_SCALE**2) * (1 + 1 / count))
+    if unsure is not None and unsure.size:
+        sd = np.sqrt(sd**2 + np.where(known, unsure, 0.0))
     normal = known & _normal(seen.keys, np.where(known, np.nan_to_num(values), 0.0))
     mean, sd = np.where(normal, 0.0, mean), np.where(normal, 1.0, sd)
     # How deep a comb of codes is hangs on the numbers of the camera: on electrons of several DN.

@@ -19,6 +19,7 @@ from analysis.mismatch.null import Null, null_of
 from analysis.mismatch.observe import Observation
 from analysis.mismatch.predict import Predictor, Reference
 from analysis.mismatch.recalibrate import Calibrated, calibrate
+from analysis.mismatch.replicates import Replicates, replicates, same_kinds
 from analysis.mismatch.simulations import Simulations
 from analysis.mismatch.touches import ALL_SUMS
 from analysis.mismatch.vector import Vector, vector
@@ -108,10 +109,8 @@ class State:
         The model.
     vector, null
         Recorded numbers, and their null.
-    simulated
-        Numbers of each simulated recording: (simulation, number).
-    fits
-        Base numbers fitted to each simulated recording: how far they scatter.
+    replicates
+        Numbers of simulated recordings.
     departures, chances
         z and adjusted chances of numbers and contrasts.
     mismatches
@@ -124,8 +123,7 @@ class State:
     calibrated: Calibrated
     vector: Vector
     null: Null
-    simulated: Array
-    fits: tuple[BaseFit, ...]
+    replicates: Replicates
     departures: Array
     chances: Array
     mismatches: tuple[Mismatch, ...]
@@ -148,15 +146,23 @@ class State:
         nulls = setting.drafts if draft else setting.nulls
         layout, seen = setting.layout, setting.seen
         calibrated = setting.calibrated(camera, None if near is None else near.calibrated)
-        vectors, fits = [], []
-        which = calibrated.model, layout, range(nulls), setting.seed, setting.jobs
         tell = partial(_refitted, layout, calibrated)
-        for fit, one in simulate(*which, tell, ALL_SUMS | calibrated.sums):
-            fits.append(fit)
-            vectors.append(one)
-            progress()
+
+        def made(which: range) -> list[tuple[BaseFit, Vector]]:
+            model, sums = calibrated.model, ALL_SUMS | calibrated.sums
+            found = []
+            for one in simulate(model, layout, which, setting.seed, setting.jobs, tell, sums):
+                found.append(one)
+                progress()
+            return found
+
+        alike = (
+            near is not None and near.setting.layout is layout and same_kinds(near.camera, camera)
+        )
+        kin = (near.replicates, near.null) if near is not None and alike else None
+        of_model = replicates(made, nulls, kin)
         own = vector(layout, seen, calibrated.residual)
-        null = null_of(layout, vectors, own)
+        null = null_of(layout, of_model.vectors, own, of_model.unsure)
         untold = unknown_combs(calibrated.model.camera, layout, own.keys)
         null = replace(null, known=null.known & ~untold)
         z, chances = tested(layout, null, own)
@@ -168,19 +174,24 @@ class State:
             setting.jobs,
             calibrated.sums,
         )
-        simulations.keep(calibrated.model.camera, [one.values for one in vectors])
+        known = [one.values for one in of_model.vectors[: of_model.own]]
+        simulations.keep(calibrated.model.camera, known)
         return cls(
             setting,
             calibrated,
             own,
             null,
-            np.stack([one.values for one in vectors]),
-            tuple(fits),
+            of_model,
             z,
             chances,
             located(layout, seen, null, z, chances),
             simulations,
         )
+
+    @property
+    def simulated(self) -> Array:
+        """Numbers of each simulated recording: (simulation, number)."""
+        return np.stack([one.values for one in self.replicates.vectors])
 
     @property
     def camera(self) -> Camera:

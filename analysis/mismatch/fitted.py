@@ -250,8 +250,9 @@ class Fitted:
         """
         if not self.own:
             return whole
-        whole = State.of(whole.setting, self.camera, self.step)
+        whole = State.of(whole.setting, self.camera, self.step, near=whole)
         large = self.base.setting.large
-        base = whole if large else State.of(self.base.setting, self.camera, self.step)
+        base = self.base
+        base = whole if large else State.of(base.setting, self.camera, self.step, near=base)
         self.base = replace(base, mismatches=whole.mismatches)
         return whole

@@ -1,8 +1,9 @@
 """Which frames train, which select, which stay locked until the proof.
 
 Frames are split by number in alternating blocks (train, select, train, locked), so that slow drift
-is in all parts. Exposures of fewer than six frames are given whole to one part; one flat level is
-left out of the re-calibration, so that the line's interpolation is tested.
+is in all parts. Exposures of fewer than six frames are given whole to one part; the brightest is
+not locked, for no other shows where a full well ends or what a long exposure gathers. One flat
+level is left out of the re-calibration, so that the line's interpolation is tested.
 """
 
 from collections.abc import Collection, Mapping
@@ -12,6 +13,8 @@ from dsis.recording import RecordedExposure, Recording
 
 LEAST_FRAMES = 6
 _BLOCKS = 16  # about so many blocks in a long exposure
+_ORDER = (0, 1, 0, 2)  # train, select, train, locked
+_LOCKED = 2
 _LEAST_LEVELS = 6  # flat levels from which one can be spared
 
 
@@ -69,16 +72,24 @@ class Split:
             few = [
                 e for e in recording.exposures if e.kind == kind and len(e.frames) < LEAST_FRAMES
             ]
-            for place, exposure in enumerate(sorted(few, key=_brightness)):
-                whole = (0, 1, 0, 2)[place % 4]
-                parts[whole][exposure.name] = tuple(range(len(exposure.frames)))
+            given = _whole(len(few))
+            for part, exposure in zip(given, sorted(few, key=_brightness), strict=True):
+                parts[part][exposure.name] = tuple(range(len(exposure.frames)))
         return cls(parts[0], parts[1], parts[2], _spared(recording))
 
 
 def _blocks(frames: int) -> tuple[tuple[int, ...], ...]:
     length = max(frames // _BLOCKS, 1)
-    part = [(0, 1, 0, 2)[(number // length) % 4] for number in range(frames)]
+    part = [_ORDER[(number // length) % 4] for number in range(frames)]
     return tuple(tuple(i for i, p in enumerate(part) if p == which) for which in range(3))
+
+
+def _whole(count: int) -> list[int]:
+    """Return the parts that exposures are given to, the darkest first."""
+    found = [_ORDER[place % 4] for place in range(count)]
+    if found[-1:] == [_LOCKED]:
+        found[-2:] = found[:-3:-1]
+    return found
 
 
 def _brightness(exposure: RecordedExposure) -> tuple[float, float, str]:

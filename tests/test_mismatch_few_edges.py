@@ -45,5 +45,31 @@ def test_a_field_goes_on_inside(seed: int, edge: float) -> None:
     assert of_outermost_lines(_state(*maps), Prnu(sigma_percent=0.05)) is None
 
 
+def _handed(image: NDArray[np.float64], share: float) -> NDArray[np.float64]:
+    sides = sum(np.roll(image, step, axis) for step in (-1, 1) for axis in (0, 1))
+    return np.asarray((1 - 4 * share) * image + share * sides)
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("length", [3.0, 5.0])
+def test_pixels_inside_show_a_field_beside_lines_at_an_edge(seed: int, length: float) -> None:
+    """A short field hardly shows in surfaces, which a darker edge pulls along."""
+    rng = np.random.default_rng(40 + seed)
+    maps = []
+    for k in range(4):
+        field = gaussian_filter(rng.standard_normal((48, 64)), length / 2, mode="wrap")
+        maps.append(_map(4 * seed + k, edge=1.2) + 0.3 * NOISE * field / field.std())
+    assert of_outermost_lines(_state(*maps), FIELD) is None
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_what_neighbours_hand_on_is_no_field(seed: int) -> None:
+    """Of a sensor without colours: of a mosaic they have other colours."""
+    handed = _handed(_map(seed), 0.04)
+    handed[0] += 1.2 * NOISE
+    handed[:, -1] -= 1.2 * NOISE
+    assert of_outermost_lines(_state(handed), FIELD) is not None
+
+
 def test_nothing_is_denied_where_nothing_is_smooth() -> None:
     assert of_outermost_lines(_state(), FIELD) is None

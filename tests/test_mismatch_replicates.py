@@ -55,7 +55,7 @@ def near(beside: Beside) -> State:
 
 
 def test_a_fourth_of_the_recordings_tells_what_all_tell(beside: Beside, near: State) -> None:
-    """Departures are those of as many of its own: two sets of them are 0.35 apart, root mean square.
+    """Departures are those of as many of its own: two such sets are 0.35 apart, in rms.
 
     Sizes move by 3 %: means of touched numbers by half a standard deviation and more.
     """

@@ -111,8 +111,7 @@ class CodeCounts:
         self.whole = self.whole and whole and low >= LOWEST_CODE and high < LOWEST_CODE + CODES
         if self.whole:
             self._make_room(low, high)
-            for frame in frames:
-                count_codes(frame, self.counts, self.lowest)
+            count_codes(frames, self.counts, self.lowest)
 
     def of(self, phases: tuple[tuple[int, int], ...]) -> "Codes | None":
         """Return the histogram of some phases; None where frames held other values."""

@@ -17,11 +17,6 @@ Sums = NDArray[np.float64]
 FiveSums = tuple[Sums, Sums, Sums, Sums, Sums]
 
 
-def count_codes(frame: Frame, histogram: NDArray[np.int64], lowest: int) -> None:
-    """Add whole codes, all within it, to `histogram` (row parity, column parity, code - lowest)."""
-    _count_codes(frame, histogram, lowest)
-
-
 def add_moments(
     difference: Frame,
     row_offset: Sums,
@@ -83,23 +78,6 @@ def offsets(by_row: Sums, by_column: Sums, single: bool) -> tuple[Sums, Sums, Su
     return by_row / across, of_columns, means
 
 
-def offsets_of_all(by_row: Sums, by_column: Sums, single: bool) -> tuple[Sums, Sums, Sums]:
-    """Return the same as `offsets` of all frames, from and by (frame, ..)."""
-    frames, rows, columns = by_row.shape[0], by_row.shape[1], by_column.shape[2]
-    if single:
-        by_line = by_row[:, :, 0] + by_row[:, :, 1]
-        mean = by_line.sum(1) / (rows * columns)
-        of_rows, of_columns = np.empty((frames, rows, 2)), np.empty((frames, 2, columns))
-        of_rows[:] = (by_line / columns)[:, :, np.newaxis]
-        whole = (by_column[:, 0] + by_column[:, 1]) / rows - mean[:, np.newaxis]
-        of_columns[:] = whole[:, np.newaxis]
-        return of_rows, of_columns, np.tile(mean[:, np.newaxis, np.newaxis], (1, 2, 2))
-    down, across, pixels, parity = _of_parity(rows, columns)
-    means = np.stack([by_row[:, 0::2].sum(1), by_row[:, 1::2].sum(1)], 1) / pixels
-    of_columns = by_column / down - means[:, :, parity]
-    return by_row / across, of_columns, means
-
-
 @lru_cache(maxsize=32)
 def _of_parity(rows: int, columns: int) -> tuple[NDArray[np.int_], ...]:
     """Return how many rows (2, 1), columns (2,) and pixels (2, 2) are even and odd; of each column.
@@ -110,13 +88,9 @@ def _of_parity(rows: int, columns: int) -> tuple[NDArray[np.int_], ...]:
     return down[:, np.newaxis], across, np.outer(down, across), np.arange(columns) & 1
 
 
+@kernel
 def split(image: Frame, places: NDArray[np.int64], means: Sums, out: Frame) -> None:
     """Write planes less their means: (plane, row, column); `places`: first row, column and step."""
-    _split(image, places, means, out)
-
-
-@kernel
-def _split(image: Frame, places: NDArray[np.int64], means: Sums, out: Frame) -> None:
     for k in range(len(places)):
         y0, x0, step = places[k]
         mean = np.float32(means[y0, x0])
@@ -128,6 +102,13 @@ def _split(image: Frame, places: NDArray[np.int64], means: Sums, out: Frame) -> 
             else:
                 for x in range(into.size):
                     into[x] = line[x0 + 2 * x] - mean
+
+
+@kernel
+def count_codes(frames: Frame, histogram: NDArray[np.int64], lowest: int) -> None:
+    """Add whole codes, all within it, to `histogram` (row parity, column parity, code - lowest)."""
+    for frame in frames:
+        _count_codes(frame, histogram, lowest)
 
 
 @kernel
@@ -201,7 +182,7 @@ def _centre(
 
 
 @kernel
-def add_power(transform: NDArray[np.complex64], power: Sums) -> None:
+def add_power(transform: NDArray[np.complexfloating], power: Sums) -> None:
     """Add |transform|^2 to `power`: (plane, row, column) both."""
     planes, rows, columns = transform.shape
     for k in range(planes):

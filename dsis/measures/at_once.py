@@ -14,7 +14,7 @@ import scipy.fft
 from numpy.typing import NDArray
 
 from dsis.cfa import Cfa
-from dsis.measures import kernels
+from dsis.measures import all_frames
 from dsis.measures.first_pass import passes
 from dsis.measures.kernels import Sums
 from dsis.measures.lag_products import lag_products_of_all
@@ -37,7 +37,7 @@ def take_all(sums: Accumulator, frames: Frames) -> None:
             message = f"frame {number} holds values that are not finite (NaN or infinite)"
             raise ValueError(message)
     sums.codes.add_all(frames, whole=bool(found.whole.all()), low=found.lowest, high=found.highest)
-    row_offsets, column_offsets, means = kernels.offsets_of_all(
+    row_offsets, column_offsets, means = all_frames.offsets_of_all(
         found.by_row, found.by_column, sums.cfa is Cfa.MONO
     )
     sums.first, sums.frames = frames[0], len(frames)
@@ -48,16 +48,8 @@ def take_all(sums: Accumulator, frames: Frames) -> None:
         for of_frame in zip(*spectra, strict=True):
             for transforms in of_frame:
                 sums.spectra(transforms)
-    centred = np.empty_like(frames)
-    centred[0] = 0
-    for number in range(1, len(frames)):
-        offsets = row_offsets[number], column_offsets[number]
-        own = differences[number], *offsets
-        if number == 1:
-            kernels.centre(*own, centred[1], 1)
-            continue
-        sums.moments = sums.moments or kernels.started(centred[1])
-        kernels.add_moments(*own, centred[number - 1], centred[number], sums.moments, 1)
+    centred, moments = all_frames.moments_of_all(differences, row_offsets, column_offsets)
+    sums.moments = moments if len(frames) > 2 else None  # of two the second's residual says it all
     sums.centred, sums.centred_before = centred[-1], centred[0]
     sums.before, sums.difference = differences[-1], differences[0]  # should more frames come
     if sums.neighbours:
@@ -70,12 +62,10 @@ def _taken_planes(
     """Take the planes of one size, surfaces and power; return the transforms of each frame."""
     sheet.start()
     images = np.empty((len(differences) - 1, *sheet.images.shape), np.float32)
-    for number, image in enumerate(images, 1):
-        kernels.split(differences[number], sheet.places, means[number], image)
+    all_frames.split_all(differences[1:], sheet.places, means[1:], images)
     sheet.surfaces += list(sheet.planes[0].smooth.coefficients(images))
     if not sums.power:
         return []
-    found = list(scipy.fft.rfft2(images))
-    for transforms in found:
-        kernels.add_power(transforms, sheet.power)
-    return found
+    found = scipy.fft.rfft2(images)
+    all_frames.add_powers(found, sheet.power)
+    return list(found)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from dsis.compiled import kernel
 from dsis.measures.estimate import Estimate, estimate, unknown
 from dsis.measures.lag_products import half_plane
+from dsis.measures.pairwise import summed
 
 Array = NDArray[np.float64]
 Phases = tuple[tuple[int, int], ...]
@@ -24,11 +25,12 @@ Phases = tuple[tuple[int, int], ...]
 class LagTable:
     """Products and numbers of pairs: (row parity, column parity, 2 L + 1, 2 L + 1), centre lag 0.
 
-    Parities are those of the first pixel of a pair.
+    Parities are those of the first pixel of a pair; `all_pairs` (2 L + 1, 2 L + 1) are of any.
     """
 
     products: Array
     pairs: Array
+    all_pairs: Array
 
     @classmethod
     def of(cls, reach: int, sums: Array, shape: tuple[int, ...]) -> "LagTable":
@@ -40,15 +42,7 @@ class LagTable:
         products = np.empty(4 * size * size)
         here, there = _entries(reach)
         products[here] = products[there] = sums.reshape(-1)
-        return cls(products.reshape(2, 2, size, size), _pairs(reach, *shape))
-
-    def of_channel(self, phases: Phases) -> tuple[Array, Array]:
-        """Return mean products (2 L + 1, 2 L + 1) and pairs of a channel's pixels."""
-        if len(phases) == 1:
-            pairs, products = self.pairs[phases[0]], self.products[phases[0]]
-        else:
-            pairs, products = self.pairs.sum((0, 1)), self.products.sum((0, 1))
-        return products / np.maximum(pairs, 1), pairs
+        return cls(products.reshape(2, 2, size, size), *_pairs(reach, *shape))
 
 
 @dataclass(frozen=True)
@@ -86,38 +80,29 @@ class Autocorrelation:
 
     def inflation(self) -> float:
         """Return the sum of rho^2 over lags less what their errors add; at least 1."""
-        beyond = self.values**2 - 1 / np.maximum(self.pairs * self.degrees, 1)
-        counted = self.pairs > 0
-        counted[counted.shape[0] // 2, counted.shape[1] // 2] = False
-        total = 1 + float(beyond[counted].sum())
+        total = 1 + _beyond_errors(self.values, self.pairs, self.degrees)
         return total if total > 1 else 1.0  # 1 also where there is no noise at all
 
     def less(self, temporal: "Autocorrelation", frames: int) -> "Autocorrelation":
         """Return that of a fixed pattern: of a mean frame, less what temporal noise leaves."""
-        centre = self.values.shape[0] // 2
-        with np.errstate(divide="ignore", invalid="ignore"):  # no noise: undefined, and said so
-            left = temporal.covariance / frames / self.scale
-        share = float(left[centre, centre])
-        values = self.values - left
+        own = self.values, self.scale
+        values, share = _less(*own, temporal.values, temporal.scale, frames)
         return Autocorrelation(values, self.pairs, self.scale, 1, self.values, share, frames)
 
     def at(self, lags: Mapping[str, tuple[int, int]]) -> dict[str, Estimate]:
         """Return the correlation at some lags (dy, dx) by name; error by Bartlett's formula."""
+        told = _bartlett(self.observed, self.pairs, self.degrees, _array(*lags.values()))
         centre = self.values.shape[0] // 2
-        wanted = np.array(list(lags.values()), np.int64).reshape(-1, 2)
-        scatters, known = np.empty(len(wanted)), np.empty(self.values.shape)
-        wide = np.zeros((len(known) + 4 * centre, len(known) + 4 * centre))
-        _bartlett(self.observed, self.pairs, self.degrees, wanted, known, wide, scatters)
         # What temporal noise leaves is estimated from T - 1 frames and taken off: its noise again.
         again = 1 / (self.frames - 1)
         null = 1 + (again if self.left else 0.0)
         found = {}
-        for (name, (dy, dx)), scatter in zip(lags.items(), scatters.tolist(), strict=True):
+        for (name, (dy, dx)), scatter in zip(lags.items(), told.tolist(), strict=True):
             here = (centre + dy, centre + dx)
-            count = float(self.pairs[here]) * self.degrees
+            count = self.pairs.item(here) * self.degrees
             error = max(scatter, 0.1) * (1 + self.left**2 * again)
             found[name] = (
-                estimate(float(self.values[here]), error / count, 0.0, null / count)
+                estimate(self.values.item(here), error / count, 0.0, null / count)
                 if count >= 1
                 else unknown(0.0)
             )
@@ -149,84 +134,119 @@ def autocorrelation(
     lost
         Smooth surfaces taken off besides rows and columns.
     """
-    products, pairs = table.of_channel(phases)
     step = 1 if len(phases) > 1 else 2
-    work = np.zeros((4, *products.shape))
-    _correlate(products, pairs, variances, phases[0], degrees, (*shape, step, lost), work)
-    values, scale, _, _ = work
-    return Autocorrelation(values, pairs, scale, degrees, values)
+    pairs = table.pairs[phases[0]] if step == 2 else table.all_pairs
+    size = (*shape, step, lost)
+    work = _correlate(table.products, pairs, variances, phases[0], degrees, size)
+    return Autocorrelation(work[0], pairs, work[1], degrees, work[0])
 
 
 @kernel
 def _correlate(  # noqa: C901, PLR0912 - one loop nest, compiled as one
-    products: Array,
+    table: Array,
     pairs: Array,
     variances: Array,
     phase: tuple[int, int],
     degrees: int,
     size: tuple[int, int, int, int],
-    work: Array,
-) -> None:
-    """Write the correlation, nan without pairs, and the product of standard deviations.
+) -> Array:
+    """Return the correlation, nan without pairs, and the product of standard deviations.
 
-    They are work[0] and work[1] of zeros (4, lag, lag). White noise first, then the lags that stand
-    out, in four rounds: converges as 1/columns. Means that were taken off cost each lag the sum of
-    its row's lags over m, for a pixel's row mean holds 1/m of every pixel of the partner's channel
-    in that row; likewise columns, and both means hold the frame's.
+    They are the first two of (4, lag, lag). White noise first, then the lags that stand out, in
+    four rounds: converges as 1/columns. Means that were taken off cost each lag the sum of its
+    row's lags over m, for a pixel's row mean holds 1/m of every pixel of the partner's channel in
+    that row; likewise columns, and both means hold the frame's.
     """
-    lags = products.shape[0]
+    lags = pairs.shape[0]
     centre = lags // 2
     n, m, step, lost = size
     y, x = phase
-    values, scale, rho, rows = work[0], work[1], work[2], work[3]
+    work = np.zeros((4, lags, lags))
+    values, scale, rho, least = work[0], work[1], work[2], work[3]
+    products = np.empty((lags, lags))
+    rows, columns, both = np.empty((lags, step)), np.empty((step, lags)), np.empty((step, step))
     for i in range(lags):
         for j in range(lags):
             partner = variances[(y + i - centre) & 1, (x + j - centre) & 1]
             scale[i, j] = np.sqrt(variances[y, x] * partner)
+            product = table[y, x, i, j]
+            if step == 1:  # all phases are one channel
+                product = product + table[0, 1, i, j] + table[1, 0, i, j] + table[1, 1, i, j]
+            products[i, j] = product / max(pairs[i, j], 1.0) / degrees / scale[i, j]
+            # Lags within their own error would only add noise.
+            least[i, j] = 3 / np.sqrt(pairs[i, j] * degrees)
     rho[centre, centre] = 1.0
     for _ in range(4):
+        for p in range(step):
+            for i in range(lags):
+                rows[i, p] = 0.0
+                for k in range(p, lags, step):
+                    rows[i, p] += rho[i, k] / m
+            for j in range(lags):
+                columns[p, j] = 0.0
+                for k in range(p, lags, step):
+                    columns[p, j] += rho[k, j]
+        for p in range(step):
+            for q in range(step):
+                both[p, q] = 0.0
+                for k in range(p, lags, step):
+                    both[p, q] += rows[k, q]
         for i in range(lags):
             for j in range(lags):
-                rows[i, j] = 0.0
-                for k in range(j % step, lags, step):
-                    rows[i, j] += rho[i, k] / m
-        for i in range(lags):
-            for j in range(lags):
-                column, both = 0.0, 0.0
-                for k in range(i % step, lags, step):
-                    column += rho[k, j]
-                    both += rows[k, j]
-                off = rows[i, j] + column / n - both * (1 - lost) / n
-                values[i, j] = off + products[i, j] / degrees / scale[i, j]
-        for i in range(lags):
-            for j in range(lags):
-                # Lags within their own error would only add noise.
-                clear = abs(values[i, j]) > 3 / np.sqrt(pairs[i, j] * degrees)
-                rho[i, j] = values[i, j] if clear else 0.0
-        values[centre, centre] = products[centre, centre] / degrees / scale[centre, centre]
+                p, q = i % step, j % step
+                off = rows[i, q] + columns[p, j] / n - both[p, q] * (1 - lost) / n
+                values[i, j] = off + products[i, j]
+                rho[i, j] = values[i, j] if abs(values[i, j]) > least[i, j] else 0.0
+        values[centre, centre] = products[centre, centre]
         rho[centre, centre] = 1.0
     for i in range(lags):
         for j in range(lags):
             if not pairs[i, j] > 0:
                 values[i, j] = np.nan
+    return work
 
 
 @kernel
-def _bartlett(
-    observed: Array,
-    pairs: Array,
-    degrees: int,
-    lags: NDArray[np.int64],
-    known: Array,
-    wide: Array,
-    found: Array,
-) -> None:
-    """Write n var(rho) of a linear process at lags (lag, 2), from those known (Bartlett 1946).
+def _beyond_errors(values: Array, pairs: Array, degrees: int) -> float:
+    """Return the sum of squares of correlations less what their errors add, centre left out."""
+    lags = values.shape[0]
+    beyond, counted = np.empty(lags * lags), 0
+    for i in range(lags):
+        for j in range(lags):
+            if pairs[i, j] > 0 and (i != lags // 2 or j != lags // 2):
+                beyond[counted] = values[i, j] * values[i, j] - 1 / max(pairs[i, j] * degrees, 1.0)
+                counted += 1
+    return summed(beyond[:counted])
 
-    `wide`, zeros, has a margin of two centres: the formula looks one lag ahead, and one behind.
+
+@kernel
+def _less(
+    values: Array, scale: Array, temporal: Array, temporal_scale: Array, frames: int
+) -> tuple[Array, float]:
+    """Return correlations less what temporal noise leaves in a mean of frames, and its share.
+
+    The share is that of the variance; nan where there is no noise.
+    """
+    lags = values.shape[0]
+    found, share = np.empty((lags, lags)), 0.0
+    for i in range(lags):
+        for j in range(lags):
+            left = temporal[i, j] * temporal_scale[i, j] / frames / scale[i, j]
+            found[i, j] = values[i, j] - left
+            if i == lags // 2 and j == lags // 2:
+                share = left
+    return found, share
+
+
+@kernel
+def _bartlett(observed: Array, pairs: Array, degrees: int, lags: NDArray[np.int64]) -> Array:
+    """Return n var(rho) of a linear process at lags (lag, 2), from those known (Bartlett 1946).
+
+    What is known gets a margin of two centres: the formula looks one lag ahead, and one behind.
     """
     size = observed.shape[0]
     centre = size // 2
+    known, wide = np.empty((size, size)), np.zeros((size + 4 * centre, size + 4 * centre))
     for i in range(size):
         for j in range(size):
             known[i, j] = observed[i, j] if pairs[i, j] > 0 else 0.0
@@ -235,7 +255,8 @@ def _bartlett(
             # Lags within their own error would only add noise: 80 lags of it.
             if abs(known[i, j]) > 3 / np.sqrt(pairs[i, j] * degrees):
                 wide[2 * centre + i, 2 * centre + j] = known[i, j]
-    for k in range(lags.shape[0]):
+    found = np.empty(len(lags))
+    for k in range(len(lags)):
         dy, dx = lags[k, 0], lags[k, 1]
         h = known[centre + dy, centre + dx]
         total = 0.0
@@ -244,6 +265,13 @@ def _bartlett(
                 w, ahead, behind = wide[i, j], wide[i + dy, j + dx], wide[i - dy, j - dx]
                 total += w * w + ahead * behind - 4 * h * w * behind + 2 * h * h * (w * w)
         found[k] = total
+    return found
+
+
+@lru_cache(maxsize=64)
+def _array(*lags: tuple[int, int]) -> NDArray[np.int64]:
+    """Return lags as an array (lag, 2)."""
+    return np.array(lags, np.int64).reshape(-1, 2)
 
 
 @lru_cache(maxsize=16)
@@ -259,8 +287,8 @@ def _entries(reach: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
 
 
 @lru_cache(maxsize=16)
-def _pairs(reach: int, rows: int, columns: int) -> Array:
-    """Return the number of pairs at each lag by the phase of their first pixel."""
+def _pairs(reach: int, rows: int, columns: int) -> tuple[Array, Array]:
+    """Return the number of pairs at each lag by the phase of their first pixel, and of all."""
     lag = range(-reach, reach + 1)
     down, across = (
         np.array(
@@ -272,4 +300,4 @@ def _pairs(reach: int, rows: int, columns: int) -> Array:
         for n in (rows, columns)
     )
     pairs: Array = (down[:, None, :, None] * across[None, :, None, :]).astype(np.float64)
-    return pairs
+    return pairs, pairs.sum((0, 1))

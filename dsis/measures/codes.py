@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from dsis.kept import Kept
 from dsis.measures.estimate import Estimate, estimate, unknown
+from dsis.measures.histogram import Histogram, histogram, limits, squared
 from dsis.measures.kernels import count_codes
 from dsis.measures.spikes import variance_of_quartiles, without_spikes
 
@@ -110,8 +111,7 @@ class CodeCounts:
         self.whole = self.whole and whole and low >= LOWEST_CODE and high < LOWEST_CODE + CODES
         if self.whole:
             self._make_room(low, high)
-            for frame in frames:
-                count_codes(frame, self.counts, self.lowest)
+            count_codes(frames, self.counts, self.lowest)
 
     def of(self, phases: tuple[tuple[int, int], ...]) -> "Codes | None":
         """Return the histogram of some phases; None where frames held other values."""
@@ -152,21 +152,23 @@ class Codes:
     @classmethod
     def of(cls, lowest: int, counts: NDArray[np.int64]) -> "Codes":
         """Return the histogram without the empty ends."""
-        used = np.flatnonzero(counts)
-        return cls(lowest + int(used[0]), counts[used[0] : used[-1] + 1].copy())
+        first, last = limits(counts)
+        return cls(lowest + first, counts[first : last + 1].copy())
 
-    @cached_property
+    @property
     def total(self) -> int:
         """Samples."""
-        return int(self.counts.sum())
+        return self._shown.total
 
     def share_at_most(self, code: float) -> float:
         """Return the share of samples at or below a code."""
-        return float(self.counts[: max(int(code) - self.lowest + 1, 0)].sum() / self.total)
+        places = int(code) - self.lowest + 1
+        return float(self.counts[:places].sum() / self.total) if places > 0 else 0.0
 
     def share_at_least(self, code: float) -> float:
         """Return the share of samples at or above a code."""
-        return float(self.counts[max(int(code) - self.lowest, 0) :].sum() / self.total)
+        place = max(int(code) - self.lowest, 0)
+        return float(self.counts[place:].sum() / self.total) if place < self.counts.size else 0.0
 
     def ends(self, lowest: float, highest: float) -> tuple[float, float]:
         """Return the first and the last code that a converter of these ends can give, DN.
@@ -174,7 +176,7 @@ class Codes:
         Those of its steps, which need not reach either end; of few codes steps are not known.
         """
         own = self.lattice
-        if own is None or own.step <= 1 or self._inner.size < _LEAST_CODES:
+        if own is None or own.step <= 1 or self._shown.used < _LEAST_CODES:
             return lowest, highest
         first = lowest + (own.code - lowest) % own.step
         return first, highest - (highest - own.code) % own.step
@@ -185,15 +187,17 @@ class Codes:
         Exact; its error is the chance that all codes seen lie on twice the true step. The ends may
         be clipped off the lattice and are left out where something lies between them.
         """
-        return self._spacing
+        used, step = self._shown.used, self._shown.step
+        if used < 2:
+            return unknown(1.0)
+        chance = (step * 2.0 ** (-min(used, 80) / 2)) ** 2
+        return estimate(step, chance, 1.0, chance)
 
     @cached_property
     def lattice(self) -> Lattice | None:
         """Where the codes lie that `spacing` looks at; None: there is none."""
-        used = self._inner
-        if not used.size:
-            return None
-        return Lattice(self.lowest + int(used[0]), int(np.gcd.reduce(np.diff(used))))
+        shown = self._shown
+        return Lattice(self.lowest + shown.first, shown.step) if shown.used else None
 
     @property
     def middle(self) -> Middle | None:
@@ -231,21 +235,6 @@ class Codes:
         counts = self.counts[used[inside]]
         return float(around[inside] @ counts / counts.sum())
 
-    @cached_property
-    def _inner(self) -> NDArray[np.intp]:
-        """Places of the codes that occur, without ends that may be clipped off the lattice."""
-        used = np.flatnonzero(self.counts)
-        return used[1:-1] if self._clipped else used
-
-    @cached_property
-    def _spacing(self) -> Estimate:
-        used = self._inner
-        if used.size < 2 or self.lattice is None:
-            return unknown(1.0)
-        step = self.lattice.step
-        chance = (step * 2.0 ** (-min(used.size, 80) / 2)) ** 2
-        return estimate(step, chance, 1.0, chance)
-
     def imbalance(self, variance_dn2: float) -> Estimate:
         """Return the rms relative deviation of code widths, sign of its square kept.
 
@@ -258,20 +247,23 @@ class Codes:
         band begins up to 3 %, or a bin, above the frequency from which noise leaves nothing: so few
         bands serve many histograms, and none of them lets in more of the smooth density.
         """
-        step = self.spacing().value
-        variance_dn2 = without_spikes(variance_dn2, self._middle_dn2)
-        sigma = variance_dn2**0.5 / step if variance_dn2 >= 0 else nan
-        if not sigma >= LEAST_SIGMA_STEPS or self._clipped:
+        shown = self._shown
+        middle_dn2 = variance_of_quartiles(shown.low, shown.high)
+        variance_dn2 = without_spikes(variance_dn2, middle_dn2)
+        if shown.clipped or shown.used < 2 or not variance_dn2 >= 0:
             return unknown(0.0)
-        counts = self.counts[:: int(step)].astype(np.float64)
+        sigma = variance_dn2**0.5 / shown.step
+        if sigma < LEAST_SIGMA_STEPS:
+            return unknown(0.0)
+        counts = self.counts[:: shown.step].astype(np.float64)
         size, mean_of, pairs_of = _band_of(counts.size, sigma)
         power = _power(counts, size)
-        total, squares = float(counts.sum()), float(counts @ counts - counts.sum())
-        excess = (float(mean_of @ power) - total) / squares
-        null = error = float(pairs_of @ power) / squares**2
+        total, squares = shown.total, shown.squares - shown.total
+        excess = (float(mean_of.dot(power)) - total) / squares
+        null = error = float(pairs_of.dot(power)) / squares**2
         if excess > 0:
             raised = _power(counts + excess * counts**2, size)
-            error = float(pairs_of @ raised) / squares**2
+            error = float(pairs_of.dot(raised)) / squares**2
         mean, variance = _signed_root(2 * (total / squares) ** 2 / null)
         # Far above the noise the root's error is that of its square over 2 rms.
         clear = max(excess - 2 * error**0.5, 0.0)
@@ -283,17 +275,8 @@ class Codes:
         )
 
     @cached_property
-    def _middle_dn2(self) -> float:
-        """The variance of a normal law with the quartiles of the histogram."""
-        below = (np.cumsum(self.counts) - self.counts / 2) / self.total
-        low, high = np.interp((0.25, 0.75), below, np.arange(self.counts.size))
-        return variance_of_quartiles(float(low), float(high))
-
-    @cached_property
-    def _clipped(self) -> bool:
-        """Whether the ends hold more than the tail of a smooth density would."""
-        few = 5 + 0.1 * self.total**0.5
-        return bool(max(self.counts[0], self.counts[-1]) > few)
+    def _shown(self) -> Histogram:
+        return histogram(self.counts)
 
 
 def _band_of(codes: int, sigma: float) -> tuple[int, NDArray[np.float64], NDArray[np.float64]]:
@@ -301,11 +284,17 @@ def _band_of(codes: int, sigma: float) -> tuple[int, NDArray[np.float64], NDArra
 
     The size of the transform; `_band`. Size and first bin are rounded up: see `Codes.imbalance`.
     """
-    size = scipy.fft.next_fast_len(_coarse(2 * codes), real=True)
+    size = _size_of(codes)
     edge = (-math.log(_LEAK) / (4 * math.pi**2)) ** 0.5 / sigma
     first = _coarse(edge * size)
     mean, pairs = _BANDS.of((size, first), partial(_band, size, first))
     return size, mean, pairs
+
+
+@lru_cache(maxsize=4096)
+def _size_of(codes: int) -> int:
+    """Return the size of a transform that holds so many codes, and as many zeros."""
+    return int(scipy.fft.next_fast_len(_coarse(2 * codes), real=True))
 
 
 def _coarse(number: float) -> int:
@@ -333,9 +322,7 @@ def _band(size: int, first: int) -> NDArray[np.float64]:
 
 def _power(counts: NDArray[np.float64], size: int) -> NDArray[np.float64]:
     """Return the power of counts in each bin of a half spectrum."""
-    transform = np.asarray(scipy.fft.rfft(counts, size), np.complex128)
-    power: NDArray[np.float64] = transform.real**2 + transform.imag**2
-    return power
+    return squared(np.fft.rfft(counts, size))  # scipy takes longer to begin
 
 
 def _signed_root(dof: float) -> tuple[float, float]:

@@ -1,11 +1,10 @@
 """A measured value with its errors."""
 
-from dataclasses import dataclass
 from math import inf, isfinite, nan
+from typing import NamedTuple
 
 
-@dataclass(frozen=True)
-class Estimate:
+class Estimate(NamedTuple):
     """A measured value, its standard error, and what the base model alone would give.
 
     Two errors are needed, for an error taken from the data grows with what it should detect: with T
@@ -50,6 +49,5 @@ def estimate(value: float, variance: float, null_value: float, null_variance: fl
     """Return an estimate from variances; unknown where one of the numbers is not finite."""
     if not (isfinite(value) and isfinite(variance) and isfinite(null_variance)):
         return unknown(null_value)
-    return Estimate(
-        float(value), max(float(variance), 0.0) ** 0.5, null_value, float(null_variance) ** 0.5
-    )
+    error = float(variance) ** 0.5 if variance > 0 else 0.0
+    return Estimate(float(value), error, null_value, float(null_variance) ** 0.5)

@@ -82,13 +82,7 @@ def passes(frames: Frame) -> tuple[Frame, AllPassed]:
     by_row, by_column = np.zeros((count, rows, 2)), np.zeros((count, blocks, 2, columns))
     squares, limits = np.zeros((count, blocks, 2, 2)), np.zeros((count, blocks, 3), np.int64)
     limits[:, :, 1], limits[:, :, 2] = _FAR, -_FAR
-    lines = np.zeros((3, columns))
-    _limits(frames[0], limits[0, 0])
-    for i in range(1, count):
-        _first_pass(
-            frames[i], frames[0], differences[i - 1], differences[i], 0, rows, by_row[i],
-            by_column[i], squares[i], limits[i], lines,
-        )  # fmt: skip
+    _passes(frames, differences, by_row, by_column, squares, limits)
     return differences, AllPassed(
         by_row,
         by_column.sum(1),
@@ -113,6 +107,26 @@ def no_change(frame: Frame) -> Passed:
 def _limits(frame: Frame, limits: NDArray[np.int64]) -> None:
     for y in range(frame.shape[0]):
         _take_limits(frame[y], limits)
+
+
+@kernel
+def _passes(
+    frames: Frame,
+    differences: Frame,
+    by_row: Sums,
+    by_column: Sums,
+    squares: Sums,
+    limits: NDArray[np.int64],
+) -> None:
+    """Pass over all frames; all arrays are by frame."""
+    count, rows, columns = frames.shape
+    lines = np.zeros((3, columns))
+    _limits(frames[0], limits[0, 0])
+    for i in range(1, count):
+        _first_pass(
+            frames[i], frames[0], differences[i - 1], differences[i], 0, rows, by_row[i],
+            by_column[i], squares[i], limits[i], lines,
+        )  # fmt: skip
 
 
 @kernel

@@ -6,8 +6,11 @@ coarser, as 1/columns, 1/rows and per polynomial, and so does 1/T of the tempora
 taken off (Searle, Casella & McCulloch, "Variance components", 1992, chapter 4).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from math import nan
+from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial.legendre import legvander
@@ -75,7 +78,7 @@ class Smooth:
         return product.reshape(*images.shape[:-2], *product.shape[1:])
 
     def weights(self, coefficients: Array) -> Array:
-        """Return those of `across` in each row, (row, degree), of what is smooth in both."""
+        """Return those of `across` in each row, (.., row, degree), of what is smooth in both."""
         weights: Array = self.along_rows @ np.where(self.mixed, coefficients, 0.0)
         return weights
 
@@ -104,8 +107,7 @@ class FixedPattern:
     mean_square: float
 
 
-@dataclass(frozen=True)
-class _Lines:
+class _Lines(NamedTuple):
     """Mean squares of rows (or columns) beyond smooth ones: of the mean frame, and temporal / T."""
 
     size: int  # pixels a line
@@ -114,44 +116,64 @@ class _Lines:
     temporal: float
 
 
-def fixed_pattern(
-    mean: Array,
+def fixed_patterns(
+    means: Array,
     smooth: Smooth,
     surfaces: Array,
     row_means: Array,
     column_means: Array,
-    c: Components,
+    parts: Sequence[Components],
     threads: int = 1,
-) -> FixedPattern:
-    """Return the fixed pattern of a mean frame (row, column), DN.
+) -> list[FixedPattern]:
+    """Return the fixed patterns of mean frames (plane, row, column), DN.
 
     Parameters
     ----------
-    mean
-        The mean frame.
+    means
+        The mean frames.
     smooth, surfaces
-        Basis and its coefficients for each frame: (frame, row degree, column degree).
+        Basis and its coefficients for each frame: (frame, plane, row degree, column degree).
     row_means, column_means
-        Of each frame: (frame, row), (frame, column), DN.
-    c
-        Components of the temporal noise.
+        Of each frame: (plane, frame, row), (plane, frame, column), DN.
+    parts
+        Components of the temporal noise of each plane.
     threads
         Threads that may be used.
     """
-    n, m = mean.shape
-    coefficients = smooth.coefficients(mean)
-    by_row, by_column, pixels, squares, scatter = pixel_residuals(
-        mean, smooth.weights(coefficients), smooth.across, threads
-    )
+    _, n, m = means.shape
+    coefficients = smooth.coefficients(means)
+    left = [
+        pixel_residuals(mean, weights, smooth.across, threads)
+        for mean, weights in zip(means, smooth.weights(coefficients), strict=True)
+    ]
+    by_row, by_column = np.array([one[0] for one in left]), np.array([one[1] for one in left])
+    rows = _lines(by_row, row_means, smooth.along_rows, m)
+    columns = _lines(by_column, column_means, smooth.along_columns, n)
+    return [
+        _fixed_pattern(left[k][2:], smooth, coefficients[k], surfaces[:, k], rows[k], columns[k], c)
+        for k, c in enumerate(parts)
+    ]
+
+
+def _fixed_pattern(
+    left: tuple[Array, float, float],
+    smooth: Smooth,
+    coefficients: Array,
+    surfaces: Array,
+    rows: _Lines,
+    columns: _Lines,
+    c: Components,
+) -> FixedPattern:
+    """Return the fixed pattern from what is left of the pixels, sums of squares, and lines."""
+    pixels, squares, scatter = left
+    n, m = pixels.shape
     dof = (n - 1) * (m - 1) - smooth.kinds
-    square = squares / dof if dof > 0 else np.nan
+    square = squares / dof if dof > 0 else nan
     noise = c.ms_pixel / c.frames
     spatial_error = scatter / pixels.size * (pixels.size / dof) ** 2 if dof else 0
     pixel = square - noise
-    rows = _lines(by_row, row_means, smooth.along_rows, m)
-    columns = _lines(by_column, column_means, smooth.along_columns, n)
     # Chi-squared of the mean frame, and of the temporal noise that is taken off.
-    pixel_null = 2 * noise**2 / dof * (1 + 1 / (c.frames - 1)) if dof > 0 else np.nan
+    pixel_null = 2 * noise**2 / dof * (1 + 1 / (c.frames - 1)) if dof > 0 else nan
     estimates = {
         "fixed_pixel_variance": estimate(
             pixel, spatial_error + c.var_ms_pixel / c.frames**2, 0.0, pixel_null
@@ -171,10 +193,14 @@ def fixed_pattern(
     return FixedPattern(estimates, pixels, square)
 
 
-def _lines(means: Array, series: Array, basis: Array, size: int) -> _Lines:
-    frames, dof = len(series), len(means) - basis.shape[1]
+def _lines(means: Array, series: Array, basis: Array, size: int) -> list[_Lines]:
+    """Return the mean squares of lines of `size` pixels, of each plane."""
+    frames, dof = series.shape[1], means.shape[1] - basis.shape[1]
     spatial, temporal = line_residuals(means, series, basis)
-    return _Lines(size, dof, size * spatial / dof, size * temporal / ((frames - 1) * dof) / frames)
+    return [
+        _Lines(size, dof, size * still / dof, size * moving / ((frames - 1) * dof) / frames)
+        for still, moving in zip(spatial.tolist(), temporal.tolist(), strict=True)
+    ]
 
 
 def _smooth_variance(

@@ -9,16 +9,12 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from dsis.compiled import kernel, over_rows
+from dsis.compiled import inlined, kernel, over_rows
+from dsis.measures.pairwise import summed
 
 Frame = NDArray[np.float32]
 Sums = NDArray[np.float64]
 FiveSums = tuple[Sums, Sums, Sums, Sums, Sums]
-
-
-def count_codes(frame: Frame, histogram: NDArray[np.int64], lowest: int) -> None:
-    """Add whole codes, all within it, to `histogram` (row parity, column parity, code - lowest)."""
-    _count_codes(frame, histogram, lowest)
 
 
 def add_moments(
@@ -82,23 +78,6 @@ def offsets(by_row: Sums, by_column: Sums, single: bool) -> tuple[Sums, Sums, Su
     return by_row / across, of_columns, means
 
 
-def offsets_of_all(by_row: Sums, by_column: Sums, single: bool) -> tuple[Sums, Sums, Sums]:
-    """Return the same as `offsets` of all frames, from and by (frame, ..)."""
-    frames, rows, columns = by_row.shape[0], by_row.shape[1], by_column.shape[2]
-    if single:
-        by_line = by_row[:, :, 0] + by_row[:, :, 1]
-        mean = by_line.sum(1) / (rows * columns)
-        of_rows, of_columns = np.empty((frames, rows, 2)), np.empty((frames, 2, columns))
-        of_rows[:] = (by_line / columns)[:, :, np.newaxis]
-        whole = (by_column[:, 0] + by_column[:, 1]) / rows - mean[:, np.newaxis]
-        of_columns[:] = whole[:, np.newaxis]
-        return of_rows, of_columns, np.tile(mean[:, np.newaxis, np.newaxis], (1, 2, 2))
-    down, across, pixels, parity = _of_parity(rows, columns)
-    means = np.stack([by_row[:, 0::2].sum(1), by_row[:, 1::2].sum(1)], 1) / pixels
-    of_columns = by_column / down - means[:, :, parity]
-    return by_row / across, of_columns, means
-
-
 @lru_cache(maxsize=32)
 def _of_parity(rows: int, columns: int) -> tuple[NDArray[np.int_], ...]:
     """Return how many rows (2, 1), columns (2,) and pixels (2, 2) are even and odd; of each column.
@@ -109,13 +88,9 @@ def _of_parity(rows: int, columns: int) -> tuple[NDArray[np.int_], ...]:
     return down[:, np.newaxis], across, np.outer(down, across), np.arange(columns) & 1
 
 
+@kernel
 def split(image: Frame, places: NDArray[np.int64], means: Sums, out: Frame) -> None:
     """Write planes less their means: (plane, row, column); `places`: first row, column and step."""
-    _split(image, places, means, out)
-
-
-@kernel
-def _split(image: Frame, places: NDArray[np.int64], means: Sums, out: Frame) -> None:
     for k in range(len(places)):
         y0, x0, step = places[k]
         mean = np.float32(means[y0, x0])
@@ -127,6 +102,13 @@ def _split(image: Frame, places: NDArray[np.int64], means: Sums, out: Frame) -> 
             else:
                 for x in range(into.size):
                     into[x] = line[x0 + 2 * x] - mean
+
+
+@kernel
+def count_codes(frames: Frame, histogram: NDArray[np.int64], lowest: int) -> None:
+    """Add whole codes, all within it, to `histogram` (row parity, column parity, code - lowest)."""
+    for frame in frames:
+        _count_codes(frame, histogram, lowest)
 
 
 @kernel
@@ -200,7 +182,7 @@ def _centre(
 
 
 @kernel
-def add_power(transform: NDArray[np.complex64], power: Sums) -> None:
+def add_power(transform: NDArray[np.complexfloating], power: Sums) -> None:
     """Add |transform|^2 to `power`: (plane, row, column) both."""
     planes, rows, columns = transform.shape
     for k in range(planes):
@@ -238,98 +220,110 @@ def project(images: NDArray[np.floating], basis: Sums) -> Sums:
     return out
 
 
-def mean_frame(
+def mean_frames(
     base: Frame,
     sums: Sums,
     frames: int,
-    place: tuple[int, int, int],
-    row_means: Sums,
-    column_means: Sums,
+    places: NDArray[np.int64],
+    line_means: tuple[Sums, Sums],
     shift: float,
-    mean: Sums,
-    change: Sums,
-) -> tuple[Sums, Sums]:
-    """Write the mean frame of a channel, and its change since the first frame less the mean's.
+) -> tuple[Sums, Sums, Sums, Sums]:
+    """Return the mean frames of channels, and their changes since the first frame less the mean's.
 
-    Returns the means of rows and of columns of the first frame, shifted as the mean frame is.
+    Then the means of rows and of columns of the first frame, shifted as the mean frames are. All by
+    plane: (plane, row, column) twice, (plane, row), (plane, column).
 
     Parameters
     ----------
     base, sums
         The first frame, and the sums of u: (row, column) of the array.
-    frames, place
-        Number of frames; first row, first column and step of the channel.
-    row_means, column_means
-        Of d: (frame, row), (frame, column).
+    frames, places
+        Number of frames; first row, first column and step of each channel.
+    line_means
+        Of d, by rows and by columns: (plane, frame, row), (plane, frame, column).
     shift
-        Added to the mean frame.
-    mean, change
-        Are written: (row, column).
+        Added to the mean frames.
     """
-    y, x, step = place
-    (n, m), first = mean.shape, base[y::step, x::step]
-    rows, columns = row_means.sum(0) / frames, column_means.sum(0) / frames
-    level = rows.sum() / n
-    _mean_frame(first, sums[y::step, x::step], frames, rows, columns, level, shift, mean, change)
-    by_row, by_column = _line_sums(first)
-    return by_row / m + shift, by_column / n + shift
+    return _mean_frames(base, sums, frames, places, *line_means, shift)
 
 
 @kernel
-def _line_sums(image: Frame) -> tuple[Sums, Sums]:
-    """Return the sums of rows and of columns."""
-    rows, columns = image.shape
-    by_row, by_column = np.empty(rows), np.zeros(columns)
-    own = np.empty(columns)
-    for y in range(rows):
-        line = image[y]
-        for x in range(columns):
-            own[x] = line[x]
-            by_column[x] += own[x]
-        a = b = c = d = 0.0  # which do not wait for one another
-        end = columns // 4 * 4
-        for x in range(0, end, 4):
-            a += own[x]
-            b += own[x + 1]
-            c += own[x + 2]
-            d += own[x + 3]
-        for x in range(end, columns):
-            a += own[x]
-        by_row[y] = (a + b) + (c + d)
-    return by_row, by_column
-
-
-@kernel
-def _mean_frame(
-    first: Frame,
+def _mean_frames(
+    base: Frame,
     sums: Sums,
     frames: int,
-    rows: Sums,
-    columns: Sums,
-    level: float,
+    places: NDArray[np.int64],
+    row_means: Sums,
+    column_means: Sums,
     shift: float,
-    mean: Sums,
-    change: Sums,
-) -> None:
-    for y in range(mean.shape[0]):
-        beyond = rows[y] - level
-        for x in range(mean.shape[1]):
-            own = sums[y, x] / frames + beyond + (columns[x] - level)
-            change[y, x] = own
-            mean[y, x] = own + level + first[y, x] + shift
+) -> tuple[Sums, Sums, Sums, Sums]:
+    count, n, m = len(places), row_means.shape[2], column_means.shape[2]
+    means, changes = np.empty((count, n, m)), np.empty((count, n, m))
+    by_row, by_column = np.empty((count, n)), np.zeros((count, m))
+    rows, columns, own = np.empty(n), np.empty(m), np.empty(m)
+    for k in range(count):
+        y0, x0, step = places[k]
+        _mean_of(row_means[k], rows)
+        _mean_of(column_means[k], columns)
+        level = summed(rows) / n
+        for y in range(n):
+            line, first = sums[y0 + y * step], base[y0 + y * step]
+            mean, change = means[k, y], changes[k, y]
+            beyond = rows[y] - level
+            for x in range(m):
+                own[x] = first[x0 + x * step]
+                change[x] = line[x0 + x * step] / frames + beyond + (columns[x] - level)
+                mean[x] = change[x] + level + own[x] + shift
+                by_column[k, x] += own[x]
+            by_row[k, y] = _of_four(own) / m + shift
+        for x in range(m):
+            by_column[k, x] = by_column[k, x] / n + shift
+    return means, changes, by_row, by_column
 
 
-def temporal_power(
-    power: Sums, transform: NDArray[np.complex128], columns: int, frames: int
-) -> Sums:
-    """Return power summed over frames less that of the mean, per pixel and free frame.
+@inlined
+def _mean_of(lines: Sums, out: Sums) -> None:
+    """Write the mean of lines (line, any)."""
+    for x in range(out.size):
+        out[x] = lines[0, x]
+    for t in range(1, len(lines)):
+        for x in range(out.size):
+            out[x] += lines[t, x]
+    for x in range(out.size):
+        out[x] /= len(lines)
 
-    Power (row, column) of images of `columns` columns; nothing is below zero.
+
+@inlined
+def _of_four(line: Sums) -> float:
+    """Return the sum of a line, of four parts, which do not wait for one another."""
+    a = b = c = d = 0.0
+    end = line.size // 4 * 4
+    for x in range(0, end, 4):
+        a += line[x]
+        b += line[x + 1]
+        c += line[x + 2]
+        d += line[x + 3]
+    for x in range(end, line.size):
+        a += line[x]
+    return (a + b) + (c + d)
+
+
+@kernel
+def temporal_powers(
+    powers: Sums, transforms: NDArray[np.complexfloating], columns: int, frames: int
+) -> NDArray[np.floating]:
+    """Return powers summed over frames less those of the means, per pixel and free frame.
+
+    Powers (plane, row, bin) of images of `columns` columns; nothing is below zero.
     """
-    left = transform.real**2
-    left += transform.imag**2
-    left *= -frames
-    left += power
-    np.maximum(left, 0, out=left)
-    left /= len(power) * columns * (frames - 1)
-    return left
+    count, n, bins = powers.shape
+    found = np.empty((count, n, bins), np.float32)
+    times, size = np.float32(-frames), np.float32(n * columns * (frames - 1))
+    for k in range(count):
+        for y in range(n):
+            line, own, out = powers[k, y], transforms[k, y], found[k, y]
+            for x in range(bins):
+                of_mean = own[x].real * own[x].real + own[x].imag * own[x].imag
+                left = np.float32(np.float64(of_mean * times) + line[x])
+                out[x] = (np.float32(0.0) if left < 0 else left) / size
+    return found

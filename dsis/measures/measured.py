@@ -61,7 +61,7 @@ class Channel:
     fixed_pixels: Array
     temporal_autocovariance: Array
     fixed_autocovariance: Array
-    power_spectrum: Array
+    power_spectrum: NDArray[np.floating]
     row_spectrum: Array
     column_spectrum: Array
     row_means: Array

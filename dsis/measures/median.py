@@ -10,16 +10,26 @@ from dsis.compiled import kernel
 
 _PARTS = 512  # of the range of values: that which holds the middle is looked at again
 _FEW = 64  # values that are selected among one by one
+_MANY = 1 << 15  # values of which numpy finds the limits sooner
 _ROUNDS = 4  # far values may keep nearly all others in one part
 
 
 def median(values: NDArray[np.floating]) -> float:
     """Return the median of all values, nan where one of them is; there must be some."""
     flat = np.ascontiguousarray(values).reshape(-1)
-    low, high = flat.min(), flat.max()  # faster than a kernel, which has to keep their order
-    if low == high or isnan(low):
-        return float(low)
-    return float(_median(flat, low, high))
+    if flat.size < _MANY:
+        return middle_and_largest(flat)[0]
+    low, high = flat.min(), flat.max()
+    return float(low if low == high or isnan(low) else _median(flat, low, high))
+
+
+@kernel
+def middle_and_largest(values: NDArray[np.floating]) -> tuple[float, float]:
+    """Return the median of values (any,), and the largest; both nan where one of them is."""
+    low, high = _limits(values)
+    if low == high or np.isnan(low):
+        return np.float64(low), np.float64(high)
+    return np.float64(_median(values, low, high)), np.float64(high)
 
 
 @kernel
@@ -65,11 +75,23 @@ def _around(values: NDArray[np.floating], rank: int, low: Any, high: Any) -> Any
 
 @kernel
 def _limits(values: NDArray[np.floating]) -> Any:
-    """Return the least and the largest value."""
-    low, high = values[0], values[0]
-    for i in range(values.size):
-        low, high = min(low, values[i]), max(high, values[i])
-    return low, high
+    """Return the least and the largest value, nan where one is not a number."""
+    a = b = c = d = values[0]  # which do not wait for one another
+    e = f = g = h = values[0]
+    unknown, end = False, values.size // 4 * 4
+    for i in range(0, end, 4):
+        p, q, r, s = values[i], values[i + 1], values[i + 2], values[i + 3]
+        a, b, c, d = min(a, p), min(b, q), min(c, r), min(d, s)
+        e, f, g, h = max(e, p), max(f, q), max(g, r), max(h, s)
+        unknown |= np.isnan(p) | np.isnan(q) | np.isnan(r) | np.isnan(s)
+    for i in range(end, values.size):
+        a, e = min(a, values[i]), max(e, values[i])
+        unknown |= np.isnan(values[i])
+    if unknown:
+        a = e = values.dtype.type(np.nan)
+    else:
+        a, e = min(a, b, c, d), max(e, f, g, h)
+    return a, e
 
 
 @kernel

@@ -164,11 +164,13 @@ def _null(frames: int, rows: int, columns: int, power: int) -> float:
     return factorial(power) / (frames * rows * columns) * loss
 
 
+@lru_cache(maxsize=1024)
 def _share(size: int, power: int) -> float:
     """Return (1 - 1/k)^p + (k - 1) (-1/k)^p: the sum of the weights' powers of a residual."""
     return float((1 - 1 / size) ** power + (size - 1) * (-1 / size) ** power)
 
 
+@lru_cache(maxsize=1024)
 def _loss(size: int, power: int) -> float:
     """Return by how much the removed mean of `size` samples raises the variance of a cumulant.
 

@@ -7,6 +7,7 @@ Nothing of the size of a frame is kept but the two maps that are asked for.
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dsis.compiled import ROWS_PER_BLOCK, inlined, kernel, over_rows
 from dsis.measures.kernels import FiveSums, Frame, Sums
@@ -56,10 +57,10 @@ class Scatter(NamedTuple):
 
 
 def pixel_moments(
-    sums: FiveSums, last: Frame, frames: int, place: Place, shape: tuple[int, int], kept: float,
-    threads: int,
-) -> tuple[Sums, Sums, Scatter]:  # fmt: skip
-    """Return variance map, neighbour map (row, column) and scatter of one channel.
+    sums: FiveSums, last: Frame, frames: int, places: NDArray[np.int64], shape: tuple[int, int],
+    kept: float, threads: int,
+) -> list[tuple[Sums, Sums, Scatter]]:  # fmt: skip
+    """Return variance map, neighbour map (row, column) and scatter of channels of one size.
 
     Parameters
     ----------
@@ -70,40 +71,43 @@ def pixel_moments(
         The last u.
     frames
         Number of frames T.
-    place, shape
-        Where the channel's pixels lie in the array, and how many rows and columns they are.
+    places, shape
+        Where the pixels of each channel lie in the array, (channel, 3) as `Place`, and how many
+        rows and columns they are.
     kept
         Share of a pixel's variance that its residual has: squares are divided by it.
     threads
         Threads that may be used.
     """
-    n, m = shape
-    size, t = n * m, frames
-    variance, neighbour = np.empty(shape), np.empty(shape)
-    by_block = np.empty((-(-n // _BLOCK), _FIRST + _SECOND))
+    (n, m), count, t = shape, len(places), frames
+    variance, neighbour = np.empty((count, n, m)), np.empty((count, n, m))
+    by_block = np.empty((count, -(-n // _BLOCK), _FIRST + _SECOND))
+    numbers = np.zeros((count, 9))
+    numbers[:, 0], numbers[:, 1] = t, kept
 
-    def summed(centre: tuple[float, ...], *, about_zero: bool = False) -> Sums:
-        numbers = np.array([t, kept, *centre])
-
+    def summed(*, about_zero: bool) -> Sums:
         def block(start: int, stop: int) -> None:
-            lines = np.empty((10 + _FIRST + _SECOND, m))
             _add_powers(
-                *sums, last, *place, numbers, about_zero, variance, neighbour, start, stop, lines,
-                by_block,
-            )  # fmt: skip
+                *sums, last, places, numbers, about_zero, variance, neighbour, start, stop, by_block
+            )
 
         over_rows(block, n, threads)
-        whole: Sums = by_block.sum(0) / size
+        whole: Sums = by_block.sum(1) / (n * m)
         return whole
 
-    powers = summed((0.0,) * 7, about_zero=True)[: _FIRST + 1]
-    square, cube, fourth, pairs, of_squares = powers.tolist()
+    powers = summed(about_zero=True)
     a = t**2 * (t + 1) / ((t - 1) * (t - 2) * (t - 3)) if t > 3 else 0.0
     b = 3 * (t - 1) / (t + 1)
-    k4 = a * (fourth - b * of_squares)
-    p = summed((square, cube, fourth, pairs, a, b, k4))[_FIRST:].tolist()
-    some = of_squares > 0
-    return variance, neighbour, Scatter(some, square, cube, fourth, pairs, k4, *p)
+    numbers[:, 2:6], numbers[:, 6], numbers[:, 7] = powers[:, :_FIRST], a, b
+    numbers[:, 8] = a * (powers[:, 2] - b * powers[:, 4])
+    products = summed(about_zero=False)
+    found = []
+    for k, own in enumerate(powers.tolist()):
+        square, cube, fourth, pairs, of_squares = own[: _FIRST + 1]
+        k4, p = float(numbers[k, 8]), products[k, _FIRST:].tolist()
+        scatter = Scatter(of_squares > 0, square, cube, fourth, pairs, k4, *p)
+        found.append((variance[k], neighbour[k], scatter))
+    return found
 
 
 def pair_moments(
@@ -196,9 +200,38 @@ def _add_powers(
     s4: Sums,
     s11: Sums,
     end: Frame,
-    y0: int,
-    x0: int,
-    step: int,
+    places: NDArray[np.int64],
+    numbers: Sums,
+    about_zero: bool,
+    variance: Sums,
+    neighbour: Sums,
+    first: int,
+    last: int,
+    out: Sums,
+) -> None:
+    """Write sums over blocks of rows of each channel, (channel, block, _FIRST + _SECOND) to `out`.
+
+    About zero these are the sums of powers and of squares squared, and the maps (channel, row,
+    column) are written, too; else those of products of two. `numbers` (channel, any): frames, kept,
+    means of square, cube, fourth and product, a, b, mean of k4.
+    """
+    lines = np.empty((10 + _FIRST + _SECOND, variance.shape[2]))
+    for k in range(len(places)):
+        _add_powers_of(
+            s1, s2, s3, s4, s11, end, places[k], numbers[k], about_zero, variance[k], neighbour[k],
+            first, last, lines, out[k],
+        )  # fmt: skip
+
+
+@kernel
+def _add_powers_of(
+    s1: Sums,
+    s2: Sums,
+    s3: Sums,
+    s4: Sums,
+    s11: Sums,
+    end: Frame,
+    place: NDArray[np.int64],
     numbers: Sums,
     about_zero: bool,
     variance: Sums,
@@ -208,13 +241,12 @@ def _add_powers(
     lines: Sums,
     out: Sums,
 ) -> None:
-    """Write sums over blocks of rows (block, _FIRST + _SECOND) to `out`, about zero also the maps.
+    """Do the same for one channel.
 
-    About zero these are the sums of powers and of squares squared, else those of products of two.
-    `numbers`: frames, kept, means of square, cube, fourth and product, a, b, mean of k4. `lines`
-    (10 + _FIRST + _SECOND, column) are what a row, its powers and its sums by column are kept in:
-    loops over them alone are vector instructions, whatever the step.
+    `lines` (10 + _FIRST + _SECOND, column) are what a row, its powers and its sums by column are
+    kept in: loops over them alone are vector instructions, whatever the step.
     """
+    y0, x0, step = place
     frames, kept = numbers[0], numbers[1]
     square, cube, fourth, pairs, total = lines[0], lines[1], lines[2], lines[3], lines[10:]
     r1, r2, r3, r4, r11, r_end = lines[4], lines[5], lines[6], lines[7], lines[8], lines[9]

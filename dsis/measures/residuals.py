@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsis.compiled import inlined, kernel, over_rows
+from dsis.measures.pairwise import summed
 
 Array = NDArray[np.float64]
 
@@ -17,22 +18,36 @@ def pixel_residuals(
     first degree, the constant, is left out. Returns row means, column means, the pixels (row,
     column), the sum of their squares, and the variance of their squares.
     """
-    n, m = image.shape
-    by_row, by_column = image.sum(1) / m, image.sum(0) / n
-    mean = by_row.sum() / n
-    pixels, by_line = np.empty((n, m)), np.empty((2, n))
+    n = len(image)
+    by_row, by_column, mean = _line_means(image)
+    pixels, by_line = np.empty(image.shape), np.empty((2, n))
 
     def residual(first: int, last: int) -> None:
         _residual(image, by_row, by_column, mean, weights, across, pixels, by_line[0], first, last)
 
     over_rows(residual, n, threads)
-    squares = float(by_line[0].sum())
+    squares = summed(by_line[0])
 
     def scatter(first: int, last: int) -> None:
         _scatter(pixels, squares / pixels.size, by_line[1], first, last)
 
     over_rows(scatter, n, threads)
-    return by_row, by_column, pixels, squares, float(by_line[1].sum()) / pixels.size
+    return by_row, by_column, pixels, squares, summed(by_line[1]) / pixels.size
+
+
+@kernel
+def _line_means(image: Array) -> tuple[Array, Array, float]:
+    """Return the means of rows and of columns, and the mean of them."""
+    n, m = image.shape
+    by_row, by_column = np.empty(n), np.zeros(m)
+    for y in range(n):
+        line = image[y]
+        by_row[y] = summed(line) / m
+        for x in range(m):
+            by_column[x] += line[x]
+    for x in range(m):
+        by_column[x] /= n
+    return by_row, by_column, summed(by_row) / n
 
 
 @kernel
@@ -97,15 +112,17 @@ def _squares(line: Array, mean: float, power: int) -> float:
     return (a + b) + (c + d)
 
 
-def line_residuals(means: Array, series: Array, basis: Array) -> tuple[float, float]:
+def line_residuals(means: Array, series: Array, basis: Array) -> tuple[Array, Array]:
     """Return sums of squares beyond a basis (line, degree), of means and of the wander of a series.
 
-    Means (line); series (frame, line), about its mean over frames.
+    Means (plane, line); series (plane, frame, line), about its mean over frames. Sums (plane,).
     """
-    return _outside(means[np.newaxis], basis), _outside(series - series.sum(0) / len(series), basis)
+    wander = series - series.sum(1, keepdims=True) / series.shape[1]
+    return _outside(means[:, np.newaxis], basis), _outside(wander, basis)
 
 
-def _outside(lines: Array, basis: Array) -> float:
-    """Return the sum of squares of lines (any, line) less their projections."""
-    left = lines - lines @ basis @ basis.T
-    return float(np.vdot(left, left))
+def _outside(lines: Array, basis: Array) -> Array:
+    """Return the sum of squares of lines (plane, any, line) less their projections."""
+    left = (lines - lines @ basis @ basis.T).reshape(len(lines), -1)
+    squares: Array = np.vecdot(left, left)
+    return squares

@@ -6,13 +6,15 @@ import numpy as np
 import scipy.special
 from numpy.typing import NDArray
 
+from dsis.compiled import kernel
 from dsis.measures.estimate import Estimate, estimate, unknown
-from dsis.measures.median import median
+from dsis.measures.median import middle_and_largest
 
 Array = NDArray[np.float64]
+_FEWEST = 4  # bins that have a median worth the name
 
 
-def spectral_peak(power: Array, columns: int, degrees: int) -> Estimate:
+def spectral_peak(power: NDArray[np.floating], columns: int, degrees: int) -> Estimate:
     """Return the largest bin of a 2-D spectrum relative to white noise.
 
     The axes are left out: they hold what rows, columns and frames have in common. White is the
@@ -27,31 +29,65 @@ def spectral_peak(power: Array, columns: int, degrees: int) -> Estimate:
     degrees
         Independent frames in the mean.
     """
-    rows = power.shape[0]
-    inner = power[1:, 1 : (columns + 1) // 2]
-    edge = power[1 : (rows + 1) // 2, columns // 2] if columns % 2 == 0 else power[:0, 0]
-    alone = [power[rows // 2, columns // 2]] if rows % 2 == 0 and columns % 2 == 0 else []
-    return _peak(inner.reshape(-1), edge, np.array(alone), degrees)
+    rows = len(power)
+    inner = (rows - 1) * ((columns + 1) // 2 - 1)  # complex bins but those of the last column
+    if inner < _FEWEST:
+        return unknown()
+    middle, largest = _middle_of_plane(power, columns)
+    last = columns % 2 == 0
+    bins, alone = inner + last * ((rows + 1) // 2 - 1), last and rows % 2 == 0
+    return _peak(middle, largest, (inner, bins, int(alone)), degrees)
 
 
 def line_peak(power: Array, lines: int, degrees: int) -> Estimate:
     """Return the largest bin of a 1-D spectrum (lines // 2 + 1), the mean left out."""
-    alone = power[lines // 2 :] if lines % 2 == 0 else power[:0]
-    return _peak(power[1 : (lines + 1) // 2], power[:0], alone, degrees)
-
-
-def _peak(inner: Array, edge: Array, alone: Array, degrees: int) -> Estimate:
-    """Return the largest of complex bins (`inner`, `edge`) and of self-conjugate ones (`alone`)."""
-    if inner.size < 4:
+    inner = (lines + 1) // 2 - 1
+    if inner < _FEWEST:
         return unknown()
-    middle, density = _median_of_white(degrees)
-    white = median(inner) / middle
+    middle, largest = _middle_of_line(power, inner)
+    return _peak(middle, largest, (inner, inner, power.size - 1 - inner), degrees)
+
+
+@kernel
+def _middle_of_plane(power: NDArray[np.floating], columns: int) -> tuple[float, float]:
+    """Return the median of complex bins, and the largest of all off the axes."""
+    rows, last = power.shape[0], (columns + 1) // 2
+    inner = np.empty((rows - 1) * (last - 1), power.dtype)
+    i, largest = 0, 0.0
+    for y in range(1, rows):
+        for x in range(1, last):
+            inner[i] = power[y, x]
+            i += 1
+    if columns % 2 == 0:
+        for y in range(1, rows // 2 + 1):  # the others are their conjugates
+            largest = max(largest, np.float64(power[y, last]))
+    middle, of_inner = middle_and_largest(inner)
+    return middle, max(of_inner, largest)
+
+
+@kernel
+def _middle_of_line(power: Array, inner: int) -> tuple[float, float]:
+    """Return the median of the complex bins, and the largest but the mean."""
+    middle, largest = middle_and_largest(power[1 : inner + 1])
+    for i in range(inner + 1, power.size):
+        largest = max(largest, power[i])
+    return middle, largest
+
+
+def _peak(middle: float, largest: float, bins: tuple[int, int, int], degrees: int) -> Estimate:
+    """Return the largest relative to white noise, from the median bin and the largest.
+
+    `bins`: those that the median is of, complex ones, and self-conjugate ones.
+    """
+    inner, whole, alone = bins
+    middle_of_white, density = _median_of_white(degrees)
+    white = middle / middle_of_white
     if white == 0:
         return unknown()
-    value = max(float(part.max()) for part in (inner, edge, alone) if part.size) / white
-    mean, variance = _largest_of_white(inner.size + edge.size, alone.size, degrees)
+    value = largest / white
+    mean, variance = _largest_of_white(whole, alone, degrees)
     # The median of K bins scatters by 1 / (4 K density^2); the largest is divided by it.
-    scatter = 1 / (4 * inner.size * (density * middle) ** 2)
+    scatter = 1 / (4 * inner * (density * middle_of_white) ** 2)
     null_value, null = mean * (1 + scatter), variance + mean**2 * scatter
     # A line of fixed amplitude and free phase in white noise: non-central chi-squared.
     excess = max(value - null_value - 3 * null**0.5, 0.0)

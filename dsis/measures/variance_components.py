@@ -5,13 +5,16 @@ The temporal residual (frame less mean frame) is z(t, y, x) = f(t) + r(t, y) + c
 variance, each unbiased and each blind to the others.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
+from dsis.compiled import kernel
 from dsis.measures.estimate import Estimate, estimate
 
 Array = NDArray[np.float64]
@@ -86,44 +89,55 @@ class Components:
         }
 
 
+class LineSquares(NamedTuple):
+    """Mean squares of lines of some planes per degree of freedom, and their variances: (plane,)."""
+
+    mean: list[float]
+    variance: list[float]
+
+
 def components(
-    row_power: Array,
-    column_power: Array,
+    of_rows: LineSquares,
+    of_columns: LineSquares,
     frame_means: Array,
     shape: tuple[int, int],
-    pixel: tuple[float, float],
-) -> Components:
-    """Return the components of one channel.
+    pixels: Sequence[tuple[float, float]],
+) -> list[Components]:
+    """Return the components of channels of one size.
 
     Parameters
     ----------
-    row_power, column_power
-        `line_power` of the means of rows and of columns less the frame's, DN^2.
+    of_rows, of_columns
+        `line_squares` of both.
     frame_means
-        Of each frame, DN.
+        Of each frame, DN: (plane, frame).
     shape
-        Rows and columns of the channel.
-    pixel
+        Rows and columns of a channel.
+    pixels
         Temporal variance of a pixel without rows, columns and frames, and the variance of that.
     """
-    frames, (rows, columns) = frame_means.size, shape
-    wander = frame_means - frame_means.sum() / frames
-    ms_frame = rows * columns * float(wander @ wander) / (frames - 1)
-    ms_row, var_row = _lines(row_power, frames, rows, columns)
-    ms_column, var_column = _lines(column_power, frames, columns, rows)
-    return Components(
-        frames,
-        rows,
-        columns,
-        pixel[0],
-        ms_row,
-        ms_column,
-        ms_frame,
-        pixel[1],
-        var_row,
-        var_column,
-        2 * ms_frame**2 / (frames + 1),
-    )
+    frames, (rows, columns) = frame_means.shape[1], shape
+    wander = frame_means - frame_means.sum(1, keepdims=True) / frames
+    squares = np.vecdot(wander, wander).tolist()
+    found = []
+    for k, (variance, error2) in enumerate(pixels):
+        ms_frame = rows * columns * squares[k] / (frames - 1)
+        found.append(
+            Components(
+                frames,
+                rows,
+                columns,
+                variance,
+                of_rows.mean[k],
+                of_columns.mean[k],
+                ms_frame,
+                error2,
+                of_rows.variance[k],
+                of_columns.variance[k],
+                2 * ms_frame**2 / (frames + 1),
+            )
+        )
+    return found
 
 
 def line_power(means: Array, frame_means: Array) -> Array:
@@ -132,23 +146,56 @@ def line_power(means: Array, frame_means: Array) -> Array:
     Means (plane, frame, line), (plane, frame); power (plane, bin): half spectrum of a real
     transform along the lines; the sum of the whole one is that of squares.
     """
-    wander = means - frame_means[:, :, np.newaxis]
-    wander -= wander.sum(1, keepdims=True) / means.shape[1]
-    transform = scipy.fft.rfft(wander)
-    power: Array = (transform.real**2 + transform.imag**2).sum(1) / means.shape[2]
+    transforms = scipy.fft.rfft(_wander(means, frame_means), overwrite_x=True)
+    return _summed_power(transforms, means.shape[2])
+
+
+@kernel
+def _wander(means: Array, frame_means: Array) -> Array:
+    """Return line means less the frame's, about their mean over frames: (plane, frame, line)."""
+    count, frames, lines = means.shape
+    found, mean = np.empty((count, frames, lines)), np.empty(lines)
+    for k in range(count):
+        mean[:] = 0.0
+        for t in range(frames):
+            for y in range(lines):
+                found[k, t, y] = means[k, t, y] - frame_means[k, t]
+                mean[y] += found[k, t, y]
+        for y in range(lines):
+            mean[y] /= frames
+        for t in range(frames):
+            for y in range(lines):
+                found[k, t, y] -= mean[y]
+    return found
+
+
+@kernel
+def _summed_power(transforms: NDArray[np.complex128], lines: int) -> Array:
+    """Return sums over frames of the power in each bin, per line: (plane, bin)."""
+    count, frames, bins = transforms.shape
+    power = np.zeros((count, bins))
+    for k in range(count):
+        for t in range(frames):
+            for i in range(bins):
+                re, im = transforms[k, t, i].real, transforms[k, t, i].imag
+                power[k, i] += re * re + im * im
+        for i in range(bins):
+            power[k, i] /= lines
     return power
 
 
-def _lines(power: Array, frames: int, lines: int, size: int) -> tuple[float, float]:
-    """Return the mean square of lines of `size` pixels and its variance.
+def line_squares(power: Array, frames: int, lines: int, size: int) -> LineSquares:
+    """Return the mean squares of lines of `size` pixels and their variances, from `line_power`.
 
     var of the sum of power P_k is 2 sum P_k^2 / T for Gaussian lines of any spectrum: coloured
     lines have fewer degrees of freedom.
     """
-    twice = _halves(len(power), lines % 2 == 0)
+    weighted = _halves(power.shape[1], lines % 2 == 0) * power
     scale = size / ((frames - 1) * (lines - 1))
-    weighted = twice * power
-    return float(weighted.sum()) * scale, 2 * float(weighted @ power) / frames * scale**2
+    sums, squares = weighted.sum(1).tolist(), np.vecdot(weighted, power).tolist()
+    return LineSquares(
+        [one * scale for one in sums], [2 * square / frames * scale**2 for square in squares]
+    )
 
 
 @lru_cache(maxsize=64)

@@ -28,9 +28,9 @@ def edges(by_row: Array, by_column: Array, squares: tuple[float, float]) -> dict
         ("columns", by_column, squares[1], by_row.size),
     ):
         sd = sqrt(square / across)
-        for name, shape in zip(names(axis), edge_shapes(means.size), strict=True):
-            clear = means.size >= _LEAST_LINES and sd > 0
-            found[name] = (float(shape @ means) / sd, 1.0) if clear else UNKNOWN
+        clear = means.size >= _LEAST_LINES and sd > 0
+        for name, shape in zip(_NAMES[axis], _single_shapes(means.size), strict=True):
+            found[name] = (float(shape.dot(means)) / sd, 1.0) if clear else UNKNOWN
     return found
 
 
@@ -39,6 +39,9 @@ def names(axis: str) -> Iterator[str]:
     for end in ENDS:
         for reach in REACHES:
             yield f"fixed_edge of {axis}, {end}, {reach}"
+
+
+_NAMES = {axis: tuple(names(axis)) for axis in ("rows", "columns")}
 
 
 def line_square(means: Array, noise: float, across: int) -> float:
@@ -67,3 +70,9 @@ def edge_shapes(size: int) -> Array:
     """Return the decays from the first and the last line, less smooth polynomials, of norm 1."""
     rest = beyond_smooth(decays(size).T).T
     return np.asarray(rest / np.linalg.norm(rest, axis=1, keepdims=True))
+
+
+@lru_cache(maxsize=64)
+def _single_shapes(size: int) -> tuple[Array, ...]:
+    """Return the same one by one."""
+    return tuple(edge_shapes(size))

@@ -6,7 +6,7 @@ chi-squared^(1/3) is normal, var 2 / (9 dof)); largest values by the normal scor
 
 from collections.abc import Mapping
 from functools import lru_cache
-from math import exp, inf, isfinite, log, log2, nan, pi, sqrt
+from math import cbrt, exp, inf, isfinite, log, log2, nan, pi, sqrt
 
 import numpy as np
 import scipy.special
@@ -81,7 +81,7 @@ def ratio_root(ratio: float, dof: float, dof_of_finer: float = inf) -> Number:
     """Return the cube root of a ratio of mean squares, and its standard deviation about one."""
     if not isfinite(ratio) or dof <= 0:
         return UNKNOWN
-    return float(np.cbrt(ratio)), sqrt(2 / (9 * dof) + 2 / (9 * dof_of_finer))
+    return cbrt(ratio), sqrt(2 / (9 * dof) + 2 / (9 * dof_of_finer))
 
 
 def _components(

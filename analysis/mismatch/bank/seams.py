@@ -29,8 +29,8 @@ def seams(by_row: Array, by_column: Array, squares: tuple[float, float]) -> dict
     ):
         sd = sqrt(square / across)
         for name, shape in zip(("half_seam", "parity"), seam_shapes(means.size), strict=True):
-            found[f"{name} of {axis}"] = (float(shape @ means) / sd, 1.0)
-        found[f"half_seam of {axis}, {WHOLE}"] = (float(_halves(means.size) @ means) / sd, 1.0)
+            found[f"{name} of {axis}"] = (float(shape.dot(means)) / sd, 1.0)
+        found[f"half_seam of {axis}, {WHOLE}"] = (float(_halves(means.size).dot(means)) / sd, 1.0)
     return found
 
 

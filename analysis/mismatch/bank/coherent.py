@@ -1,8 +1,7 @@
 """What a channel shows over all exposures: spectra, lines of them, and lags along lines."""
 
 from collections.abc import Sequence
-from functools import cached_property
-from itertools import islice
+from functools import cache, cached_property
 from math import sqrt
 
 import numpy as np
@@ -177,7 +176,7 @@ class SpectrumSums:
         white = self._white()
         if not white > 0:
             return []
-        return list(islice(separate(self.power, self.shape[1], white), RANKS[-1] + 1))
+        return separate(self.power, self.shape[1], white, RANKS[-1] + 1)
 
     def _white(self) -> float:
         """Return the power of a bin of white noise: from the median, that lines do not raise."""
@@ -253,8 +252,9 @@ class SpectrumSums:
             found[label] = UNKNOWN
             if not self.waves or min(down, across) < 1:
                 continue
-            inner = self.power[[*range(1, down + 1), *range(n - down, n)], 1 : across + 1]
-            ratio = float(inner.mean()) / self.weight[""][0]
+            inner = np.concatenate([self.power[1 : down + 1], self.power[n - down :]])
+            inner = np.ascontiguousarray(inner[:, 1 : across + 1])
+            ratio = float(inner.sum()) / inner.size / self.weight[""][0]
             found[label] = ratio_root(ratio, 2 * degrees * inner.size)
         return found
 
@@ -264,22 +264,24 @@ class SpectrumSums:
         A memory's spectrum is smooth: sinusoids, which correlate at their period, are taken out.
         """
         n, m = self.shape
-        reach = {axis: min(LAGS, size // 2 - 1) for axis, size in (("rows", m), ("columns", n))}
+        names = {axis: _lag_names(axis, size) for axis, size in (("rows", m), ("columns", n))}
         if not self.waves:
-            return {
-                _lag_name(a, k): UNKNOWN for a, most in reach.items() for k in range(1, most + 1)
-            }
+            return {name: UNKNOWN for own in names.values() for name in own}
         covariance = np.fft.irfft2(without_lines(self.relative, self.seen), s=(n, m))
         sd = 1 / sqrt(n * m * self.seen)
         found: dict[str, Number] = {}
         for axis, line in (("rows", covariance[0]), ("columns", covariance[:, 0])):
-            for lag in range(1, reach[axis] + 1):
-                found[_lag_name(axis, lag)] = (float(line[lag] / line[0]), sd)
+            own = names[axis]
+            values = (line[1 : len(own) + 1] / line[0]).tolist()
+            found |= {name: (value, sd) for name, value in zip(own, values, strict=True)}
         return found
 
 
-def _lag_name(axis: str, lag: int) -> str:
-    return f"line_correlation along {axis} {lag}"
+@cache
+def _lag_names(axis: str, size: int) -> tuple[str, ...]:
+    """Return the names of the lags, from 1 on, along lines of so many pixels."""
+    most = min(LAGS, size // 2 - 1)
+    return tuple(f"line_correlation along {axis} {lag}" for lag in range(1, most + 1))
 
 
 def line_name(rank: int) -> str:

@@ -90,7 +90,7 @@ def _farthest(moved: Image) -> float:
 
 
 @kernel
-def _folded(moved: Image, farthest: float) -> tuple[Array, bool]:
+def _folded(moved: Image, farthest: np.float32) -> tuple[Array, bool]:
     """Draw in what moves farther; return means over cells, and whether anything did."""
     rows, columns = moved.shape[0] // CELL, moved.shape[1] // CELL
     drawn_in = False

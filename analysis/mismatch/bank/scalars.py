@@ -107,7 +107,7 @@ def _fixed(
     """Return each part of the fixed pattern against the next finer one."""
     frames, n, m = size
     smooth = Smooth.of(n, m)
-    mixed = int(smooth.mixed.sum())
+    mixed = smooth.kinds
     dof = (n - 1) * (m - 1) - mixed
     noise = pixel / frames
     square = noise + found["fixed_pixel_variance"].value

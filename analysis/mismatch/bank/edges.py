@@ -29,7 +29,7 @@ def edges(by_row: Array, by_column: Array, squares: tuple[float, float]) -> dict
     ):
         sd = sqrt(square / across)
         clear = means.size >= _LEAST_LINES and sd > 0
-        for name, shape in zip(_NAMES[axis], _single_shapes(means.size), strict=True):
+        for name, shape in _shapes(axis, means.size):
             found[name] = (float(shape.dot(means)) / sd, 1.0) if clear else UNKNOWN
     return found
 
@@ -39,9 +39,6 @@ def names(axis: str) -> Iterator[str]:
     for end in ENDS:
         for reach in REACHES:
             yield f"fixed_edge of {axis}, {end}, {reach}"
-
-
-_NAMES = {axis: tuple(names(axis)) for axis in ("rows", "columns")}
 
 
 def line_square(means: Array, noise: float, across: int) -> float:
@@ -73,6 +70,6 @@ def edge_shapes(size: int) -> Array:
 
 
 @lru_cache(maxsize=64)
-def _single_shapes(size: int) -> tuple[Array, ...]:
-    """Return the same one by one."""
-    return tuple(edge_shapes(size))
+def _shapes(axis: str, size: int) -> tuple[tuple[str, Array], ...]:
+    """Return the names of an axis' numbers, and the shape of each."""
+    return tuple(zip(names(axis), edge_shapes(size), strict=True))

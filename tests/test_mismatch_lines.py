@@ -1,7 +1,5 @@
 """Lines of a spectrum: which bins are separate sinusoids, and what is left without them."""
 
-from itertools import islice
-
 import numpy as np
 import scipy.stats
 from numpy.typing import NDArray
@@ -95,7 +93,7 @@ def test_ranks_of_white_noise_are_normal_scores() -> None:
     degrees, scores = 20, []
     for _ in range(300):
         power = rng.gamma(degrees, 1 / degrees, (ROWS, COLUMNS // 2 + 1))
-        bins = list(islice(separate(power, COLUMNS, 1.0), 2))
+        bins = separate(power, COLUMNS, 1.0, 2)
         chance = log_chance(bins[1][2], 2, power[1:, 1:].size, degrees)
         scores.append(score_of_log(chance))
     assert abs(np.mean(scores)) < 4 / 300**0.5

@@ -12,6 +12,7 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.mismatch.bank.robust import drawn_in_mean
 from analysis.mismatch.layout import Layout, Place
 from analysis.mismatch.observe import Level
 from dsis.measures.median import median
@@ -199,23 +200,24 @@ def _signals(
 ) -> dict[Place, float]:
     """Return level above black; where darks have several times, above the dark of that time."""
     signal: dict[Place, float] = {}
+    uniform = layout.uniform
     for channel in layout.channels:
         darks: dict[float, list[float]] = {}
-        for e in layout.exposures:
+        for e in uniform:
             if e.kind == "dark":
                 place = (e.name, channel)
                 own = levels[place].level_dn - offsets.level_dn.get(place, 0.0)
                 darks.setdefault(e.exposure_time_s, []).append(own)
         times = sorted(darks)
-        means = [float(np.mean(darks[t])) for t in times]
-        for e in layout.uniform:
+        means = [sum(darks[t]) / len(darks[t]) for t in times]
+        grounds = [black[channel]] * len(uniform)
+        if len(times) > 1:
+            grounds = np.interp([e.exposure_time_s for e in uniform], times, means).tolist()
+        for e, ground in zip(uniform, grounds, strict=True):
             place = (e.name, channel)
             if e.kind == "dark":
                 signal[place] = 0.0
                 continue
-            ground = black[channel]
-            if len(times) > 1:
-                ground = float(np.interp(e.exposure_time_s, times, means))
             signal[place] = levels[place].level_dn - offsets.level_dn.get(place, 0.0) - ground
     return signal
 
@@ -247,13 +249,7 @@ def _light(
     for name, pairs in ratios.items():
         if len(pairs) < 2:
             continue
-        value, weight = np.array(pairs).T
-        mean = float((value * weight).sum() / weight.sum())
-        for _ in range(_ROUNDS):  # Huber: a few levels off the line do not bend it
-            far = np.abs(value - mean) * np.sqrt(weight)
-            w = weight * np.minimum(1, _HUBER / np.maximum(far, 1e-12))
-            mean = float((value * w).sum() / w.sum())
-        light[name] = mean
+        light[name] = drawn_in_mean(np.array(pairs), _HUBER, _ROUNDS)
     return light
 
 

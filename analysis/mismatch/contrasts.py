@@ -105,7 +105,8 @@ def contrasts(layout: Layout, reference: Vector, known: NDArray[np.bool_]) -> Co
         row[which] = 1 / np.sqrt(len(which))
         keys.append(Key(statistic, "contrast", "", "", together_too(scope, detail)))
         rows.append(row)
-    return Contrasts(tuple(keys), np.array(rows).reshape(len(rows), len(reference.keys)))
+    matrix = np.stack(rows) if rows else np.zeros((0, len(reference.keys)))
+    return Contrasts(tuple(keys), matrix)
 
 
 def _groups(reference: Vector, known: NDArray[np.bool_]) -> dict[tuple[str, str], list[int]]:
@@ -133,19 +134,21 @@ def _shaped(
 ) -> Iterator[tuple[str, Array]]:
     """Yield unit rows of the shapes that differ from those before."""
     kept: list[Array] = []
+    expected = []
+    for place in (reference.keys[i].place for i in which):
+        at = place if place in layout.signal_dn else (place[0], "Gr")
+        expected.append((max(layout.signal_dn[at], 0.0), layout.variance_dn2[at]))
+    errors = reference.errors[which]
     for name, shape in shapes.items():
         row = np.zeros(len(reference.keys))
-        for i in which:
-            place = reference.keys[i].place
-            place = place if place in layout.signal_dn else (place[0], "Gr")
-            s, v = max(layout.signal_dn[place], 0.0), layout.variance_dn2[place]
-            row[i] = shape(s, v) / reference.errors[i]
+        row[which] = np.array([shape(s, v) for s, v in expected]) / errors
         size = float(np.linalg.norm(row))
         if size == 0:
             continue
         row /= size
-        if all(abs(float(row @ other)) <= _SAME for other in kept):
-            kept.append(row)
+        own = row[which]
+        if all(abs(float(own @ other)) <= _SAME for other in kept):
+            kept.append(own)
             yield name, row
 
 

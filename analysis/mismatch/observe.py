@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.bank.bulk import Bulk
-from analysis.mismatch.bank.coherent import SpectrumSums
+from analysis.mismatch.bank.coherent import SpectrumSums, half_bins
 from analysis.mismatch.bank.common import common
 from analysis.mismatch.bank.linemeans import AXES, Axis, LineMeans
 from analysis.mismatch.bank.local import local_scalars, variances, widened
@@ -226,7 +226,8 @@ def observing(
             lines |= {(one.exposure, axis): whole.lines(one, axis) for axis in AXES}
         if watch is not None:
             watch(one.exposure, measured)
-        for name, channel in measured.channels.items():
+        fine = half_bins(list(measured.channels.values()), frames - 1)
+        for own, (name, channel) in zip(fine, measured.channels.items(), strict=True):
             place = (one.exposure, name)
             levels[place] = _with_bulk(_level(channel, frames), name, many)
             if name not in sums:
@@ -239,7 +240,7 @@ def observing(
                 continue
             found[place] = scalars(channel, frames)
             variance, signal = layout.variance_dn2[place], layout.signal_dn[place]
-            sums[name].add(one.exposure, channel, frames, variance, signal)
+            sums[name].add(one.exposure, channel, frames, variance, signal, own)
             if kept.images:
                 surfaces[place] = leaning(channel, frames)
         yield

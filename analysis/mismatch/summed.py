@@ -97,13 +97,17 @@ class ChannelSums:
         frames: int,
         variance_dn2: float,
         signal_dn: float,
+        fine: NDArray[np.float64],
     ) -> None:
-        """Take one exposure; the variance and signal that are expected weigh it."""
+        """Take one exposure; the variance and signal that are expected weigh it.
+
+        `fine` are the channel's `half_bins`.
+        """
         pixel = channel.estimates["pixel_variance"].value
         self.patterns.add(exposure, channel.mean_frame, pixel, frames)
         if frames > 2:
             self.variances.add(channel.variance_map, (frames - 1) / variance_dn2)
-        self.spectra.add(channel, frames, variance_dn2, signal_dn)
+        self.spectra.add(channel, frames, variance_dn2, signal_dn, fine)
 
 
 class SensorSums:

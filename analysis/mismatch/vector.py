@@ -1,9 +1,11 @@
 """The bank's numbers of one observation in one fixed order."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
+from itertools import chain
 from math import inf, isfinite, log, nan, sqrt
+from operator import itemgetter
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +14,7 @@ from analysis.mismatch.bank.key import MOSAIC, Key, split_name
 from analysis.mismatch.bank.local import LOCAL_NAMES
 from analysis.mismatch.bank.scalars import NAMES, UNKNOWN, Number
 from analysis.mismatch.basefit import CLIPPED_SHARE, BaseFit, colour
-from analysis.mismatch.layout import Layout, Place
+from analysis.mismatch.layout import Layout, Place, Taken
 from analysis.mismatch.observe import Observation
 from analysis.mismatch.scenes import SCENE
 
@@ -22,13 +24,21 @@ RELATIVE_RATIO = 3e-5
 
 
 _key = lru_cache(maxsize=None)(Key)  # the same in every simulation
-_split = lru_cache(maxsize=None)(split_name)
+_of_names = itemgetter(*NAMES)
 
 
 @cache
 def _keys(place: Place) -> tuple[Key, ...]:
-    """Return the keys of all `NAMES` at a place."""
-    return tuple(_key(name, "exposure", *place) for name in NAMES)
+    """Return the keys of all `NAMES` at a place, and of its pixel variance and level."""
+    names = (*NAMES, "pixel_variance", "level")
+    return tuple(_key(name, "exposure", *place) for name in names)
+
+
+@lru_cache(maxsize=4096)
+def _keys_of(scope: str, exposure: str, channel: str, labels: tuple[str, ...]) -> tuple[Key, ...]:
+    """Return the keys of numbers by their labels."""
+    each = map(split_name, labels)
+    return tuple(_key(statistic, scope, exposure, channel, detail) for statistic, detail in each)
 
 
 @dataclass(frozen=True)
@@ -57,45 +67,46 @@ class Vector:
 
 def vector(layout: Layout, seen: Observation, fit: BaseFit) -> Vector:
     """Return the numbers of an observation beside the base numbers fitted to it."""
-    rows: list[tuple[Key, Number]] = []
-    shared: dict[Key, float] = {}
+    keys: list[Key] = []
+    numbers: list[Number] = []
+    shared: dict[int, float] = {}
+
+    def add(some: Iterable[Key], own: Iterable[Number]) -> None:
+        keys.extend(some)
+        numbers.extend(own)
+
+    def add_all(scope: str, exposure: str, channel: str, own: Mapping[str, Number]) -> None:
+        add(_keys_of(scope, exposure, channel, tuple(own)), own.values())
+
+    channels = layout.channels
+    darks = sum(e.kind == "dark" for e in layout.exposures)
     for exposure in layout.uniform:
-        for channel in layout.channels:
+        for channel in channels:
             place = (exposure.name, channel)
-            own = seen.scalars[place]
-            rows += zip(_keys(place), [own[name] for name in NAMES], strict=True)
             variance = UNKNOWN if place in layout.still else _variance(place, seen, fit)
-            rows.append((_key("pixel_variance", "exposure", *place), variance))
-            level = _level(layout, exposure.name, channel, seen, fit)
-            rows.append((_key("level", "exposure", *place), level))
-        if "Gr" in layout.channels and exposure.kind == "flat":
-            key = _key("channel_ratio", "exposure", exposure.name, "G")
-            shared[key] = _drawn(layout, exposure.name, seen, fit)
-            rows.append((key, _ratio(exposure.name, seen, fit, shared[key])))
-        rows += _in_common(exposure.name, seen)
+            level = _level(exposure, channel, seen, fit, darks)
+            add(_keys(place), (*_of_names(seen.scalars[place]), variance, level))
+        if "Gr" in channels and exposure.kind == "flat":
+            drawn = _drawn(layout, exposure.name, seen, fit)
+            shared[len(keys)] = drawn
+            ratio = _ratio(exposure.name, seen, fit, drawn)
+            add([_key("channel_ratio", "exposure", exposure.name, "G")], [ratio])
+        add_all(MOSAIC, exposure.name, "", seen.common.get(exposure.name, {}))
     for exposure in layout.pictures:
-        rows += _of_scene(layout, exposure.name, seen, fit)
-        rows += _in_common(exposure.name, seen)
-    for (channel, name), numbers in seen.maps.items():
-        for label, number in numbers.items():
-            statistic, detail = _split(label)
-            rows.append((_key(statistic, name, "", channel, detail), number))
-    for channel, numbers in seen.pooled.items():
-        for label, number in numbers.items():
-            statistic, detail = _split(label)
-            rows.append((_key(statistic, "all", "", channel, detail), number))
-    keys = tuple(key for key, _ in rows)
-    values, errors = np.array([number for _, number in rows]).T
+        for key, number in _of_scene(layout, exposure.name, seen, fit):
+            add([key], [number])
+        add_all(MOSAIC, exposure.name, "", seen.common.get(exposure.name, {}))
+    for (channel, name), own in seen.maps.items():
+        add_all(name, "", channel, own)
+    for channel, own in seen.pooled.items():
+        add_all("all", "", channel, own)
+    told = np.fromiter(chain.from_iterable(numbers), np.float64, 2 * len(numbers))
+    values, errors = told[::2], told[1::2]
     unknown = ~(np.isfinite(values) & np.isfinite(errors) & (errors > 0))
     values, errors = np.where(unknown, nan, values), np.where(unknown, inf, errors)
-    alike = [shared.get(key, 0.0) for key in keys] if shared else np.zeros(len(keys))
-    return Vector(keys, values, errors, np.asarray(alike))
-
-
-def _in_common(name: str, seen: Observation) -> Iterator[tuple[Key, Number]]:
-    for label, number in seen.common.get(name, {}).items():
-        statistic, detail = _split(label)
-        yield _key(statistic, MOSAIC, name, "", detail), number
+    alike = np.zeros(len(keys))
+    alike[list(shared)] = list(shared.values())
+    return Vector(tuple(keys), values, errors, alike)
 
 
 def _of_scene(
@@ -146,12 +157,12 @@ def _variance(place: Place, seen: Observation, fit: BaseFit) -> Number:
     return log(level.variance_dn2 / expected), sqrt(2 / level.dof)
 
 
-def _level(layout: Layout, name: str, channel: str, seen: Observation, fit: BaseFit) -> Number:
-    """Return a dark's level against all darks, a flat's against its light, DN."""
+def _level(exposure: Taken, channel: str, seen: Observation, fit: BaseFit, darks: int) -> Number:
+    """Return a dark's level against all darks, of so many, a flat's against its light, DN."""
+    name = exposure.name
     level = seen.levels[name, channel]
-    exposure = next(e for e in layout.exposures if e.name == name)
     if exposure.kind == "dark":
-        if sum(e.kind == "dark" for e in layout.exposures) < 2:
+        if darks < 2:
             return nan, inf
         return level.level_dn - fit.black_dn[channel], level.level_error_dn
     per_light = fit.light_dn.get(colour(channel))

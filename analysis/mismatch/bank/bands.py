@@ -14,6 +14,7 @@ from analysis.mismatch.bank.coherent import slow_lines
 from analysis.mismatch.bank.peaks import Peak, largest_line, line_top
 from analysis.mismatch.bank.rowlags import row_lags
 from analysis.mismatch.bank.scalars import Number
+from dsis.compiled import kernel
 from dsis.measures import Channel
 
 Array = NDArray[np.float64]
@@ -49,22 +50,25 @@ class Bands:
         """Take one exposure; the variance and signal that are expected weigh it."""
         if not all(c.estimates["pixel_variance"].value > 0 for c in channels.values()):
             return
-        shapes = {"": dict.fromkeys(channels, 1.0), "signal": signal_dn}
-        for key, shape in shapes.items():
-            series = np.zeros((frames, self.rows))
-            noise = told = 0.0
-            for name, channel in channels.items():
-                lines, across = channel.mean_frame.shape
-                own = max(shape[name], 0.0) * across / variance_dn2[name]
-                series[:, self.sites[name][0] :: 2][:, :lines] += own * channel.moving_rows
-                noise += lines * own**2 * channel.estimates["pixel_variance"].value / across
-                told += lines * own * max(shape[name], 0.0)
-            if noise > 0:
-                seen = frames - 1
-                power = (np.abs(np.fft.rfft(series, 2 * self.rows, axis=1)) ** 2).sum(0)
-                self.power[key] += told * power / noise
-                self.weight[key][0] += told * seen
-                self.weight[key][1] += told**2 * seen
+        series = np.zeros((len(_LABELS), frames, self.rows))
+        noise, told = dict.fromkeys(_LABELS, 0.0), dict.fromkeys(_LABELS, 0.0)
+        for name, channel in channels.items():
+            lines, across = channel.mean_frame.shape
+            shapes = {"": 1.0, "signal": max(signal_dn[name], 0.0)}
+            weights = []
+            for key, shape in shapes.items():
+                own = shape * across / variance_dn2[name]
+                noise[key] += lines * own**2 * channel.estimates["pixel_variance"].value / across
+                told[key] += lines * own * shape
+                weights.append(own)
+            _add(series, tuple(weights), self.sites[name][0], channel.moving_rows)
+        powers = (np.abs(np.fft.rfft(series, 2 * self.rows, axis=2)) ** 2).sum(1)
+        seen = frames - 1
+        for key, power in zip(_LABELS, powers, strict=True):
+            if noise[key] > 0:
+                self.power[key] += told[key] * power / noise[key]
+                self.weight[key][0] += told[key] * seen
+                self.weight[key][1] += told[key] ** 2 * seen
 
     def numbers(self) -> dict[str, Number]:
         """Return the largest of each weighting, and what rows share of one amplitude in DN."""
@@ -89,3 +93,12 @@ class Bands:
                 as_plane = 1 + (power - 1) / len(self.sites)
                 found[_KINDS[key]] = Peak(0.0, 2 * cycles / self.rows, as_plane, off)
         return found
+
+
+@kernel
+def _add(series: Array, weights: tuple[float, ...], first: int, moved: Array) -> None:
+    """Add a channel's rows (frame, row) to series of all (weighting, frame, row of the mosaic)."""
+    for k in range(len(weights)):
+        for t in range(moved.shape[0]):
+            for y in range(moved.shape[1]):
+                series[k, t, first + 2 * y] += weights[k] * moved[t, y]

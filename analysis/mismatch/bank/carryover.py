@@ -120,9 +120,11 @@ class CarryOver:
         squares of the own.
         """
         inner, edge, after = self.inner, self.edges[axis], AXES.index(axis)
-        counts, moved = inner.counts + edge.counts, inner.moved + edge.moved
+        by_code = np.empty((5, FOLDED))
+        np.add(inner.counts, edge.counts, out=by_code[:3])
+        for k, column in ((3, 1 + after), (4, 0)):
+            np.add(inner.moved[:, column], edge.moved[:, column], out=by_code[k])
         squares = inner.squares + edge.squares
-        by_code = np.stack([*counts, moved[:, 1 + after], moved[:, 0]])
         return by_code, squares[[0, 2 + after, 4 + after, 1]]
 
     def samples(self, axis: str) -> Samples | None:
@@ -166,26 +168,12 @@ class CarryOverSums:
         for axis in AXES:
             kept = own.samples(axis)
             self.samples[axis] += (kept,) if kept is not None else ()
-        sums = [own.sums(axis) for axis in AXES]
-        count, square, product, before = np.array([all_ for _, all_ in sums]).T[..., None, None]
-        told = np.minimum(square, before) > 0
-        before = np.where(told, before, 1.0)
         # n - 1 differences of successive frames, which share frames, say as much as fewer apart.
         weight = (2 * own.frames - 2) / (3 * own.frames - 4)
-        signs = np.array([1.0, -1.0])  # of cosines, of sines
-        size = np.array([own.size[axis] for axis in AXES])[:, None, None]
-        waves = np.stack([(by_code @ _waves()).T for by_code, _ in sums])
-        cosines, sines, doubled = waves.reshape(len(AXES), 3, len(PERIODS), -1).swapaxes(0, 1)
-        codes, apart, joined = doubled[..., :1], cosines[..., 1:2], cosines[..., 2:3]
-        moved, through = (np.stack([cosines[..., k], sines[..., k]], -1) for k in (3, 4))
-        # Of cosines (cos a - cos b)^2, of sines (sin a - sin b)^2, from a - b and a + b.
-        whole = count + signs * codes / 2 - (apart + signs * joined)
-        left = whole - through**2 / before
-        known = told & (left > _LEAST / size * np.abs(whole))
-        top = moved - through * product / before
-        scale = weight / (np.maximum(square - product**2 / before, 1e-12) / np.maximum(count, 1))
-        self.top += np.where(known, top * scale, 0.0)
-        self.bottom += np.where(known, left * scale, 0.0)
+        for k, axis in enumerate(AXES):
+            by_code, squares = own.sums(axis)
+            waves = by_code @ _waves()
+            _add(waves, squares, own.size[axis], weight, self.top[k], self.bottom[k])
 
     def numbers(self) -> dict[str, Number]:
         """Return amplitudes and their errors in white noise, DN, by name."""
@@ -198,6 +186,42 @@ class CarryOverSums:
                     known = bottom > 0
                     found[name] = (float(top / bottom), 1 / sqrt(bottom)) if known else UNKNOWN
         return found
+
+
+@kernel
+def _add(
+    waves: Array, squares: Array, size: int, weight: float, tops: Array, bottoms: Array
+) -> None:
+    """Add what `sums` says of each wave of an axis, by least squares: (period, phase).
+
+    Parameters
+    ----------
+    waves
+        Sums by code, times `_waves`.
+    squares
+        Of all samples.
+    size
+        Samples in a line.
+    weight
+        Of differences between frames.
+    tops, bottoms
+        Are added to.
+    """
+    count, square, product, before = squares
+    if not min(square, before) > 0:
+        return
+    scale = weight / (max(square - product**2 / before, 1e-12) / max(count, 1))
+    periods = len(tops)
+    for p in range(periods):
+        codes, apart, joined = waves[0, 2 * periods + p], waves[1, p], waves[2, p]
+        for phase, sign in enumerate((1.0, -1.0)):
+            moved, through = waves[3, phase * periods + p], waves[4, phase * periods + p]
+            # Of cosines (cos a - cos b)^2, of sines (sin a - sin b)^2, from a - b and a + b.
+            whole = count + sign * codes / 2 - (apart + sign * joined)
+            left = whole - through**2 / before
+            if left > _LEAST / size * abs(whole):
+                tops[p, phase] += (moved - through * product / before) * scale
+                bottoms[p, phase] += left * scale
 
 
 @cache

@@ -1,8 +1,7 @@
 """What a channel shows over all exposures: spectra, lines of them, and lags along lines."""
 
 from collections.abc import Sequence
-from functools import cached_property
-from itertools import islice
+from functools import cache, cached_property
 from math import sqrt
 
 import numpy as np
@@ -33,6 +32,7 @@ from analysis.mismatch.bank.scalars import (
     ratio_root,
     score_of_log,
 )
+from dsis.compiled import kernel
 from dsis.measures import Channel
 
 Array = NDArray[np.float64]
@@ -40,6 +40,7 @@ _ALONE = 2.0  # times as high a bin elsewhere is the peak, whatever a block sums
 LAGS = 16  # along a line, pixels of the plane
 RANKS = (2, 3, 4)  # of lines beside the strongest
 PATCHES = (4, 8, 16)  # pixels of the plane, that share noise
+_KEYS = ("", "signal")
 
 
 class SpectrumSums:
@@ -60,29 +61,37 @@ class SpectrumSums:
         self.shape, self.waves = shape, waves
         n, m = shape
         self.power, self.relative = np.zeros((2, n, m // 2 + 1))
-        self.rows = {key: np.zeros(n // 2 + 1) for key in ("", "signal")}
+        self.rows = dict(zip(_KEYS, np.zeros((2, n // 2 + 1)), strict=True))
         self.columns = np.zeros(m // 2 + 1)
         # Of row means, on half bins: a sinusoid loses a fifth at most between two of them.
-        self.fine = {key: np.zeros(n + 1) for key in self.rows}
+        self.fine = dict(zip(_KEYS, np.zeros((2, n + 1)), strict=True))
         self.seen = 0
-        self.weight = {key: [0.0, 0.0] for key in ("", "signal")}
+        self.weight = {key: [0.0, 0.0] for key in _KEYS}
 
-    def add(self, channel: Channel, frames: int, variance_dn2: float, signal_dn: float) -> None:
-        """Take the spectra of one exposure."""
+    def add(
+        self,
+        channel: Channel,
+        frames: int,
+        variance_dn2: float,
+        signal_dn: float,
+        fine: Array | None = None,
+    ) -> None:
+        """Take the spectra of one exposure; `fine` are its `half_bins`, if they are at hand."""
         pixel = channel.estimates["pixel_variance"].value
         if not pixel > 0:
             return
         seen = frames - 1
         weights = {"": seen / variance_dn2, "signal": seen * max(signal_dn, 0) ** 2 / variance_dn2}
         if self.waves:
-            self.power += weights[""] * channel.power_spectrum / pixel
-            self.relative += seen * channel.power_spectrum / pixel
+            _add(self.power, weights[""], channel.power_spectrum, pixel)
+            _add(self.relative, seen, channel.power_spectrum, pixel)
         self.seen += seen
-        self.columns += weights[""] * channel.column_spectrum / pixel
-        fine = _half_bins(channel, seen)
+        _add_line(self.columns, weights[""], channel.column_spectrum, pixel)
+        if fine is None:
+            fine = half_bins([channel], seen)[0]
         for key, weight in weights.items():
-            self.rows[key] += weight * channel.row_spectrum / pixel
-            self.fine[key] += weight * fine / pixel
+            _add_line(self.rows[key], weight, channel.row_spectrum, pixel)
+            _add_line(self.fine[key], weight, fine, pixel)
             self.weight[key][0] += weight
             self.weight[key][1] += weight**2 / seen
 
@@ -177,7 +186,7 @@ class SpectrumSums:
         white = self._white()
         if not white > 0:
             return []
-        return list(islice(separate(self.power, self.shape[1], white), RANKS[-1] + 1))
+        return separate(self.power, self.shape[1], white, RANKS[-1] + 1)
 
     def _white(self) -> float:
         """Return the power of a bin of white noise: from the median, that lines do not raise."""
@@ -253,8 +262,9 @@ class SpectrumSums:
             found[label] = UNKNOWN
             if not self.waves or min(down, across) < 1:
                 continue
-            inner = self.power[[*range(1, down + 1), *range(n - down, n)], 1 : across + 1]
-            ratio = float(inner.mean()) / self.weight[""][0]
+            inner = np.concatenate([self.power[1 : down + 1], self.power[n - down :]])
+            inner = np.ascontiguousarray(inner[:, 1 : across + 1])
+            ratio = float(inner.sum()) / inner.size / self.weight[""][0]
             found[label] = ratio_root(ratio, 2 * degrees * inner.size)
         return found
 
@@ -264,22 +274,24 @@ class SpectrumSums:
         A memory's spectrum is smooth: sinusoids, which correlate at their period, are taken out.
         """
         n, m = self.shape
-        reach = {axis: min(LAGS, size // 2 - 1) for axis, size in (("rows", m), ("columns", n))}
+        names = {axis: _lag_names(axis, size) for axis, size in (("rows", m), ("columns", n))}
         if not self.waves:
-            return {
-                _lag_name(a, k): UNKNOWN for a, most in reach.items() for k in range(1, most + 1)
-            }
+            return {name: UNKNOWN for own in names.values() for name in own}
         covariance = np.fft.irfft2(without_lines(self.relative, self.seen), s=(n, m))
         sd = 1 / sqrt(n * m * self.seen)
         found: dict[str, Number] = {}
         for axis, line in (("rows", covariance[0]), ("columns", covariance[:, 0])):
-            for lag in range(1, reach[axis] + 1):
-                found[_lag_name(axis, lag)] = (float(line[lag] / line[0]), sd)
+            own = names[axis]
+            values = (line[1 : len(own) + 1] / line[0]).tolist()
+            found |= {name: (value, sd) for name, value in zip(own, values, strict=True)}
         return found
 
 
-def _lag_name(axis: str, lag: int) -> str:
-    return f"line_correlation along {axis} {lag}"
+@cache
+def _lag_names(axis: str, size: int) -> tuple[str, ...]:
+    """Return the names of the lags, from 1 on, along lines of so many pixels."""
+    most = min(LAGS, size // 2 - 1)
+    return tuple(f"line_correlation along {axis} {lag}" for lag in range(1, most + 1))
 
 
 def line_name(rank: int) -> str:
@@ -299,11 +311,32 @@ def _line(power: Array, samples: int) -> Array:
     return power[np.newaxis, 1 : (samples + 1) // 2]
 
 
-def _half_bins(channel: Channel, seen: int) -> Array:
-    """Return the temporal power of row means as `row_spectrum`, at half bins too: (rows + 1,)."""
-    lines = channel.moving_rows.shape[1]
-    power = np.abs(np.fft.rfft(channel.moving_rows, 2 * lines, axis=1)) ** 2
-    return np.asarray(power.sum(0) * (channel.mean_frame.shape[1] / lines / max(seen, 1)))
+def half_bins(channels: Sequence[Channel], seen: int) -> list[Array]:
+    """Return the temporal power of row means as `row_spectrum`, at half bins too: (rows + 1,).
+
+    That of each channel; those of one shape are transformed in one call.
+    """
+    if len({channel.mean_frame.shape for channel in channels}) > 1:
+        return [half_bins([channel], seen)[0] for channel in channels]
+    lines, across = channels[0].mean_frame.shape
+    moving = np.array([channel.moving_rows for channel in channels])
+    power = np.abs(np.fft.rfft(moving, 2 * lines, axis=2)) ** 2
+    return list(power.sum(1) * (across / lines / max(seen, 1)))
+
+
+@kernel
+def _add(into: Array, weight: float, power: Array, pixel: float) -> None:
+    """Add a weighted spectrum in units of the variance of pixels: (row, bin)."""
+    for y in range(into.shape[0]):
+        _add_line(into[y], weight, power[y], pixel)
+
+
+@kernel
+def _add_line(into: Array, weight: float, power: Array, pixel: float) -> None:
+    """Add the same of a line: (bin,); shares are as exact as the spectrum is."""
+    own, white = power.dtype.type(weight), power.dtype.type(pixel)
+    for x in range(into.size):
+        into[x] += own * power[x] / white
 
 
 def slow_lines(power: Array, degrees: float) -> Number:

@@ -9,7 +9,9 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.mismatch.bank.pairwise import total
 from analysis.mismatch.bank.scalars import UNKNOWN, Number, ratio_root
+from dsis.compiled import kernel
 from dsis.measures import Channel
 
 Array = NDArray[np.float64]
@@ -53,46 +55,50 @@ def common(
     columns = _lines(channels, pixel, {name: x for name, (_, x) in sites.items()}, 1, frames)
     # Rows and columns that move carry the frame's mean along.
     still = max(rows[0] + columns[0] - 1, 1.0)
-    alike = dict.fromkeys(channels, 1.0)
-    moved = {name: c.frame_means - c.frame_means.sum() / frames for name, c in channels.items()}
-
-    def along(shape: Mapping[str, float]) -> Number:
-        return _frames(channels, pixel, shape, moved, still)
-
-    found = {
-        "row_variance": ratio_root(*rows),
-        "column_variance": ratio_root(*columns),
-        "frame_variance": along(alike),
-        "frame_variance of light": UNKNOWN,
-    }
+    shapes = {"frame_variance": (1.0,) * len(channels)}
     # What alternates from site to site is constant in every plane, but for its sign.
     for name, odd in SIGNS.items():
-        signs = {channel: 1.0 - 2.0 * odd(*sites[channel]) for channel in channels}
-        found[f"alternation_variance of {name}"] = along(signs)
+        signs = tuple(1.0 - 2.0 * odd(*sites[channel]) for channel in channels)
+        shapes[f"alternation_variance of {name}"] = signs
     if all(value > 0 for value in signal_dn.values()):
         top = max(signal_dn.values())
-        shares = {name: signal_dn[name] / top for name in channels}
-        found["frame_variance of light"] = along(shares)
+        shapes["frame_variance of light"] = tuple(signal_dn[name] / top for name in channels)
+    moved = np.array([c.frame_means for c in channels.values()])
+    pixels = [(c.mean_frame.size, pixel[name]) for name, c in channels.items()]
+    squares = _frames(moved, np.array(pixels), np.array(list(shapes.values()))).tolist()
+    along = dict(zip(shapes, squares, strict=True))
+    found = dict.fromkeys(COMMON, UNKNOWN)
+    found["row_variance"], found["column_variance"] = ratio_root(*rows), ratio_root(*columns)
+    for name, square in along.items():
+        found[name] = ratio_root(square / still, frames - 1)
     return found
 
 
-def _frames(
-    channels: Mapping[str, Channel],
-    pixel: Mapping[str, float],
-    shape: Mapping[str, float],
-    moved: Mapping[str, Array],
-    still: float,
-) -> Number:
-    """Return the mean square of the frame means' amplitude along a shape over the channels."""
-    frames = min(map(len, moved.values()))
-    top = np.zeros(frames)
-    weight = 0.0
-    for name, channel in channels.items():
-        own = shape[name] * channel.mean_frame.size / pixel[name]
-        top += own * moved[name]
-        weight += own * shape[name]
-    square = float((top**2).sum()) / weight / (frames - 1)
-    return ratio_root(square / still, frames - 1)
+@kernel
+def _frames(means: Array, pixels: Array, shapes: Array) -> Array:
+    """Return the mean square of the frame means' amplitude along shapes over the channels.
+
+    Parameters
+    ----------
+    means
+        Of frames: (channel, frame).
+    pixels
+        How many a channel has, and their variance, DN^2: (channel, 2).
+    shapes
+        (shape, channel).
+    """
+    channels, frames = means.shape
+    moved, found = np.empty(means.shape), np.empty(len(shapes))
+    for c in range(channels):
+        moved[c] = means[c] - total(means[c]) / frames
+    for k in range(found.size):
+        top, weight = np.zeros(frames), 0.0
+        for c in range(channels):
+            own = shapes[k, c] * pixels[c, 0] / pixels[c, 1]
+            top += own * moved[c]
+            weight += own * shapes[k, c]
+        found[k] = total(top * top) / weight / (frames - 1)
+    return found
 
 
 def _lines(
@@ -103,7 +109,7 @@ def _lines(
     frames: int,
 ) -> tuple[float, float]:
     """Return the mean square of lines that two channels share, and its degrees of freedom."""
-    total = dof = 0.0
+    squares = dof = 0.0
     for side in (0, 1):
         names = [name for name in channels if parity[name] == side]
         count = min(channels[name].mean_frame.shape[axis] for name in names)
@@ -113,8 +119,16 @@ def _lines(
             channel = channels[name]
             moved = channel.moving_rows if axis == 0 else channel.moving_columns
             own = channel.mean_frame.shape[1 - axis] / pixel[name]
-            top += own * moved[:, :count]
+            _add(moved, own, top)
             weight += own
-        total += float((top**2).sum()) / weight
+        squares += float((top * top).sum()) / weight
         dof += (frames - 1) * (count - 1)
-    return total / dof, dof
+    return squares / dof, dof
+
+
+@kernel
+def _add(moved: Array, weight: float, top: Array) -> None:
+    """Add what moves (frame, line) to the first lines that all have."""
+    for t in range(top.shape[0]):
+        for i in range(top.shape[1]):
+            top[t, i] += weight * moved[t, i]

@@ -28,9 +28,9 @@ def edges(by_row: Array, by_column: Array, squares: tuple[float, float]) -> dict
         ("columns", by_column, squares[1], by_row.size),
     ):
         sd = sqrt(square / across)
-        for name, shape in zip(names(axis), edge_shapes(means.size), strict=True):
-            clear = means.size >= _LEAST_LINES and sd > 0
-            found[name] = (float(shape @ means) / sd, 1.0) if clear else UNKNOWN
+        clear = means.size >= _LEAST_LINES and sd > 0
+        for name, shape in _shapes(axis, means.size):
+            found[name] = (float(shape.dot(means)) / sd, 1.0) if clear else UNKNOWN
     return found
 
 
@@ -67,3 +67,9 @@ def edge_shapes(size: int) -> Array:
     """Return the decays from the first and the last line, less smooth polynomials, of norm 1."""
     rest = beyond_smooth(decays(size).T).T
     return np.asarray(rest / np.linalg.norm(rest, axis=1, keepdims=True))
+
+
+@lru_cache(maxsize=64)
+def _shapes(axis: str, size: int) -> tuple[tuple[str, Array], ...]:
+    """Return the names of an axis' numbers, and the shape of each."""
+    return tuple(zip(names(axis), edge_shapes(size), strict=True))

@@ -12,6 +12,7 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.mismatch.bank.pairwise import total
 from dsis.compiled import kernel
 
 Array = NDArray[np.float64]
@@ -89,9 +90,9 @@ class PatternSums:
     def add(self, exposure: str, mean_frame: Array, variance_dn2: float, frames: int) -> None:
         """Take the mean frame of an exposure and the variance of a pixel over time."""
         row, weight = self.regressors.rows[exposure], self.regressors.weights[exposure]
-        _add(mean_frame, float(mean_frame.sum()) / mean_frame.size, weight * row, self.moments)
-        self.gram += weight * np.outer(row, row)
-        self.noise += weight**2 * np.outer(row, row) * variance_dn2 / frames
+        of_noise = (weight**2, variance_dn2, frames)
+        _add(mean_frame, weight, row, self.moments)
+        _add_products(row, weight, of_noise, self.gram, self.noise)
 
     def maps(self) -> dict[str, tuple[Array, float]]:
         """Return each map (row, column) in DN at the regressor's largest value, and its noise.
@@ -117,12 +118,28 @@ class PatternSums:
 
 
 @kernel
-def _add(mean_frame: Array, mean: float, shares: Array, moments: Array) -> None:
+def _add(mean_frame: Array, weight: float, row: Array, moments: Array) -> None:
     """Add shares of a mean frame less its mean to the moments (regressor, row, column)."""
+    mean = total(mean_frame.reshape(-1)) / mean_frame.size
     for y in range(mean_frame.shape[0]):
         line = mean_frame[y]
-        for i in range(shares.size):
-            share, into = shares[i], moments[i, y]
+        for i in range(row.size):
+            share, into = weight * row[i], moments[i, y]
             if share != 0:  # darks have no gain
                 for x in range(line.size):
                     into[x] += share * (line[x] - mean)
+
+
+@kernel
+def _add_products(
+    row: Array, weight: float, of_noise: tuple[float, float, int], gram: Array, noise: Array
+) -> None:
+    """Add weighted products of regressors, and what noise makes of them: (regressor, regressor).
+
+    `of_noise`: the weight squared, the variance of a pixel over time, and how many frames.
+    """
+    squared, variance, frames = of_noise
+    for i in range(row.size):
+        for k in range(row.size):
+            gram[i, k] += weight * (row[i] * row[k])
+            noise[i, k] += squared * (row[i] * row[k]) * variance / frames

@@ -19,7 +19,8 @@ from dsis.measures.residuals import pixel_residuals
 Array = NDArray[np.float64]
 _FAR_OUT, _FEW = 5.0, 0.01  # standard deviations of single pixels, and their share at most
 _CHANCE = 3.0  # standard errors of a mean square
-STANDING_OUT = (3.5, 5, 8)  # standard deviations of a map above its middle
+STANDING_OUT = (3.5, 5.0, 8.0)  # standard deviations of a map above its middle
+OUTLYING = tuple(f"outlying_pixels of {limit:g}" for limit in STANDING_OUT)
 
 
 @dataclass(frozen=True)
@@ -64,7 +65,8 @@ def parts(image: Array, noise: float) -> Parts:
     degree = smooth.degree
     row = m * float(rows @ rows) / (n - 1 - degree)
     column = n * float(columns @ columns) / (m - 1 - degree)
-    mean_square = squares / pixels.size
+    mean_square, sd = squares / pixels.size, sqrt(square)
+    *above, far = _above(pixels, sd, *STANDING_OUT, _FAR_OUT)
     lines = (
         sure_of_lines(row, square, n - 1 - degree),
         sure_of_lines(column, square, m - 1 - degree),
@@ -78,9 +80,9 @@ def parts(image: Array, noise: float) -> Parts:
         **_correlations(pixels, mean_square),
         **patches(pixels, square),
         "outlying_pixels": _outlying(scatter + mean_square**2, square, pixels.size),
-        **_standing_out(pixels, square),
+        **{name: (root_of(n), 1.0) for name, n in zip(OUTLYING, above, strict=True)},
         **seams(by_row, by_column, lines),
-        **edges(*_of_many(pixels, square, by_row, by_column), lines),
+        **edges(*_of_many(pixels, sd, far, by_row, by_column), lines),
     }
     return Parts(pixels, rows, columns, square, coefficients, numbers)
 
@@ -94,14 +96,13 @@ def sure_of_lines(lines: float, pixels: float, dof: float) -> float:
     return max(pixels, lines / (1 + _CHANCE * sqrt(2 / dof)))
 
 
-def _of_many(pixels: Array, square: float, by_row: Array, by_column: Array) -> tuple[Array, Array]:
-    """Return line means without what few pixels that stand far out add to them."""
-    limit = _FAR_OUT * sqrt(square)
-    if pixels.max() <= limit and pixels.min() >= -limit:
+def _of_many(
+    pixels: Array, sd: float, far: int, by_row: Array, by_column: Array
+) -> tuple[Array, Array]:
+    """Return line means without what few pixels, so many, that stand far out add to them."""
+    if not 0 < far < _FEW * pixels.size:
         return by_row, by_column
-    y, x = np.nonzero(np.abs(pixels) > limit)
-    if not 0 < y.size < _FEW * pixels.size:
-        return by_row, by_column
+    y, x = np.nonzero(np.abs(pixels) > _FAR_OUT * sd)
     own = pixels[y, x]
     row = by_row - np.bincount(y, own, by_row.size) / by_column.size
     return row, by_column - np.bincount(x, own, by_column.size) / by_row.size
@@ -140,14 +141,24 @@ def _outlying(fourth: float, square: float, size: int) -> Number:
     return log(max(fourth / square**2, 0.1) / 3), sqrt(24 / size) / 3
 
 
-def _standing_out(pixels: Array, square: float) -> dict[str, Number]:
-    """Return how many pixels lie far above the others, as roots."""
-    sd = sqrt(square)
-    far = pixels[pixels > min(STANDING_OUT) * sd]  # few: all others are looked at once
-    return {
-        f"outlying_pixels of {limit:g}": (float(rooted(np.count_nonzero(far > limit * sd))), 1.0)
-        for limit in STANDING_OUT
-    }
+@kernel
+def _above(
+    pixels: Array, sd: float, low: float, middle: float, high: float, either: float
+) -> tuple[int, int, int, int]:
+    """Return how many pixels lie above so many standard deviations, and farther to either side."""
+    by_low = by_middle = by_high = far = 0
+    for value in pixels.reshape(-1):
+        if value > low * sd:
+            by_low += 1
+            by_middle += int(value > middle * sd)
+            by_high += int(value > high * sd)
+        far += int(abs(value) > either * sd)
+    return by_low, by_middle, by_high, far
+
+
+def root_of(count: float) -> float:
+    """Return what `rooted` does of a single count."""
+    return 2 * sqrt(count + 3 / 8)
 
 
 def rooted(count: ArrayLike) -> Array:

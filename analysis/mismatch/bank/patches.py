@@ -1,16 +1,19 @@
 """Patches of a map: how much pixels that lie together have in common, over several sizes."""
 
 from functools import lru_cache
-from math import sqrt
+from math import cbrt, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.mismatch.bank.pairwise import total
 from analysis.mismatch.bank.scalars import UNKNOWN, Number
+from dsis.compiled import kernel
 from dsis.measures.fixed_pattern import Smooth
 
 Array = NDArray[np.float64]
 SIZES = (4, 8, 16)  # pixels of the plane along a side
+_NAMES = tuple(f"fixed_patch_variance of {size} pixels" for size in SIZES)
 _LEAST_PATCHES = 12.0  # beyond lines and smooth surfaces, to be worth a number
 
 
@@ -26,21 +29,36 @@ def patches(pixels: Array, square: float) -> dict[str, Number]:
     """
     rows, columns = pixels.shape
     found: dict[str, Number] = {}
-    for size, name in zip(SIZES, names(), strict=True):
+    for size, name in zip(SIZES, _NAMES, strict=True):
         free = _free(rows, columns, size)
         if free < _LEAST_PATCHES or not square > 0:
             found[name] = UNKNOWN
             continue
-        sums = _sums(_sums(pixels, size).T, size)
-        ratio = float((sums**2).sum()) / size**2 / free / square
+        ratio = _squares(pixels, size) / size**2 / free / square
         dof = (rows - 1) * (columns - 1)
-        found[name] = float(np.cbrt(ratio)), sqrt(2 / (9 * free) - 2 / (9 * dof))
+        found[name] = cbrt(ratio), sqrt(2 / (9 * free) - 2 / (9 * dof))
     return found
 
 
 def names() -> list[str]:
     """Return the names of the numbers, in the order of `SIZES`."""
-    return [f"fixed_patch_variance of {size} pixels" for size in SIZES]
+    return list(_NAMES)
+
+
+@kernel
+def _squares(pixels: Array, size: int) -> float:
+    """Return the sum of squares of the sums over patches; what is left over belongs to none."""
+    down, across = pixels.shape[0] // size, pixels.shape[1] // size
+    squares, line = np.empty(down * across), np.empty(across * size)
+    for y in range(down):
+        line[:] = 0.0
+        for k in range(y * size, (y + 1) * size):
+            for x in range(line.size):
+                line[x] += pixels[k, x]
+        for x in range(across):
+            own = total(line[x * size : (x + 1) * size])
+            squares[y * across + x] = own * own
+    return total(squares)
 
 
 def _sums(values: Array, size: int) -> Array:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from analysis.mismatch.bank.lines import log_chance
 from analysis.mismatch.bank.scalars import UNKNOWN, Number, middle_of_gamma, score_of_log
+from dsis.compiled import kernel
 from dsis.measures.median import median
 
 Array = NDArray[np.float64]
@@ -72,15 +73,37 @@ def largest(
     white = white_level(inner, degrees)
     if not white > 0:
         return UNKNOWN
-    shape = inner.shape
-    parts = [(b, summed(inner, b)) for b in blocks if b[0] <= shape[0] and b[1] <= shape[1]]
+    (rows, columns), own = inner.shape, _highest(inner)
+    parts = [
+        (own[high - 1][wide - 1], high * wide, (rows - high + 1) * (columns - wide + 1))
+        for high, wide in blocks
+        if high <= rows and wide <= columns
+    ]
     if edge is not None and edge.size:
-        parts.append(((1, 1), edge))
+        parts.append((float(edge.max()), 1, edge.size))
     least = min(
-        log_chance(float(power.max()) / white / (high * wide), 1, power.size, degrees * high * wide)
-        for (high, wide), power in parts
+        log_chance(power / white / bins, 1, count, degrees * bins) for power, bins, count in parts
     )
     return score_of_log(least), 1.0
+
+
+@kernel
+def _highest(inner: Array) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return the largest bin and the largest sums of `_BLOCKS`, by their rows and columns."""
+    one, beside, below, four = -np.inf, -np.inf, -np.inf, -np.inf
+    rows, columns = inner.shape
+    for y in range(rows):
+        line, after = inner[y], inner[min(y + 1, rows - 1)]
+        for x in range(columns):
+            one = max(one, line[x])
+        for x in range(columns - 1):
+            beside = max(beside, line[x] + line[x + 1])
+        if y + 1 < rows:
+            for x in range(columns):
+                below = max(below, line[x] + after[x])
+            for x in range(columns - 1):
+                four = max(four, line[x] + line[x + 1] + after[x] + after[x + 1])
+    return (one, beside), (below, four)
 
 
 def white_level(power: Array, degrees: float) -> float:

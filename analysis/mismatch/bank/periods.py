@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from analysis.mismatch.bank.lines import any_of, log_chance
 from analysis.mismatch.bank.peaks import Peak
 from analysis.mismatch.bank.scalars import UNKNOWN, Number, score_of_log
+from dsis.compiled import kernel
 
 Array = NDArray[np.float64]
 Image = NDArray[np.float32]
@@ -56,13 +57,11 @@ class Periods:
     def _take(self, moved: Image) -> None:
         if len(self.cells) == 1:
             self.farthest = _farthest(moved)
-        self.squares[0] += float(np.vdot(moved, moved))
-        np.clip(moved, -self.farthest, self.farthest, out=moved)
-        self.squares[1] += float(np.vdot(moved, moved))
-        rows, columns = (size // CELL for size in moved.shape)
-        whole = moved[: rows * CELL, : columns * CELL].reshape(rows * CELL, columns, CELL)
-        lines = whole.sum(1, dtype=np.float64)
-        self.cells.append(lines.reshape(rows, CELL, CELL).sum(0) / max(rows * columns, 1))
+        square = float(np.vdot(moved, moved))
+        cells, drawn_in = _folded(moved, np.float32(self.farthest))
+        self.squares[0] += square
+        self.squares[1] += float(np.vdot(moved, moved)) if drawn_in else square
+        self.cells.append(cells)
 
     @property
     def kept(self) -> float:
@@ -73,14 +72,43 @@ class Periods:
     def power(self) -> Array:
         """Return the power over time (row, column), summed over frames: of a mean of cells."""
         cells = np.array(self.cells)
-        return np.asarray((np.abs(np.fft.fft2(cells - cells.mean(0))) ** 2).sum(0))
+        waves = np.fft.fft(np.fft.fft(cells - cells.sum(0) / len(cells), axis=2), axis=1)
+        return np.asarray((np.abs(waves) ** 2).sum(0))
 
 
 def _farthest(moved: Image) -> float:
     """Return how far all but few pixels ever move between two frames; inf where few move at all."""
     flat = np.abs(moved.reshape(-1)[:: max(moved.size // _SAMPLE, 1) | 1])
-    far = float(np.quantile(flat, _MANY))
+    place = (flat.size - 1) * _MANY
+    below = int(place)
+    above = min(below + 1, flat.size - 1)
+    flat.partition((below, above))
+    # As `numpy.quantile`, which takes longer for so few: from the nearer of two values.
+    low, high, share = flat[below], flat[above], place - below
+    far = float(high - (high - low) * (1 - share) if share >= 1 / 2 else low + (high - low) * share)
     return _FAR_OUT * far if far > 0 else inf
+
+
+@kernel
+def _folded(moved: Image, farthest: np.float32) -> tuple[Array, bool]:
+    """Draw in what moves farther; return means over cells, and whether anything did."""
+    rows, columns = moved.shape[0] // CELL, moved.shape[1] // CELL
+    drawn_in = False
+    for y in range(moved.shape[0]):
+        line = moved[y]
+        for x in range(line.size):
+            if abs(line[x]) > farthest:
+                line[x] = farthest if line[x] > 0 else -farthest
+                drawn_in = True
+    cells = np.zeros((CELL, CELL))
+    for y in range(rows * CELL):
+        into, own = cells[y % CELL], np.zeros(CELL)
+        for first in range(0, columns * CELL, CELL):
+            for x in range(CELL):
+                own[x] += moved[y, first + x]
+        into += own
+    cells /= max(rows * columns, 1)
+    return cells, drawn_in
 
 
 class PeriodSums:

@@ -5,8 +5,10 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.mismatch.bank.pairwise import total
 from analysis.mismatch.bank.robust import drawn_in
 from analysis.mismatch.bank.scalars import UNKNOWN, Number, ratio_root
+from dsis.compiled import kernel
 from dsis.measures.fixed_pattern import Smooth
 
 Array = NDArray[np.float64]
@@ -28,12 +30,7 @@ class VarianceSums:
 
     def add(self, variance_map: Array, weight: float) -> None:
         """Take the variance of each pixel (row, column) of one exposure."""
-        mean = float(variance_map.sum()) / variance_map.size
-        if not mean > 0:
-            return
-        part = weight * (variance_map / mean - 1)
-        self.total += part
-        square = float((part**2).sum()) / part.size
+        square = _add(np.ascontiguousarray(variance_map), weight, self.total.reshape(-1))
         self.squares += square
         self.fourths += square**2
 
@@ -74,3 +71,21 @@ class VarianceSums:
         if null <= 1e-12 * self.squares**2:
             return UNKNOWN
         return excess / sqrt(null), 1.0
+
+
+@kernel
+def _add(variances: Array, weight: float, into: Array) -> float:
+    """Add weighted variances of pixels about their mean, relative to it; return their mean square.
+
+    Nothing where the mean is none.
+    """
+    flat = variances.reshape(-1)
+    mean = total(flat) / flat.size
+    if not mean > 0:
+        return 0.0
+    squares = np.empty(flat.size)
+    for i in range(flat.size):
+        part = weight * (flat[i] / mean - 1)
+        into[i] += part
+        squares[i] = part * part
+    return total(squares) / flat.size

@@ -3,6 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.mismatch.bank.pairwise import total
+from dsis.compiled import kernel
 from dsis.measures.median import median
 
 Array = NDArray[np.float64]
@@ -20,3 +22,24 @@ def drawn_in(values: Array) -> Array:
     apart = values - values.mean()
     limit = _FAR_OUT * typical_square(apart) ** 0.5
     return np.asarray(np.clip(apart, -limit, limit))
+
+
+@kernel
+def drawn_in_mean(pairs: Array, farthest: float, rounds: int) -> float:
+    """Return the mean of values with weights, (value, 2), by so many rounds of reweighting.
+
+    Values farther off than so many standard deviations, whose squares the weights are the inverse
+    of, do not bend it (Huber).
+    """
+    size = len(pairs)
+    weights, products = pairs[:, 1].copy(), np.empty(size)
+    mean = 0.0
+    for again in range(rounds + 1):
+        for i in range(size):
+            value, weight = pairs[i]
+            if again:
+                far = abs(value - mean) * np.sqrt(weight)
+                weights[i] = weight * min(1.0, farthest / max(far, 1e-12))
+            products[i] = value * weights[i]
+        mean = total(products) / total(weights)
+    return float(mean)

@@ -6,7 +6,7 @@ chi-squared^(1/3) is normal, var 2 / (9 dof)); largest values by the normal scor
 
 from collections.abc import Mapping
 from functools import lru_cache
-from math import exp, inf, isfinite, log, log2, nan, pi, sqrt
+from math import cbrt, exp, inf, isfinite, log, log2, nan, pi, sqrt
 
 import numpy as np
 import scipy.special
@@ -81,7 +81,7 @@ def ratio_root(ratio: float, dof: float, dof_of_finer: float = inf) -> Number:
     """Return the cube root of a ratio of mean squares, and its standard deviation about one."""
     if not isfinite(ratio) or dof <= 0:
         return UNKNOWN
-    return float(np.cbrt(ratio)), sqrt(2 / (9 * dof) + 2 / (9 * dof_of_finer))
+    return cbrt(ratio), sqrt(2 / (9 * dof) + 2 / (9 * dof_of_finer))
 
 
 def _components(
@@ -107,7 +107,7 @@ def _fixed(
     """Return each part of the fixed pattern against the next finer one."""
     frames, n, m = size
     smooth = Smooth.of(n, m)
-    mixed = int(smooth.mixed.sum())
+    mixed = smooth.kinds
     dof = (n - 1) * (m - 1) - mixed
     noise = pixel / frames
     square = noise + found["fixed_pixel_variance"].value

@@ -28,10 +28,20 @@ def seams(by_row: Array, by_column: Array, squares: tuple[float, float]) -> dict
         ("columns", by_column, squares[1], by_row.size),
     ):
         sd = sqrt(square / across)
-        for name, shape in zip(("half_seam", "parity"), seam_shapes(means.size), strict=True):
-            found[f"{name} of {axis}"] = (float(shape @ means) / sd, 1.0)
-        found[f"half_seam of {axis}, {WHOLE}"] = (float(_halves(means.size) @ means) / sd, 1.0)
+        for name, shape in _shapes(axis, means.size):
+            found[name] = (float(shape.dot(means)) / sd, 1.0)
     return found
+
+
+@lru_cache(maxsize=64)
+def _shapes(axis: str, size: int) -> tuple[tuple[str, Array], ...]:
+    """Return names and shapes of the steps of an axis' lines."""
+    half, comb = seam_shapes(size)
+    return (
+        (f"half_seam of {axis}", half),
+        (f"parity of {axis}", comb),
+        (f"half_seam of {axis}, {WHOLE}", _halves(size)),
+    )
 
 
 @lru_cache(maxsize=64)

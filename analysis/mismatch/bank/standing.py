@@ -13,7 +13,7 @@ to frame beyond chance, its mean frame moves as well, by what is known.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from math import log
 
 import numpy as np
@@ -21,23 +21,31 @@ import scipy.fft
 from numpy.typing import NDArray
 from scipy.special import betainc, betaln, gammainccinv
 
+from analysis.mismatch.bank.binned import (
+    MEAN_LOG,
+    above,
+    beside_rings,
+    beyond_white,
+    blocks,
+    highest_corner,
+    in_rings,
+    nearby,
+    of_still,
+)
 from analysis.mismatch.bank.lines import any_of
 from analysis.mismatch.bank.peaks import Peak, frequency
 from analysis.mismatch.bank.robust import typical_square
 from analysis.mismatch.bank.scalars import UNKNOWN, Number, score_of_log
 from analysis.mismatch.bank.waves import Moving, WaveSums, add_power, looked_at, some
-from dsis.compiled import kernel
 from dsis.measures.median import median
 
 Array = NDArray[np.float64]
 Places = NDArray[np.int_]
 Mask = NDArray[np.bool_]
 NAME = "fixed_spectral_peak"
-_AROUND, _OWN = 7, 2  # bins to each side that say what is around, and those that do not
 _BLOCK = 9  # bins, three along each axis, over which a bent wave spreads
 _LOWEST = 4.0  # bins from frequency 0: what is smooth is there, and has numbers of its own
 _SPREAD = np.pi**2 / 6  # variance of the logarithm of an exponential variate
-_MEAN_LOG = -0.5772156649  # and its mean
 _MOVES = 0.01  # chance that a bin of white noise is taken for one that moves more
 _LEAST_LINES = 32  # of a sensor: fewer have no bins around that tell anything
 _LOOKED_AT = 32  # bins of white noise that are looked at closely: the highest are among them
@@ -74,7 +82,7 @@ def standing(
     moving = waves.moving()
     if moving is None or min(waves.shape) < _LEAST_LINES:
         return UNKNOWN, None
-    size = float(np.mean([sharpness[name] ** 2 for name in planes])) ** 0.5
+    size = (sum(sharpness[name] ** 2 for name in planes) / len(planes)) ** 0.5
     image = np.zeros(waves.shape, np.float32)
     for name, own in planes.items():  # few pixels that stand far out are no wave, and hide none
         y, x = sites[name]
@@ -99,28 +107,25 @@ def strongest(image: NDArray[np.floating], moving: Moving, step: int) -> tuple[N
         return UNKNOWN, None
     scales = middles / middles[0, 0]
     level, apart = sensor.levels(power[0, 0])
-    white = moving.white
+    white, most = moving.white, _most_of_white(moving.degrees)
     found: list[Found] = []
     for down, right in sensor.sizes:
         within, scale = sensor.within[down, right], float(scales[down, right])
         count = sensor.sizes[down, right]
         y, x = _screened(power[down, right], level, within, -log(_share(count)) * scale)
-        here = np.max([level[v, u] for v, u in sensor.corners(y, x, down, right)], 0)
+        here = highest_corner(level, (y, x), down, right)
         worth, around = sensor.around(apart, y, x)
-        moves = _moves(moving, white[down, right], (down, right), y, x)
+        moves = beyond_white(moving.power[down, right], white[down, right], most, (y, x))
         sure = np.where(moves > 0, np.minimum(worth, moving.degrees), worth)
         ratio = power[down, right][y, x] / (here * around * scale + moves)
         found += _least(-sure * np.log1p(ratio / sure), y + down / 2, x + right / 2, count)
     within = sensor.within[0, 0]
     count = sensor.sizes[0, 0]
     limit = float(gammainccinv(_BLOCK, _share(count)))
-    y, x = _screened(_blocks(power[0, 0], level, within), np.ones(level.shape), within, limit)
+    y, x = _screened(blocks(power[0, 0], level, within), np.ones(level.shape), within, limit)
     worth, around = sensor.around(apart, y, x)
-    total, ratio = np.zeros(y.size), power[0, 0] / level
-    for v, u in ((v, u) for v in (-1, 0, 1) for u in (-1, 0, 1)):
-        below, beside = (y + v) % rows, np.minimum(x + u, level.shape[1] - 1)
-        still = within[below, beside] & (_moves(moving, white[0, 0], (0, 0), below, beside) == 0)
-        total += np.where(still, ratio[below, beside] / around, 1.0)
+    moved = (moving.power[0, 0], white[0, 0], most)
+    total = of_still(power[0, 0], level, within, moved, (y, x), around)
     found += _least(_log_above(_BLOCK, total, worth), y, x, count)
     if not found:
         return (score_of_log(0.0), 1.0), None
@@ -157,17 +162,10 @@ def _screened(power: Array, level: Array, within: Mask, limit: float) -> tuple[P
     """Return the bins that stand out of a first level by so much: the largest of them at least."""
     found = np.empty((2, _MOST), np.int_)
     while True:
-        count = _above(power, level, within, limit, found)
+        count = above(power, level, within, limit, found)
         if count <= _MOST:
             return found[0, :count], found[1, :count]
         limit *= _STRICTER
-
-
-def _moves(moving: Moving, white: float, half: tuple[int, int], y: Places, x: Places) -> Array:
-    """Return what bins move beyond white noise, in its units; 0 where chance moves them as much."""
-    limit = _most_of_white(moving.degrees)
-    own = moving.power[half][y, x] / max(white, 1e-300)
-    return np.asarray(np.where(own > limit, own - 1, 0.0))
 
 
 @lru_cache(maxsize=64)
@@ -236,15 +234,19 @@ class _Sensor:
         sizes = {half: int(within[half].sum()) for half in ((0, 0), (0, 1), (1, 0), (1, 1))}
         return cls((rows, columns), within, sizes, ring, _three(counts.astype(np.float64)))
 
+    @cached_property
+    def known(self) -> Places:
+        """Rings that hold bins, or have such neighbours."""
+        return np.flatnonzero(self.counts)
+
     def levels(self, power: Array) -> tuple[Array, Array]:
         """Return what rings tell of the level of each bin, and how far ln of its power is off."""
         level, apart = np.empty(power.shape), np.empty(power.shape)
         sums = np.zeros(self.counts.size)
-        _in_rings(power, self.within[0, 0], self.ring, sums, apart)
-        means = _three(sums) / np.maximum(self.counts, 1.0) - _MEAN_LOG
-        known = np.flatnonzero(self.counts)
-        means = np.interp(np.arange(means.size), known, means[known])
-        _beside_rings(means, self.ring, level, apart)
+        in_rings(power, self.within[0, 0], self.ring, sums, apart)
+        means = _three(sums) / np.maximum(self.counts, 1.0) - MEAN_LOG
+        means = np.interp(np.arange(means.size), self.known, means[self.known])
+        beside_rings(means, self.ring, level, apart)
         return level, apart
 
     def around(self, apart: Array, y: Places, x: Places) -> tuple[Array, Array]:
@@ -253,19 +255,10 @@ class _Sensor:
         Most patterns are alike in all directions: the factor, of bins around, allows for others.
         """
         number, total = np.empty(y.size), np.empty(y.size)
-        _nearby(apart, self.within[0, 0], self.shape[1], (y, x), (number, total))
+        nearby(apart, self.within[0, 0], self.shape[1], (y, x), (number, total))
         number = np.maximum(number, 1.0)
         in_ring = np.maximum(self.counts[np.rint(self.ring[y, x]).astype(np.int_)], 1.0)
         return 1 / (_SPREAD * (1 / in_ring + 1 / number)), np.exp(total / number)
-
-    def corners(self, y: Places, x: Places, down: int, right: int) -> list[tuple[Places, Places]]:
-        """Return the bins between which places lie."""
-        rows, last = self.shape[0], self.ring.shape[1] - 1
-        return [
-            ((y + v) % rows, np.minimum(x + u, last))
-            for v in range(down + 1)
-            for u in range(right + 1)
-        ]
 
 
 def _three(values: Array) -> Array:
@@ -274,84 +267,3 @@ def _three(values: Array) -> Array:
     found[1:] += values[:-1]
     found[:-1] += values[1:]
     return found
-
-
-@kernel
-def _in_rings(power: Array, within: Mask, ring: Array, sums: Array, logs: Array) -> None:
-    """Add the logarithms of bins to their rings."""
-    for y in range(power.shape[0]):
-        for x in range(power.shape[1]):
-            logs[y, x] = np.log(max(power[y, x], 1e-300))
-            if within[y, x]:
-                sums[int(ring[y, x] + 0.5)] += logs[y, x]
-
-
-@kernel
-def _beside_rings(means: Array, ring: Array, level: Array, logs: Array) -> None:
-    """Take from logarithms what rings tell of their mean."""
-    for y in range(ring.shape[0]):
-        for x in range(ring.shape[1]):
-            lower = int(ring[y, x])
-            mean = means[lower] + (ring[y, x] - lower) * (means[lower + 1] - means[lower])
-            level[y, x] = np.exp(mean)
-            logs[y, x] -= mean + _MEAN_LOG
-
-
-@kernel
-def _above(power: Array, level: Array, within: Mask, limit: float, found: Places) -> int:
-    """Write rows and columns of bins above a limit; return how many there are, written or not."""
-    count = 0
-    for y in range(power.shape[0]):
-        for x in range(power.shape[1]):
-            if within[y, x] and power[y, x] > limit * level[y, x]:
-                if count < found.shape[1]:
-                    found[0, count], found[1, count] = y, x
-                count += 1
-    return count
-
-
-@kernel
-def _blocks(power: Array, level: Array, within: Mask) -> Array:
-    """Return sums over three bins along each axis, in units of their level; others count as 1."""
-    rows, columns = power.shape
-    found = np.zeros((rows, columns))
-    line = np.ones(columns)
-    for y in range(rows):
-        for x in range(columns):
-            line[x] = power[y, x] / level[y, x] if within[y, x] else 1.0
-        for x in range(columns):
-            three = line[x] + (line[x - 1] if x else 1.0)
-            three += line[x + 1] if x + 1 < columns else 1.0
-            found[(y - 1) % rows, x] += three
-            found[y, x] += three
-            found[(y + 1) % rows, x] += three
-    return found
-
-
-@kernel
-def _nearby(
-    apart: Array,
-    within: Mask,
-    columns: int,
-    places: tuple[Places, Places],
-    found: tuple[Array, Array],
-) -> None:
-    """Count the bins around places, and sum how far they are off; around the ends too."""
-    rows, half = apart.shape
-    for i in range(places[0].size):
-        number, total = 0, 0.0
-        for v in range(-_AROUND, _AROUND + 1):
-            for u in range(-_AROUND, _AROUND + 1):
-                if max(abs(v), abs(u)) <= _OWN:
-                    continue
-                y, x = places[0][i] + v, places[1][i] + u
-                if x < 0 or x >= half:  # a bin's conjugate is at the opposite frequency
-                    y, x = -y, -x if x < 0 else columns - x
-                while y < 0:  # a division takes longer
-                    y += rows
-                while y >= rows:
-                    y -= rows
-                if 0 <= x < half and within[y, x]:
-                    number += 1
-                    total += apart[y, x]
-        found[0][i], found[1][i] = number, total

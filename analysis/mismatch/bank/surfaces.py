@@ -1,17 +1,21 @@
 """Smooth surfaces of a map: how strong they are, and which way they lean."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 from math import sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.mismatch.bank.pairwise import total
 from analysis.mismatch.bank.scalars import Number, ratio_root
+from dsis.compiled import kernel
 from dsis.measures import Channel
 from dsis.measures.fixed_pattern import Smooth
 
 Array = NDArray[np.float64]
 LOW = "low order"
+_OF_LOW = f"fixed_smooth_variance of {LOW}"
 _BOWED = 2  # degree of surfaces that bow
 
 
@@ -31,16 +35,33 @@ def surfaces(
     """
     row, column, square = squares
     size = len(coefficients)
-    order = np.arange(size)[:, None] + np.arange(size)
-    share = np.ones_like(coefficients)
-    share[:, 0], share[0, :] = square / max(row, square), square / max(column, square)
-    power = coefficients**2 * share
+    shares = square / max(row, square), square / max(column, square)
     found = {}
-    for name, most in (("fixed_smooth_variance", size - 1), (f"fixed_smooth_variance of {LOW}", 2)):
-        taken = (order > 0) & (order <= most)
-        kinds = int(taken.sum())
-        found[name] = ratio_root(float(power[taken].sum()) / kinds / square, kinds, dof)
+    for name, most in (("fixed_smooth_variance", size - 1), (_OF_LOW, 2)):
+        power, kinds = _power(coefficients, most, *shares)
+        found[name] = ratio_root(power / kinds / square, kinds, dof)
     return found
+
+
+@kernel
+def _power(coefficients: Array, most: int, of_rows: float, of_columns: float) -> tuple[float, int]:
+    """Return the sum of squares of coefficients of a total degree of 1 to `most`, and their number.
+
+    Of polynomials along rows alone, and along columns alone, a share counts.
+    """
+    size = len(coefficients)
+    squares, count = np.empty(size * size), 0
+    for i in range(size):
+        for j in range(size):
+            if 0 < i + j <= most:
+                square = coefficients[i, j] * coefficients[i, j]
+                if i == 0:
+                    square *= of_columns
+                elif j == 0:
+                    square *= of_rows
+                squares[count] = square
+                count += 1
+    return total(squares[:count]), count
 
 
 def slopes(
@@ -55,17 +76,31 @@ def slopes(
     if len(coefficients) < 3:
         return {}
     down, across = max(row, square), max(column, square)
-    smooth = Smooth.of(shape[0], shape[1])
-    # Orthonormal polynomials have any sign: here they rise towards the last line.
-    signed = np.outer(np.sign(smooth.along_rows[-1]), np.sign(smooth.along_columns[-1]))
-    signed = coefficients * signed[: len(coefficients), : len(coefficients)]
+    tilt_down, tilt_across, bow_down, bow_across = (
+        sign * float(coefficients[place])
+        for sign, place in zip(_rising(shape[0], shape[1]), _LOWEST, strict=True)
+    )
     n, m = float(shape[0]) ** 2, float(shape[1]) ** 2
-    fall = n * signed[2, 0] + m * signed[0, 2]
+    fall = n * bow_down + m * bow_across
     return {
-        "fixed_smooth_tilt of rows": (float(signed[1, 0]) / sqrt(down), 1.0),
-        "fixed_smooth_tilt of columns": (float(signed[0, 1]) / sqrt(across), 1.0),
-        "fixed_smooth_falloff": (float(fall) / sqrt(n**2 * down + m**2 * across), 1.0),
+        "fixed_smooth_tilt of rows": (tilt_down / sqrt(down), 1.0),
+        "fixed_smooth_tilt of columns": (tilt_across / sqrt(across), 1.0),
+        "fixed_smooth_falloff": (fall / sqrt(n**2 * down + m**2 * across), 1.0),
     }
+
+
+_LOWEST = ((1, 0), (0, 1), (2, 0), (0, 2))  # degrees of tilts and bows along rows and columns
+
+
+@lru_cache(maxsize=64)
+def _rising(rows: int, columns: int) -> tuple[float, ...]:
+    """Return the signs with which polynomials of the degrees `_LOWEST` rise to the last line.
+
+    Orthonormal ones have any.
+    """
+    smooth = Smooth.of(rows, columns)
+    signed = np.outer(np.sign(smooth.along_rows[-1]), np.sign(smooth.along_columns[-1]))
+    return tuple(float(signed[place]) for place in _LOWEST)
 
 
 @dataclass(frozen=True, eq=False)

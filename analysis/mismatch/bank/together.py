@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.bank.edges import names as edge_names
-from analysis.mismatch.bank.parts import STANDING_OUT, Parts, counted, rooted, sure_of_lines
+from analysis.mismatch.bank.parts import OUTLYING, Parts, root_of, sure_of_lines
 from analysis.mismatch.bank.patches import patches
 from analysis.mismatch.bank.scalars import Number, ratio_root
 from analysis.mismatch.bank.seams import WHOLE
@@ -20,6 +20,11 @@ from dsis.measures.fixed_pattern import Smooth
 
 Array = NDArray[np.float64]
 TOGETHER = "all channels"
+_AXES = ("rows", "columns")
+_STEPS = (
+    *(f"half_seam of {axis}{part}" for axis in _AXES for part in ("", f", {WHOLE}")),
+    *(name for axis in _AXES for name in edge_names(axis)),
+)
 
 
 def together(
@@ -40,7 +45,7 @@ def together(
     """
     names = list(parts)
     squares = [parts[name].square for name in names]
-    square = float(np.mean(squares))
+    square = sum(squares) / len(squares)
     sizes = {name: parts[name].pixels.shape for name in names}
     dof = sum((n - 1) * (m - 1) for n, m in sizes.values())
     found = {}
@@ -53,27 +58,25 @@ def together(
             # A mean over a line has the noise of a pixel over the root of the line's length.
             moved = _mean(means, [sharpness[name] for name in own])
             degree = len(parts[own[0]].coefficients) - 1
-            across = float(np.mean([sizes[name][1 - axis] for name in own]))
-            top += across * float(moved @ moved)
+            across = sum(sizes[name][1 - axis] for name in own) / len(own)
+            top += across * float(moved.dot(moved))
             bottom += moved.size - 1 - degree
         lines[axis] = sure_of_lines(top / bottom, square, bottom)
         found[f"{label} of {TOGETHER}"] = ratio_root(top / bottom / square, bottom, dof)
-    axes = ("rows", "columns")
-    steps = [f"half_seam of {axis}{part}" for axis in axes for part in ("", f", {WHOLE}")]
-    for one in (*steps, *(name for axis in axes for name in edge_names(axis))):
-        values = [np.array([parts[n].numbers[one][0]]) for n in names]
-        size = float(_mean(values, [sharpness[n] for n in names])[0])
-        found[f"{one}, {TOGETHER}"] = (size, 1.0)
-    for name, number in _patches(list(parts.values()), [sharpness[n] for n in names]).items():
+    sharp = [sharpness[name] for name in names]
+    norm = _norm(sharp)
+    numbers = [parts[name].numbers for name in names]
+    for one in _STEPS:
+        size = sum(w * own[one][0] for w, own in zip(sharp, numbers, strict=True))
+        found[f"{one}, {TOGETHER}"] = (float(size / norm), 1.0)
+    for name, number in _patches(list(parts.values()), sharp).items():
         found[f"{name}, {TOGETHER}"] = number
-    for one in (f"outlying_pixels of {limit:g}" for limit in STANDING_OUT):
-        roots = np.array([parts[n].numbers[one][0] for n in names])
-        found[f"{one}, {TOGETHER}"] = (float(rooted(counted(roots).sum())), 1.0)
+    for one in OUTLYING:
+        halves = [own[one][0] / 2 for own in numbers]
+        count = sum(half * half - 3 / 8 for half in halves)
+        found[f"{one}, {TOGETHER}"] = (root_of(count), 1.0)
     least = min(len(parts[name].coefficients) for name in names)
-    surface = _mean(
-        [parts[name].coefficients[:least, :least] for name in names],
-        [sharpness[name] for name in names],
-    )
+    surface = _mean([parts[name].coefficients[:least, :least] for name in names], sharp)
     squares_too = (lines[0], lines[1], square)
     shape = sizes[names[0]]
     common = {**surfaces(surface, squares_too, dof), **slopes(surface, squares_too, shape)}
@@ -87,7 +90,7 @@ def together(
 
 def _patches(parts: Sequence[Parts], sharpness: Sequence[float]) -> dict[str, Number]:
     """Return the numbers of patches that channels share."""
-    rows, columns = np.min([own.pixels.shape for own in parts], axis=0)
+    rows, columns = (min(own.pixels.shape[axis] for own in parts) for axis in (0, 1))
     pixels = _mean([own.pixels[:rows, :columns] for own in parts], sharpness)
     dof = (rows - 1) * (columns - 1) - Smooth.of(rows, columns).kinds
     return patches(pixels, float((pixels**2).sum()) / dof)
@@ -96,8 +99,12 @@ def _patches(parts: Sequence[Parts], sharpness: Sequence[float]) -> dict[str, Nu
 def _mean(values: Sequence[Array], sharpness: Sequence[float]) -> Array:
     """Return the best mean of values, each of noise 1, in units of its own noise."""
     size = min(len(v) for v in values)
-    total = sum(
-        (w * v[:size] for v, w in zip(values, sharpness, strict=True)),
-        np.zeros_like(values[0][:size]),
-    )
-    return np.asarray(total / sqrt(sum(w**2 for w in sharpness)))
+    total = np.zeros(values[0][:size].shape)
+    for value, weight in zip(values, sharpness, strict=True):
+        total += weight * value[:size]
+    total /= _norm(sharpness)
+    return total
+
+
+def _norm(sharpness: Sequence[float]) -> float:
+    return sqrt(sum(w**2 for w in sharpness))

@@ -151,8 +151,8 @@ class WaveSums:
         if self.step == 2:
             each = {name: c.estimates["pixel_variance"].value for name, c in channels.items()}
             for axis, pairs in _PAIRED.items():
-                alike = [each[a] * each[b] for a, b in pairs]
-                self.uneven[axis] += weight**2 / seen * float(np.mean(alike)) / white**2
+                alike = sum(each[a] * each[b] for a, b in pairs) / len(pairs)
+                self.uneven[axis] += weight**2 / seen * alike / white**2
 
     def number(self) -> Number:
         """Return the normal score of the largest power, on bins or between them.

@@ -73,8 +73,8 @@ class Split:
                 e for e in recording.exposures if e.kind == kind and len(e.frames) < LEAST_FRAMES
             ]
             given = _whole(len(few))
-            for part, exposure in zip(given, sorted(few, key=_brightness), strict=True):
-                parts[part][exposure.name] = tuple(range(len(exposure.frames)))
+            for own, exposure in zip(given, sorted(few, key=_brightness), strict=True):
+                parts[own][exposure.name] = tuple(range(len(exposure.frames)))
         return cls(parts[0], parts[1], parts[2], _spared(recording))
 
 

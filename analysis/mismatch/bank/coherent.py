@@ -325,14 +325,14 @@ def half_bins(channels: Sequence[Channel], seen: int) -> list[Array]:
 
 
 @kernel
-def _add(into: Array, weight: float, power: Array, pixel: float) -> None:
+def _add(into: Array, weight: float, power: NDArray[np.floating], pixel: float) -> None:
     """Add a weighted spectrum in units of the variance of pixels: (row, bin)."""
     for y in range(into.shape[0]):
         _add_line(into[y], weight, power[y], pixel)
 
 
 @kernel
-def _add_line(into: Array, weight: float, power: Array, pixel: float) -> None:
+def _add_line(into: Array, weight: float, power: NDArray[np.floating], pixel: float) -> None:
     """Add the same of a line: (bin,); shares are as exact as the spectrum is."""
     own, white = power.dtype.type(weight), power.dtype.type(pixel)
     for x in range(into.size):

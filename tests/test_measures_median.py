@@ -6,7 +6,7 @@ import pytest
 from dsis.measures.median import median
 
 
-@pytest.mark.parametrize("size", [1, 2, 7, 64, 65, 96, 4096, 4097])
+@pytest.mark.parametrize("size", [1, 2, 7, 64, 65, 96, 4096, 4097, 1 << 15])
 @pytest.mark.parametrize("kind", [np.float32, np.float64])
 def test_median_is_that_of_numpy(size: int, kind: type[np.floating]) -> None:
     random = np.random.default_rng(size)

@@ -219,6 +219,7 @@ def _channels(
     column_power = noise.column_power * (n / (frames - 1))
     row_means = noise.rows + noise.first_rows[:, np.newaxis]
     column_means = noise.columns + noise.first_columns[:, np.newaxis]
+    squares, means = [one.tolist() for one in sums.pair_squares], noise.means.tolist()
     channels = {}
     for k, plane in enumerate(noise.sheet.planes):
         name, moments, part, power = plane.name, noise.moments[k], parts[k], noise.powers[k]
@@ -238,7 +239,7 @@ def _channels(
         channels[name] = Channel(
             {name: estimates[name] for name in MEASURES},
             moments.kurtosis_within_pixels(),
-            pair_variance(*_pairs(sums, plane, noise.means[k]), part),
+            pair_variance(*_pairs(squares, plane, means[k]), part),
             noise.mean_frames[k],
             moments.variance_map,
             moments.neighbour,
@@ -270,15 +271,17 @@ def _clipped(sums: Accumulator, codes: Codes | None) -> tuple[float, float]:
     )
 
 
-def _pairs(sums: Accumulator, plane: Plane, means: Array) -> tuple[list[float], list[float]]:
-    """Return mean squares and means of the difference of each pair of frames."""
+def _pairs(
+    squares: Sequence[list[list[float]]], plane: Plane, means: Sequence[float]
+) -> tuple[list[float], list[float]]:
+    """Return mean squares and means of the difference of each pair of frames.
+
+    From sums of squares by phase, of each pair, and means of each frame.
+    """
     n, m = plane.shape
-    squares = [
-        sum(square[y][x] for y, x in plane.phases) / (n * m)
-        for square in map(np.ndarray.tolist, sums.pair_squares)
-    ]
-    pairs = len(squares)
-    return squares, (means[1 : 2 * pairs : 2] - means[: 2 * pairs : 2]).tolist()
+    phases, pairs = plane.phases, range(1, 2 * len(squares), 2)
+    mean_squares = [sum([square[y][x] for y, x in phases]) / (n * m) for square in squares]
+    return mean_squares, [means[k] - means[k - 1] for k in pairs]
 
 
 def _level(value: float, part: Components, fixed: FixedPattern) -> Estimate:

@@ -243,9 +243,11 @@ def _bartlett(observed: Array, pairs: Array, degrees: int, lags: NDArray[np.int6
     """Return n var(rho) of a linear process at lags (lag, 2), from those known (Bartlett 1946).
 
     What is known gets a margin of two centres: the formula looks one lag ahead, and one behind.
+    Where none is known on one side, it adds nothing.
     """
     size = observed.shape[0]
     centre = size // 2
+    top, bottom, left, right = size, 0, size, 0
     known, wide = np.empty((size, size)), np.zeros((size + 4 * centre, size + 4 * centre))
     for i in range(size):
         for j in range(size):
@@ -255,13 +257,15 @@ def _bartlett(observed: Array, pairs: Array, degrees: int, lags: NDArray[np.int6
             # Lags within their own error would only add noise: 80 lags of it.
             if abs(known[i, j]) > 3 / np.sqrt(pairs[i, j] * degrees):
                 wide[2 * centre + i, 2 * centre + j] = known[i, j]
+                top, bottom = min(top, i), max(bottom, i + 1)
+                left, right = min(left, j), max(right, j + 1)
     found = np.empty(len(lags))
     for k in range(len(lags)):
         dy, dx = lags[k, 0], lags[k, 1]
         h = known[centre + dy, centre + dx]
         total = 0.0
-        for i in range(centre, size + 3 * centre):
-            for j in range(centre, size + 3 * centre):
+        for i in range(2 * centre + top, 2 * centre + bottom):
+            for j in range(2 * centre + left, 2 * centre + right):
                 w, ahead, behind = wide[i, j], wide[i + dy, j + dx], wide[i - dy, j - dx]
                 total += w * w + ahead * behind - 4 * h * w * behind + 2 * h * h * (w * w)
         found[k] = total

@@ -107,8 +107,8 @@ def split(image: Frame, places: NDArray[np.int64], means: Sums, out: Frame) -> N
 @kernel
 def count_codes(frames: Frame, histogram: NDArray[np.int64], lowest: int) -> None:
     """Add whole codes, all within it, to `histogram` (row parity, column parity, code - lowest)."""
-    for frame in frames:
-        _count_codes(frame, histogram, lowest)
+    for i in range(len(frames)):  # `for frame in frames` would not know that they are contiguous
+        _count_codes(frames[i], histogram, lowest)
 
 
 @kernel

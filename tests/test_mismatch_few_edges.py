@@ -8,7 +8,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
-from analysis.mismatch.fewedges import of_outermost_lines
+from analysis.mismatch.fewedges import _alike, of_outermost_lines
 from dsis.effects.prnu import Prnu
 from dsis.effects.smooth_prnu import SmoothPrnu
 
@@ -69,6 +69,14 @@ def test_what_neighbours_hand_on_is_no_field(seed: int) -> None:
     handed[0] += 1.2 * NOISE
     handed[:, -1] -= 1.2 * NOISE
     assert of_outermost_lines(_state(handed), FIELD) is not None
+
+
+@pytest.mark.parametrize("shape", [(3, 3), (5, 5), (4, 42)])
+def test_tiny_maps_tell_nothing(shape: tuple[int, int]) -> None:
+    rng = np.random.default_rng(1)
+    for image in (np.zeros(shape), rng.standard_normal(shape)):
+        assert of_outermost_lines(_state(image), Prnu(sigma_percent=0.05)) is None
+        assert np.isfinite(_alike(image[1:-1, 1:-1], 1))
 
 
 def test_nothing_is_denied_where_nothing_is_smooth() -> None:

@@ -5,6 +5,8 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
+from analysis.mismatch.bank.key import Key
+from analysis.mismatch.replicates import _alike
 from analysis.mismatch.state import Setting, State
 from dsis.camera import Camera
 from dsis.effects import registry
@@ -93,9 +95,41 @@ def test_another_model_is_simulated(beside: Beside, near: State, model: Camera) 
     np.testing.assert_array_equal(state.simulated, beside.of(model)[0].simulated)
 
 
-def test_a_draft_serves_as_far_as_it_goes(beside: Beside) -> None:
-    """Of eight recordings four are made anew; the others of sixteen are the model's own."""
+def test_a_draft_is_too_few_for_a_null(beside: Beside) -> None:
     draft, made = beside.of(_lined(1.0), draft=True)
     assert made == NULLS // 2
-    some, made = beside.of(_lined(1.01), draft)
-    assert (made, len(some.simulated)) == (FEW + NULLS // 2, NULLS)
+    assert beside.of(_lined(1.01), draft)[1] == NULLS
+    assert beside.of(_lined(1.01), draft, draft=True)[1] == FEW
+
+
+def test_many_small_steps_are_a_large_one(beside: Beside, near: State) -> None:
+    """What was moved is not moved again: noise of rows goes up by half, 6 % at a time."""
+    state, counts = near, []
+    for step in range(1, 9):
+        state, made = beside.of(_lined(1.06**step), state)
+        counts.append(made)
+    assert FEW in counts
+    assert NULLS in counts
+    whole = beside.of(_lined(1.06**8))[0]
+    ratio = (state.null.sd / whole.null.sd)[whole.null.known]
+    assert ratio.min() > 0.6
+    assert ratio.max() < 1.6
+    apart = ((whole.null.mean - state.null.mean) / whole.null.sd)[whole.null.known]
+    assert np.sqrt((apart**2).mean()) < 0.1
+
+
+def test_the_same_model_asked_again_is_as_unsure(beside: Beside, near: State) -> None:
+    one = beside.of(_lined(1.03, 0.62), near)[0]
+    again, made = beside.of(one.camera, one)
+    assert made == FEW
+    np.testing.assert_allclose(again.null.sd, one.null.sd, rtol=1e-3)
+
+
+def test_a_single_number_that_changes_is_not_hidden_by_its_group() -> None:
+    """Forty numbers of one name, of which one scatters three times as far."""
+    keys = tuple(Key("row_variance", "exposure", f"{i}", "MONO", "") for i in range(40))
+    known = np.ones(40, bool)
+    scatter, off = np.full(40, 0.01), np.ones(40)
+    assert _alike(keys, known, scatter, off)
+    scatter[7], off[7] = 4.0, 9.0
+    assert not _alike(keys, known, scatter, off)

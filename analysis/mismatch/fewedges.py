@@ -66,5 +66,8 @@ def _alike(image: Array, step: int) -> float:
         for x in range(-farthest, farthest + 1)
         if x != 0 and nearest**2 <= y * y + x * x <= farthest**2
     ]
-    pairs = sum((rows - y) * (columns - abs(x)) for y, x in lags)
-    return float(sum(products[lag] for lag in lags)) / (float((own**2).mean()) * sqrt(pairs))
+    pairs = sum(max(rows - y, 0) * max(columns - abs(x), 0) for y, x in lags)
+    power = float((own**2).mean()) if own.size else 0.0
+    if not (pairs and power > 0):
+        return 0.0
+    return float(sum(products[lag] for lag in lags)) / (power * sqrt(pairs))

@@ -97,8 +97,8 @@ def null_of(
     scale, worth, tails = _by_name(seen.keys, own, known, count - 1)
     blended = tails**2 * (worth * scale + (count - 1) * own) / (worth + count - 1)
     sd = error * np.sqrt(np.maximum(blended, _LEAST_SCALE**2) * (1 + 1 / count))
-    if unsure is not None and unsure.size:
-        sd = np.sqrt(sd**2 + np.where(known, unsure, 0.0))
+    besides = np.where(known, unsure, 0.0) if unsure is not None and unsure.size else 0.0 * sd
+    sd = np.sqrt(sd**2 + besides)
     normal = known & _normal(seen.keys, np.where(known, np.nan_to_num(values), 0.0))
     mean, sd = np.where(normal, 0.0, mean), np.where(normal, 1.0, sd)
     # How deep a comb of codes is hangs on the numbers of the camera: on electrons of several DN.
@@ -115,6 +115,8 @@ def null_of(
     spread = (along**2).sum(0) / (count - 1)
     expected = _spread(sums, [one.shared for one in simulated], sd) / (1 + 1 / count)
     pooled = (_OWN * expected + (count - 1) * spread) / (_OWN + count - 1)
+    # The same few recordings leave all numbers unsure, at worst to the same side.
+    aside = (np.abs(sums.matrix) @ (np.sqrt(besides) / sd)) ** 2
     return Null(
         (*seen.keys, *sums.keys),
         mean,
@@ -122,7 +124,7 @@ def null_of(
         known,
         sums,
         np.zeros(len(sums.keys)),
-        np.sqrt(np.maximum(pooled, _LEAST_SCALE**2) * (1 + 1 / count)),
+        np.sqrt(np.maximum(pooled, _LEAST_SCALE**2) * (1 + 1 / count) + aside),
         _POOLED + count - 1,
     )
 

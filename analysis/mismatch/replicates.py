@@ -19,9 +19,10 @@ from analysis.mismatch.vector import Vector
 from dsis.camera import Camera
 
 Array = NDArray[np.float64]
-_SHARE, _LEAST = 4, 2  # one in so many is simulated anew, but not fewer
+_SHARE, _LEAST = 4, 4  # one in so many is simulated anew, but not fewer
 _STEADY = 0.5  # scatter of a statistic's change, beside its spread
 _CHANCE = 2.0  # mean square of departures, 1 in a model's own recordings
+_SINGLE, _RARE = 1.0, 6.0  # of a single number: squared scatter, and such a mean square
 Simulate = Callable[[range], Sequence[tuple[BaseFit, Vector]]]
 """Gives base numbers and numbers of a model's recordings, by their numbers."""
 
@@ -40,23 +41,25 @@ class Replicates:
         How many of the first are the model's own.
     unsure
         By how much moved ones leave the mean of each number unsure, squared; empty: by nothing.
+    moved_from
+        Of the model that moved ones were made for: none is moved twice.
     """
 
     vectors: tuple[Vector, ...]
     fits: tuple[BaseFit, ...]
     own: int
     unsure: Array = field(default_factory=lambda: np.zeros(0))
+    moved_from: "Known | None" = None
 
 
-def replicates(
-    simulate: Simulate, count: int, near: tuple[Replicates, Null] | None = None
-) -> Replicates:
-    """Return so many recordings of a model.
+Known = tuple[Replicates, Null]
+"""Recordings that are all of one model, and its null."""
 
-    `near`: those of one with effects of the same kinds, and its null.
-    """
+
+def replicates(simulate: Simulate, count: int, near: Known | None = None) -> Replicates:
+    """Return so many recordings of a model; `near`: those of one much the same, see `known`."""
     few = max(count // _SHARE, _LEAST)
-    if near is None or min(len(near[0].vectors), count) <= few:
+    if near is None or count <= few or len(near[0].vectors) < count:
         return _of(simulate(range(count)))
     first = _of(simulate(range(few)))
     moved = _moved(first.vectors, near[0].vectors[:count], near[1])
@@ -64,20 +67,21 @@ def replicates(
         rest = _of(simulate(range(few, count)))
         return Replicates((*first.vectors, *rest.vectors), (*first.fits, *rest.fits), count)
     vectors, scatter = moved
-    share = len(vectors) / count
-    rest = _of(simulate(range(few + len(vectors), count)))
-    fits = (*first.fits, *rest.fits)
-    return Replicates(
-        (*first.vectors, *vectors, *rest.vectors),
-        fits if len(fits) >= len(near[0].fits) else near[0].fits,
-        few,
-        share**2 * scatter / few,
-    )
+    unsure = (len(vectors) / count) ** 2 * scatter / few
+    return Replicates((*first.vectors, *vectors), near[0].fits, few, unsure, near)
+
+
+def known(own: Replicates, null: Null) -> Known:
+    """Return what a model much the same may be made of: recordings that are none of them moved."""
+    return (own, null) if own.moved_from is None else own.moved_from
 
 
 def same_kinds(one: Camera, other: Camera) -> bool:
-    """Return whether cameras have effects of the same kinds."""
-    first, second = (sorted(effect.kind for effect in own.effect) for own in (one, other))
+    """Return whether cameras have effects of the same kinds, and as many read-out segments."""
+    first, second = (
+        (sorted(effect.kind for effect in own.effect), own.noise.shot, len(own.noise.segment))
+        for own in (one, other)
+    )
     return first == second
 
 
@@ -101,10 +105,10 @@ def _moved(
         return None
     change = np.where(finite, np.nan_to_num(own) - np.nan_to_num(before), 0.0)
     scatter, mean = change.var(0, ddof=1), change.mean(0)
-    known = null.known & finite.all(0)
-    off = np.where(known, (np.nan_to_num(own) - null.mean) / null.sd, 0.0)
-    steady = np.where(known, scatter / null.sd**2, 0.0)
-    if not _alike(first[0].keys, known, steady, (off**2).mean(0)):
+    seen = np.asarray(finite.all(0))
+    off = np.where(seen, (np.nan_to_num(own) - null.mean) / null.sd, 0.0)
+    steady = np.where(seen, scatter / null.sd**2, 0.0)
+    if not _alike(first[0].keys, seen, steady, (off**2).mean(0)):
         return None
     noise = scatter / len(first)
     kept = np.where(mean == 0, 0.0, mean**2 / np.maximum(mean**2 + noise, 1e-300))
@@ -112,13 +116,13 @@ def _moved(
     return [replace(one, values=one.values + kept * mean) for one in later], kept * scatter
 
 
-def _alike(keys: Sequence[Key], known: NDArray[np.bool_], scatter: Array, off: Array) -> bool:
+def _alike(keys: Sequence[Key], seen: NDArray[np.bool_], scatter: Array, off: Array) -> bool:
     """Return whether every statistic changes alike in all recordings, or not to speak of.
 
     Parameters
     ----------
-    keys, known
-        Of the numbers.
+    keys, seen
+        Of the numbers; which are numbers.
     scatter
         Of a change, beside the near model's spread: squared.
     off
@@ -127,9 +131,9 @@ def _alike(keys: Sequence[Key], known: NDArray[np.bool_], scatter: Array, off: A
     """
     groups: dict[tuple[str, str], list[int]] = {}
     for i, key in enumerate(keys):
-        if known[i]:
+        if seen[i]:
             groups.setdefault((key.statistic, key.scope), []).append(i)
-    return all(
+    return not bool(((scatter > _SINGLE) & (off > _RARE)).any()) and all(
         scatter[which].mean() <= _STEADY**2 or off[which].mean() <= _CHANCE
         for which in groups.values()
     )

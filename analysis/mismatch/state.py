@@ -19,7 +19,7 @@ from analysis.mismatch.null import Null, null_of
 from analysis.mismatch.observe import Observation
 from analysis.mismatch.predict import Predictor, Reference
 from analysis.mismatch.recalibrate import Calibrated, calibrate
-from analysis.mismatch.replicates import Replicates, replicates, same_kinds
+from analysis.mismatch.replicates import Replicates, known, replicates, same_kinds
 from analysis.mismatch.simulations import Simulations
 from analysis.mismatch.touches import ALL_SUMS
 from analysis.mismatch.vector import Vector, vector
@@ -159,7 +159,7 @@ class State:
         alike = (
             near is not None and near.setting.layout is layout and same_kinds(near.camera, camera)
         )
-        kin = (near.replicates, near.null) if near is not None and alike else None
+        kin = known(near.replicates, near.null) if near is not None and alike else None
         of_model = replicates(made, nulls, kin)
         own = vector(layout, seen, calibrated.residual)
         null = null_of(layout, of_model.vectors, own, of_model.unsure)
@@ -174,8 +174,8 @@ class State:
             setting.jobs,
             calibrated.sums,
         )
-        known = [one.values for one in of_model.vectors[: of_model.own]]
-        simulations.keep(calibrated.model.camera, known)
+        its_own = [one.values for one in of_model.vectors[: of_model.own]]
+        simulations.keep(calibrated.model.camera, its_own)
         return cls(
             setting,
             calibrated,

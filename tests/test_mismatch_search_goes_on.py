@@ -5,6 +5,7 @@ from typing import Any
 
 import pytest
 
+import analysis.mismatch.fitted as fitted_module
 import analysis.mismatch.name as search_module
 from analysis.mismatch.candidates import Proposal
 from analysis.mismatch.confirmed import proven
@@ -50,7 +51,8 @@ class Scripted(Search):
 
 
 def _search(monkeypatch: pytest.MonkeyPatch, why: str, *script: str, **more: Any) -> Scripted:
-    monkeypatch.setattr(search_module, "State", Stub(of=lambda *_, **__: OPEN))
+    for module in (search_module, fitted_module):
+        monkeypatch.setattr(module, "State", Stub(of=lambda *_, **__: OPEN))
     setting: Any = Stub(nulls=16, drafts=16, layout=None, large=False, given=0)
     base: Any = OPEN
     camera: Any = Stub(effect=())
@@ -331,7 +333,8 @@ def test_where_nothing_is_left_named_all_frames_still_show_what_they_did(
     search = _search(monkeypatch, "", "wrong", "other")
     search.whole, search.base = Stub(), Stub(mismatches=[SOMETHING, OTHER])  # type: ignore[assignment] # stubs
     some = Stub(mismatches=[], camera=Stub(effect=()))
-    monkeypatch.setattr(search_module, "State", Stub(of=lambda *_, **__: some))
+    for module in (search_module, fitted_module):
+        monkeypatch.setattr(module, "State", Stub(of=lambda *_, **__: some))
     monkeypatch.setattr(
         search_module, "replace", lambda own, **new: Stub(**{**own.__dict__, **new})
     )

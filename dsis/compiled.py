@@ -21,13 +21,16 @@ from threading import Lock, local
 from typing import Any, TypeVar, cast
 
 import numba
+import numpy as np
 from numba.core import event, types
 from numba.extending import intrinsic
 from numba.misc.appdirs import AppDirs
+from numpy.typing import NDArray
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 ROWS_PER_BLOCK = 64
+_ALONE = 128  # values that are summed in one loop
 _UNUSED_S = 86400.0  # from when on no process can still write there
 _one_places = Lock()  # the compiler has one setting for all threads, and they may import at once
 
@@ -53,7 +56,8 @@ event.register("numba:compile", _Word())  # type: ignore[no-untyped-call] # numb
 def kernel(function: F) -> F:
     """Compile `function` on its first call; cached on disk, releases the interpreter lock.
 
-    Kernels may call kernels of other files of their folder: all are compiled anew when one changes.
+    Kernels may call kernels of other files of their folder, and of this file: all are compiled anew
+    when one changes.
     """
     settings: Any = numba.config
     with _one_places:
@@ -107,6 +111,32 @@ def inlined(function: F) -> F:
         function
     )
     return cast("F", compiled)
+
+
+@kernel
+def pairwise_sum(values: NDArray[np.float64]) -> float:
+    """Return the sum of values (any,), in the order in which `numpy.sum` adds them.
+
+    Its rounding error does not grow with what is summed. Kernels of any folder may call it.
+    """
+    if values.size > _ALONE:
+        half = values.size // 2 // 8 * 8
+        return pairwise_sum(values[:half]) + pairwise_sum(values[half:])
+    a = b = c = d = e = f = g = h = 0.0  # which do not wait for one another
+    end = values.size // 8 * 8
+    for i in range(0, end, 8):
+        a += values[i]
+        b += values[i + 1]
+        c += values[i + 2]
+        d += values[i + 3]
+        e += values[i + 4]
+        f += values[i + 5]
+        g += values[i + 6]
+        h += values[i + 7]
+    total = ((a + b) + (c + d)) + ((e + f) + (g + h))
+    for i in range(end, values.size):
+        total += values[i]
+    return total
 
 
 def emitted(emit: Callable[..., object]) -> Callable[..., None]:

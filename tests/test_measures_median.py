@@ -26,3 +26,8 @@ def test_median_is_that_of_numpy(size: int, kind: type[np.floating]) -> None:
 def test_median_of_what_is_not_finite() -> None:
     assert median(np.array([1.0, np.inf, 2.0, -np.inf])) == 1.5
     assert np.isnan(median(np.array([1.0, np.nan, 2.0])))
+
+
+def test_of_no_values_none_is_in_the_middle() -> None:
+    with pytest.raises(ValueError, match="no values"):
+        median(np.zeros(0))

@@ -3,16 +3,8 @@
 import numpy as np
 import pytest
 
-from analysis.mismatch.bank.pairwise import total
 from analysis.mismatch.bank.patches import SIZES, _squares
 from analysis.mismatch.bank.periods import _farthest, _folded
-
-
-def test_sums_add_in_the_order_of_numpy() -> None:
-    rng = np.random.default_rng(1)
-    for size in (*range(300), 1000, 1023, 4096, 12288, 100001):
-        values = rng.normal(size=size) * np.exp(3 * rng.normal(size=size))
-        assert total(values) == values.sum()
 
 
 @pytest.mark.parametrize("shape", [(24, 32), (51, 70), (17, 200), (96, 128)])

@@ -6,9 +6,16 @@ Arrays have the frames first. The same sums in the same order: the same bytes.
 import numpy as np
 from numpy.typing import NDArray
 
-from dsis.compiled import kernel
-from dsis.measures.kernels import FiveSums, Frame, Sums, add_power, split
-from dsis.measures.pairwise import summed
+from dsis.compiled import kernel, pairwise_sum
+from dsis.measures.kernels import (
+    FiveSums,
+    Frame,
+    Sums,
+    add_moments_of_line,
+    add_power,
+    centre_line,
+    split,
+)
 
 
 def offsets_of_all(by_row: Sums, by_column: Sums, single: bool) -> tuple[Sums, Sums, Sums]:
@@ -31,7 +38,7 @@ def _offsets_of_one(
         for y in range(rows):
             by_line[y] = by_row[t, y, 0] + by_row[t, y, 1]
             of_rows[t, y, 0] = of_rows[t, y, 1] = by_line[y] / columns
-        mean = summed(by_line) / (rows * columns)
+        mean = pairwise_sum(by_line) / (rows * columns)
         means[t] = mean
         for x in range(columns):
             offset = (by_column[t, 0, x] + by_column[t, 1, x]) / rows - mean
@@ -75,30 +82,15 @@ def moments_of_all(
             line, before, out = differences[t, y], centred[t - 1, y], centred[t, y]
             offset = column_offsets[t, y & 1]
             even, odd = row_offsets[t, y, 0], row_offsets[t, y, 1]
-            for x in range(columns):
-                out[x] = np.float32(line[x] - offset[x] - (odd if x & 1 else even))
-            if t == 1:
-                for x in range(columns):
-                    u = np.float64(out[x])
-                    square = u * u
-                    a1[x], a2[x], a3[x], a4[x] = u, square, square * u, square * square
-                    a11[x] = 0.0
-                continue
-            for x in range(columns):
-                u = np.float64(out[x])
-                square = u * u
-                a1[x] += u
-                a2[x] += square
-                a3[x] += square * u
-                a4[x] += square * square
-                a11[x] += u * before[x]
+            centre_line(line, offset, (even, odd), out)
+            add_moments_of_line(out, before, a1, a2, a3, a4, a11)
     return centred, (s1, s2, s3, s4, s11)
 
 
 @kernel
 def _room(rows: int, columns: int) -> FiveSums:
     size = rows, columns
-    return np.empty(size), np.empty(size), np.empty(size), np.empty(size), np.empty(size)
+    return np.zeros(size), np.zeros(size), np.zeros(size), np.zeros(size), np.zeros(size)
 
 
 @kernel

@@ -11,6 +11,7 @@ import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
+from dsis.compiled import pairwise_sum
 from dsis.measures import kernels
 from dsis.measures.autocovariance import Autocorrelation, LagTable, autocorrelation
 from dsis.measures.codes import Codes
@@ -20,7 +21,6 @@ from dsis.measures.lag_products import lag_products
 from dsis.measures.measured import Channel, Measured
 from dsis.measures.moments import PixelMoments, kept
 from dsis.measures.pairs import pair_variance
-from dsis.measures.pairwise import summed
 from dsis.measures.pixels import pair_moments, pixel_moments
 from dsis.measures.plane import Plane, Sheets
 from dsis.measures.spectra import line_peak, spectral_peak
@@ -224,8 +224,9 @@ def _channels(
     for k, plane in enumerate(noise.sheet.planes):
         name, moments, part, power = plane.name, noise.moments[k], parts[k], noise.powers[k]
         codes = sums.codes.of(plane.phases)
+        level = pairwise_sum(noise.mean_frames[k].reshape(-1)) / (n * m)
         estimates = {
-            "level": _level(summed(noise.mean_frames[k].reshape(-1)) / (n * m), part, fixed[k]),
+            "level": _level(level, part, fixed[k]),
             **part.estimates(),
             **moments.estimates(inflations[name]),
             **_correlations(sums, temporal[name], CORRELATION_LAGS),
@@ -251,7 +252,7 @@ def _channels(
             column_power[k],
             row_means[k],
             column_means[k],
-            noise.means[k] + summed(noise.first_rows[k]) / n,
+            noise.means[k] + pairwise_sum(noise.first_rows[k]) / n,
             codes,
             *_clipped(sums, codes),
         )

@@ -12,10 +12,9 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from dsis.compiled import kernel
+from dsis.compiled import kernel, pairwise_sum
 from dsis.measures.estimate import Estimate, estimate, unknown
 from dsis.measures.lag_products import half_plane
-from dsis.measures.pairwise import summed
 
 Array = NDArray[np.float64]
 Phases = tuple[tuple[int, int], ...]
@@ -216,7 +215,7 @@ def _beyond_errors(values: Array, pairs: Array, degrees: int) -> float:
             if pairs[i, j] > 0 and (i != lags // 2 or j != lags // 2):
                 beyond[counted] = values[i, j] * values[i, j] - 1 / max(pairs[i, j] * degrees, 1.0)
                 counted += 1
-    return summed(beyond[:counted])
+    return pairwise_sum(beyond[:counted])
 
 
 @kernel

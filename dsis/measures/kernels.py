@@ -9,8 +9,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from dsis.compiled import inlined, kernel, over_rows
-from dsis.measures.pairwise import summed
+from dsis.compiled import inlined, kernel, over_rows, pairwise_sum
 
 Frame = NDArray[np.float32]
 Sums = NDArray[np.float64]
@@ -151,34 +150,46 @@ def _add_moments(
     first: int,
     last: int,
 ) -> None:
-    columns = difference.shape[1]
     for y in range(first, last):
         line, before, out = difference[y], previous[y], centred[y]
         offset = column_offset[y & 1]
         a1, a2, a3, a4, a11 = s1[y], s2[y], s3[y], s4[y], s11[y]
         even, odd = row_offset[y, 0], row_offset[y, 1]
-        for x in range(columns):
-            out[x] = np.float32(line[x] - offset[x] - (odd if x & 1 else even))
-        for x in range(columns):
-            u = np.float64(out[x])
-            square = u * u
-            a1[x] += u
-            a2[x] += square
-            a3[x] += square * u
-            a4[x] += square * square
-            a11[x] += u * before[x]
+        centre_line(line, offset, (even, odd), out)
+        add_moments_of_line(out, before, a1, a2, a3, a4, a11)
 
 
 @kernel
 def _centre(
     difference: Frame, row_offset: Sums, column_offset: Sums, centred: Frame, first: int, last: int
 ) -> None:
-    columns = difference.shape[1]
     for y in range(first, last):
         line, out, offset = difference[y], centred[y], column_offset[y & 1]
         even, odd = row_offset[y, 0], row_offset[y, 1]
-        for x in range(columns):
-            out[x] = np.float32(line[x] - offset[x] - (odd if x & 1 else even))
+        centre_line(line, offset, (even, odd), out)
+
+
+@kernel
+def centre_line(line: Sums, offset: Sums, of_row: tuple[float, float], out: Frame) -> None:
+    """Write a line less the offsets of its columns, and of the row in even and odd columns."""
+    even, odd = of_row
+    for x in range(line.size):
+        out[x] = np.float32(line[x] - offset[x] - (odd if x & 1 else even))
+
+
+@kernel
+def add_moments_of_line(
+    line: Frame, before: Frame, s1: Sums, s2: Sums, s3: Sums, s4: Sums, s11: Sums
+) -> None:
+    """Add u, its square, cube and fourth power, and the product with u of the frame before."""
+    for x in range(line.size):
+        u = np.float64(line[x])
+        square = u * u
+        s1[x] += u
+        s2[x] += square
+        s3[x] += square * u
+        s4[x] += square * square
+        s11[x] += u * before[x]
 
 
 @kernel
@@ -265,7 +276,7 @@ def _mean_frames(
         y0, x0, step = places[k]
         _mean_of(row_means[k], rows)
         _mean_of(column_means[k], columns)
-        level = summed(rows) / n
+        level = pairwise_sum(rows) / n
         for y in range(n):
             line, first = sums[y0 + y * step], base[y0 + y * step]
             mean, change = means[k, y], changes[k, y]

@@ -17,6 +17,9 @@ _ROUNDS = 4  # far values may keep nearly all others in one part
 def median(values: NDArray[np.floating]) -> float:
     """Return the median of all values, nan where one of them is; there must be some."""
     flat = np.ascontiguousarray(values).reshape(-1)
+    if not flat.size:
+        message = "there are no values, of which none is in the middle"
+        raise ValueError(message)
     if flat.size < _MANY:
         return middle_and_largest(flat)[0]
     low, high = flat.min(), flat.max()

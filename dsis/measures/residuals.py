@@ -3,8 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from dsis.compiled import inlined, kernel, over_rows
-from dsis.measures.pairwise import summed
+from dsis.compiled import inlined, kernel, over_rows, pairwise_sum
 
 Array = NDArray[np.float64]
 
@@ -26,13 +25,13 @@ def pixel_residuals(
         _residual(image, by_row, by_column, mean, weights, across, pixels, by_line[0], first, last)
 
     over_rows(residual, n, threads)
-    squares = summed(by_line[0])
+    squares = pairwise_sum(by_line[0])
 
     def scatter(first: int, last: int) -> None:
         _scatter(pixels, squares / pixels.size, by_line[1], first, last)
 
     over_rows(scatter, n, threads)
-    return by_row, by_column, pixels, squares, summed(by_line[1]) / pixels.size
+    return by_row, by_column, pixels, squares, pairwise_sum(by_line[1]) / pixels.size
 
 
 @kernel
@@ -42,12 +41,12 @@ def _line_means(image: Array) -> tuple[Array, Array, float]:
     by_row, by_column = np.empty(n), np.zeros(m)
     for y in range(n):
         line = image[y]
-        by_row[y] = summed(line) / m
+        by_row[y] = pairwise_sum(line) / m
         for x in range(m):
             by_column[x] += line[x]
     for x in range(m):
         by_column[x] /= n
-    return by_row, by_column, summed(by_row) / n
+    return by_row, by_column, pairwise_sum(by_row) / n
 
 
 @kernel

@@ -9,9 +9,8 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.mismatch.bank.pairwise import total
 from analysis.mismatch.bank.scalars import UNKNOWN, Number, ratio_root
-from dsis.compiled import kernel
+from dsis.compiled import kernel, pairwise_sum
 from dsis.measures import Channel
 
 Array = NDArray[np.float64]
@@ -90,14 +89,14 @@ def _frames(means: Array, pixels: Array, shapes: Array) -> Array:
     channels, frames = means.shape
     moved, found = np.empty(means.shape), np.empty(len(shapes))
     for c in range(channels):
-        moved[c] = means[c] - total(means[c]) / frames
+        moved[c] = means[c] - pairwise_sum(means[c]) / frames
     for k in range(found.size):
         top, weight = np.zeros(frames), 0.0
         for c in range(channels):
             own = shapes[k, c] * pixels[c, 0] / pixels[c, 1]
             top += own * moved[c]
             weight += own * shapes[k, c]
-        found[k] = total(top * top) / weight / (frames - 1)
+        found[k] = pairwise_sum(top * top) / weight / (frames - 1)
     return found
 
 

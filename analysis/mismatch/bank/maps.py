@@ -12,8 +12,7 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.mismatch.bank.pairwise import total
-from dsis.compiled import kernel
+from dsis.compiled import kernel, pairwise_sum
 
 Array = NDArray[np.float64]
 MAPS = ("offset", "gain", "time")
@@ -120,7 +119,7 @@ class PatternSums:
 @kernel
 def _add(mean_frame: Array, weight: float, row: Array, moments: Array) -> None:
     """Add shares of a mean frame less its mean to the moments (regressor, row, column)."""
-    mean = total(mean_frame.reshape(-1)) / mean_frame.size
+    mean = pairwise_sum(mean_frame.reshape(-1)) / mean_frame.size
     for y in range(mean_frame.shape[0]):
         line = mean_frame[y]
         for i in range(row.size):

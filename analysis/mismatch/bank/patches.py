@@ -6,9 +6,8 @@ from math import cbrt, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.mismatch.bank.pairwise import total
 from analysis.mismatch.bank.scalars import UNKNOWN, Number
-from dsis.compiled import kernel
+from dsis.compiled import kernel, pairwise_sum
 from dsis.measures.fixed_pattern import Smooth
 
 Array = NDArray[np.float64]
@@ -56,9 +55,9 @@ def _squares(pixels: Array, size: int) -> float:
             for x in range(line.size):
                 line[x] += pixels[k, x]
         for x in range(across):
-            own = total(line[x * size : (x + 1) * size])
+            own = pairwise_sum(line[x * size : (x + 1) * size])
             squares[y * across + x] = own * own
-    return total(squares)
+    return pairwise_sum(squares)
 
 
 def _sums(values: Array, size: int) -> Array:

@@ -5,10 +5,9 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.mismatch.bank.pairwise import total
 from analysis.mismatch.bank.robust import drawn_in
 from analysis.mismatch.bank.scalars import UNKNOWN, Number, ratio_root
-from dsis.compiled import kernel
+from dsis.compiled import kernel, pairwise_sum
 from dsis.measures.fixed_pattern import Smooth
 
 Array = NDArray[np.float64]
@@ -80,7 +79,7 @@ def _add(variances: Array, weight: float, into: Array) -> float:
     Nothing where the mean is none.
     """
     flat = variances.reshape(-1)
-    mean = total(flat) / flat.size
+    mean = pairwise_sum(flat) / flat.size
     if not mean > 0:
         return 0.0
     squares = np.empty(flat.size)
@@ -88,4 +87,4 @@ def _add(variances: Array, weight: float, into: Array) -> float:
         part = weight * (flat[i] / mean - 1)
         into[i] += part
         squares[i] = part * part
-    return total(squares) / flat.size
+    return pairwise_sum(squares) / flat.size

@@ -3,8 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.mismatch.bank.pairwise import total
-from dsis.compiled import kernel
+from dsis.compiled import kernel, pairwise_sum
 from dsis.measures.median import median
 
 Array = NDArray[np.float64]
@@ -41,5 +40,5 @@ def drawn_in_mean(pairs: Array, farthest: float, rounds: int) -> float:
                 far = abs(value - mean) * np.sqrt(weight)
                 weights[i] = weight * min(1.0, farthest / max(far, 1e-12))
             products[i] = value * weights[i]
-        mean = total(products) / total(weights)
+        mean = pairwise_sum(products) / pairwise_sum(weights)
     return float(mean)

@@ -7,9 +7,8 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.mismatch.bank.pairwise import total
 from analysis.mismatch.bank.scalars import Number, ratio_root
-from dsis.compiled import kernel
+from dsis.compiled import kernel, pairwise_sum
 from dsis.measures import Channel
 from dsis.measures.fixed_pattern import Smooth
 
@@ -61,7 +60,7 @@ def _power(coefficients: Array, most: int, of_rows: float, of_columns: float) ->
                     square *= of_rows
                 squares[count] = square
                 count += 1
-    return total(squares[:count]), count
+    return pairwise_sum(squares[:count]), count
 
 
 def slopes(

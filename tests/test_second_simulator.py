@@ -170,3 +170,25 @@ def test_findings_are_judged_by_the_key() -> None:
     assert any("1/2 = 50.0 %" in line for line in figures([right, wrong]))
     assert not points_at("dust_shadows", {**spots, "where": {"exposures": ["D1"]}}, kinds)
     assert share(0, 0) == "0/0"
+
+
+def test_a_law_the_project_learned_later_is_asked_for_by_its_name() -> None:
+    made = {"amplitude": 1.05, "length": 0.08}
+    row = {"effect": "line_start_settling", "z": 40.0, "realisation": made}
+    entry = {"case": "case-0", "verdict": "omitted_physics", "effects": [], "off": []}
+    entry |= {"unlisted": [row["effect"]], "hidden": [row], "written": {}, "camera": {"w": 150}}
+    numbers = {
+        "offset_dn": {"value": 1.0, "standard_error": 0.1},
+        "length_pixels": {"value": 15.0, "standard_error": 1.0},
+    }
+    values = {"verdict": "omitted_physics", "seconds": 1.0}
+    found = {"effect": "line_settling", "parameters": numbers}
+    right = judge(entry, {**values, "omitted_physics": [found]}, {})
+    assert not right["wrong"]
+    assert not right["outside"]
+    assert right["errors_se"]["line_settling.offset_dn"] == pytest.approx(-0.5)
+    assert right["errors_se"]["line_settling.length_pixels"] == pytest.approx(3.0)
+    assert any("z = 10 on" in line and "1/1" in line for line in figures([right]))
+    silent = judge(entry, {**values, "unexplained": [{"statistic": "fixed_smooth_tilt"}]}, {})
+    assert silent["missed"] == ["line_settling"]
+    assert len(shortfalls([silent])) == 1

@@ -8,7 +8,6 @@ from typing import Any
 from scipy.stats import beta
 
 from second.judging import COVERED
-from second.vocabulary import PARAMETERS
 
 STRONG = 10.0  # z from which on a name is asked for
 Judged = Mapping[str, Any]
@@ -35,7 +34,7 @@ def figures(cases: list[Judged]) -> list[str]:
         kind not in case["missed"]
         for case in cases
         for kind, z in case["z"].items()
-        if kind in PARAMETERS and z >= STRONG
+        if kind not in case["outside"] and z >= STRONG
     ]
     nulls = [c for c in cases if not c["z"]]
     outside = [left and not c["wrong"] for c in cases for left in c["outside"].values()]

@@ -6,6 +6,7 @@ called from any thread (numba's own parallel back ends may not). No fast-math: t
 every processor that rounds as IEEE 754 says.
 """
 
+import gc
 import hashlib
 import inspect
 import os
@@ -35,22 +36,35 @@ _UNUSED_S = 86400.0  # from when on no process can still write there
 _one_places = Lock()  # the compiler has one setting for all threads, and they may import at once
 
 
-class _Word(event.Listener):
-    """Says once, on a terminal, why the first use of a command takes longer."""
+class _Compiling(event.Listener):
+    """Says once, on a terminal, why the first use of a command takes longer; sweeps nothing then.
+
+    A compiler makes very many objects, few of them waste: sweeps take a tenth of its time. One
+    thread compiles at a time; a kernel that calls others waits for theirs.
+    """
+
+    said = False
+    depth = 0
+    swept = True  # whether there is a sweeper, outside
 
     def on_start(self, event: object) -> None:
         del event
-        global _said  # noqa: PLW0603 - once for the whole program
-        if not _said and sys.stderr.isatty():
+        if not self.said and sys.stderr.isatty():
             print("dsis: compiling once for this machine, some seconds ...", file=sys.stderr)  # noqa: T201 - for the terminal only
-        _said = True
+        self.said = True
+        if self.depth == 0:
+            self.swept = gc.isenabled()
+            gc.disable()
+        self.depth += 1
 
     def on_end(self, event: object) -> None:
         del event
+        self.depth -= 1
+        if self.depth == 0 and self.swept:
+            gc.enable()
 
 
-_said = False
-event.register("numba:compile", _Word())  # type: ignore[no-untyped-call] # numba has no types; not sent where the cache on disk holds the kernel
+event.register("numba:compile", _Compiling())  # type: ignore[no-untyped-call] # numba has no types; not sent where the cache on disk holds the kernel
 
 
 def kernel(function: F) -> F:
@@ -66,7 +80,11 @@ def kernel(function: F) -> F:
         settings.CACHE_DIR = str(place or default)
         try:
             compile_ = numba.njit(
-                cache=place is not None, nogil=True, error_model="numpy", fastmath=False
+                cache=place is not None,
+                nogil=True,
+                error_model="numpy",
+                fastmath=False,
+                no_cfunc_wrapper=True,
             )
             return cast("F", compile_(function))
         finally:
@@ -107,9 +125,9 @@ def inlined(function: F) -> F:
 
     It must stand in the file of the kernels that call it: the cache on disk follows that file only.
     """
-    compiled = numba.njit(nogil=True, error_model="numpy", fastmath=False, forceinline=True)(
-        function
-    )
+    compiled = numba.njit(
+        nogil=True, error_model="numpy", fastmath=False, forceinline=True, no_cfunc_wrapper=True
+    )(function)
     return cast("F", compiled)
 
 

@@ -1,6 +1,5 @@
 """Patterns and pixels that something else feigns: alike frames, halves, dark current."""
 
-from collections.abc import Mapping, Sequence
 from math import log
 
 import numpy as np
@@ -17,11 +16,12 @@ from analysis.mismatch.contradicted import Denial, rival
 from analysis.mismatch.displaced import displaced
 from analysis.mismatch.edged import STATISTIC, edged, single
 from analysis.mismatch.feignedtails import coded, lopsided, placed
-from analysis.mismatch.grown import LEAST_NUMBER, grown
+from analysis.mismatch.grown import grown
 from analysis.mismatch.halves import halved
 from analysis.mismatch.inpatches import in_patches
 from analysis.mismatch.jumped import jumped
 from analysis.mismatch.leftopen import warm_left
+from analysis.mismatch.movinglines import moving_lines, of_means
 from analysis.mismatch.nofield import no_field
 from analysis.mismatch.persisting import persisting
 from analysis.mismatch.rivalled import rivalled
@@ -60,6 +60,7 @@ def of_another(state: State, effect: Effect, without: Array) -> Denial | None:
     kind = effect.kind
     return (
         feigned(state, kind, without)
+        or moving_lines(state, kind, without)
         or outlying(state, kind)
         or side_by_side(state, kind)
         or in_patches(state, kind)
@@ -107,74 +108,25 @@ def feigned(state: State, kind: str, without: Array) -> Denial | None:
     if kind not in _MAPS or all(m.statistic != "frame_correlation" for m in state.mismatches):
         return None
     numbers = {e.name: e.numbers for e in state.setting.layout.exposures}
-    left = {
-        (key.exposure, key.channel): state.vector.values[i] - state.null.mean[i]
+    larger = {
+        (key.exposure, key.channel): _in_means(
+            state.vector.values[i] - state.null.mean[i], len(numbers[key.exposure])
+        )
         for i, key in enumerate(state.vector.keys)
         if key.statistic == "frame_correlation" and state.null.known[i] and key.exposure in numbers
     }
-    seen, fake, clear, rest = 0.0, 0.0, False, False
-    for i, key in enumerate(state.vector.keys):
-        place = (key.exposure, key.channel)
-        if key.statistic != "fixed_pixel_variance":
-            continue
-        change, sd = state.null.mean[i] - without[i], state.null.sd[i]
-        if not (state.null.known[i] and change > sd):
-            continue  # the pattern explains nothing here, or nothing is known
-        # Numbers are cube roots of variances relative to the noise of the mean frame.
-        explained = float(state.vector.values[i] ** 3 - without[i] ** 3)
-        if place in left:
-            alike = _in_means(left[place], len(numbers[place[0]]))
-            seen += explained / sd**2
-            fake += alike / sd**2
-        elif key.scope in _MAPS[kind]:
-            alike = _in_maps(state, left, numbers, kind, key.channel)
-        else:
-            continue
-        unit = 3 * max(without[i], LEAST_NUMBER) ** 2 * sd
-        clear |= explained > _CLEAR * unit
-        rest |= explained - alike > _CLEAR * unit
-    if fake <= _MOST * seen and (rest or not clear):
-        return None
-    share = 1 - fake / seen if seen > 0 else 0.0
-    return Denial(
-        share, "successive frames are alike for another reason, and feign a fixed pattern"
+    return of_means(
+        state,
+        (_MAPS[kind], "fixed_pixel_variance"),
+        larger,
+        without,
+        "successive frames are alike for another reason, and feign a fixed pattern",
     )
 
 
 def _in_means(rho: float, frames: int) -> float:
     """Return by which share of itself the variance of a mean of alike frames is larger."""
     return 2 * rho * (frames - 1) / frames
-
-
-def _in_maps(
-    state: State,
-    left: Mapping[tuple[str, str], float],
-    numbers: Mapping[str, Sequence[int]],
-    kind: str,
-    channel: str,
-) -> float:
-    """Return the same of a map over all exposures, of offsets, of gains or of what grows with time.
-
-    Mean frames count by their inverse variances, and by the square of the signal or the time.
-    """
-    whole = more = 0.0
-    for (name, own), level in state.setting.seen.levels.items():
-        if own != channel or name not in numbers or not level.variance_dn2 > 0:
-            continue
-        row = _counted_by(state, kind, name, own)
-        weight = row**2 * len(numbers[name]) / level.variance_dn2
-        whole += weight
-        more += weight * _in_means(left.get((name, own), 0.0), len(numbers[name]))
-    return more / whole if whole > 0 else 0.0
-
-
-def _counted_by(state: State, kind: str, name: str, channel: str) -> float:
-    """Return what an exposure's offsets are multiplied by in a pattern's map."""
-    if kind == "dsnu":
-        return 1.0
-    if kind == "prnu":
-        return max(state.calibrated.fit.signal_dn[name, channel], 0.0)
-    return next(e.exposure_time_s for e in state.setting.layout.exposures if e.name == name)
 
 
 def stepped(state: State, kind: str) -> Denial | None:

@@ -11,6 +11,7 @@ from analysis.mismatch.bank.lines import (
     clearest_bin,
     log_chance,
     of_colour,
+    off_axes,
     separate,
     without_lines,
 )
@@ -84,7 +85,7 @@ class SpectrumSums:
         weights = {"": seen / variance_dn2, "signal": seen * max(signal_dn, 0) ** 2 / variance_dn2}
         if self.waves:
             _add(self.power, weights[""], channel.power_spectrum, pixel)
-            _add(self.relative, seen, channel.power_spectrum, pixel)
+            _add(self.relative, float(seen), channel.power_spectrum, pixel)
         self.seen += seen
         _add_line(self.columns, weights[""], channel.column_spectrum, pixel)
         if fine is None:
@@ -271,13 +272,15 @@ class SpectrumSums:
     def _lags(self) -> dict[str, Number]:
         """Return correlations along lines: of a memory, alike at all signals.
 
-        A memory's spectrum is smooth: sinusoids, which correlate at their period, are taken out.
+        A memory's spectrum is smooth: sinusoids, which correlate at their period, are taken out,
+        and so is what whole rows, columns and frames have in common.
         """
         n, m = self.shape
         names = {axis: _lag_names(axis, size) for axis, size in (("rows", m), ("columns", n))}
         if not self.waves:
             return {name: UNKNOWN for own in names.values() for name in own}
-        covariance = np.fft.irfft2(without_lines(self.relative, self.seen), s=(n, m))
+        inner = without_lines(off_axes(self.relative), self.seen)
+        covariance = np.fft.irfft2(inner, s=(n, m))
         sd = 1 / sqrt(n * m * self.seen)
         found: dict[str, Number] = {}
         for axis, line in (("rows", covariance[0]), ("columns", covariance[:, 0])):

@@ -80,11 +80,7 @@ def kernel(function: F) -> F:
         settings.CACHE_DIR = str(place or default)
         try:
             compile_ = numba.njit(
-                cache=place is not None,
-                nogil=True,
-                error_model="numpy",
-                fastmath=False,
-                no_cfunc_wrapper=True,
+                cache=place is not None, nogil=True, error_model="numpy", fastmath=False
             )
             return cast("F", compile_(function))
         finally:
@@ -125,9 +121,9 @@ def inlined(function: F) -> F:
 
     It must stand in the file of the kernels that call it: the cache on disk follows that file only.
     """
-    compiled = numba.njit(
-        nogil=True, error_model="numpy", fastmath=False, forceinline=True, no_cfunc_wrapper=True
-    )(function)
+    compiled = numba.njit(nogil=True, error_model="numpy", fastmath=False, forceinline=True)(
+        function
+    )
     return cast("F", compiled)
 
 

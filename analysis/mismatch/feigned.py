@@ -16,6 +16,7 @@ from analysis.mismatch.contradicted import Denial, rival
 from analysis.mismatch.displaced import displaced
 from analysis.mismatch.edged import STATISTIC, edged, single
 from analysis.mismatch.feignedtails import coded, lopsided, placed
+from analysis.mismatch.flatcolumns import flat_columns
 from analysis.mismatch.grown import grown
 from analysis.mismatch.halves import halved
 from analysis.mismatch.inpatches import in_patches
@@ -76,6 +77,7 @@ def of_another(state: State, effect: Effect, without: Array) -> Denial | None:
         or jumped(state, effect)
         or wandering(state, effect)
         or of_pink_noise(state, effect)
+        or flat_columns(state, effect)
         or unequal(state, effect, without)
         or uneven(state, effect)
         or coded(state, kind, without)

@@ -89,11 +89,7 @@ def bands(size: Size, length_rows: float) -> Cause:
 def pink(size: Size) -> Cause:
     """Return 1/f noise in the order of read-out: waves of two frames' length to two samples."""
     rows, columns = size.rows, size.columns
-    length = 2 * fft.next_fast_len(rows * columns, real=True)
-    power = np.zeros(length // 2 + 1)
-    power[1:-1] = 1 / np.arange(1, length // 2)
-    series = fft.irfft(power / power.sum(), length) * length / 2
-    lag = np.arange(1 - columns, columns)
+    series, lag = _series(size)
     near = np.stack([series[y * columns + lag] for y in range(rows)])  # (row, lag)
     along = fft.dct(np.eye(columns), axis=0, norm="ortho")[:SLOW]
     basis = down(rows)
@@ -109,6 +105,23 @@ def pink(size: Size) -> Cause:
             first = below if i == j == 0 else first
     waves = waves_of(series[:columns])[SLOW - 1 : size.waves]
     return Cause(size.banded(slow), waves, constant_of(first))
+
+
+def pink_lines(size: Size) -> Array:
+    """Return the covariance of the means of lines so many apart, of such noise: (row,)."""
+    series, lag = _series(size)
+    along = np.full(size.columns, 1 / size.columns)
+    weight = np.correlate(along, along, "full")
+    return np.array([weight @ series[y * size.columns + lag] for y in range(size.rows)])
+
+
+def _series(size: Size) -> tuple[Array, NDArray[np.intp]]:
+    """Return the covariance of 1/f noise of unit variance by lag, and all lags along a line."""
+    length = 2 * fft.next_fast_len(size.rows * size.columns, real=True)
+    power = np.zeros(length // 2 + 1)
+    power[1:-1] = 1 / np.arange(1, length // 2)
+    series = fft.irfft(power / power.sum(), length) * length / 2
+    return series, np.arange(1 - size.columns, size.columns)
 
 
 def beside(size: Size) -> dict[str, Cause]:

@@ -37,8 +37,9 @@ def _state(moving: float, pattern: float, located: bool = True) -> Any:
     named = [("column_variance", "exposure", e) for e in SIGNAL_DN]
     named += [("fixed_column_variance", "exposure", e) for e in SIGNAL_DN]
     named += [("fixed_column_variance", "gain", "")]
-    values = np.array([*temporal, *fixed, whole])
-    sd = np.array([(2 / COLUMNS / n) ** 0.5 / 3 for n in (FRAMES, FRAMES, 1, 1, 1)])
+    named += [("fixed_pixel_variance", "exposure", e) for e in SIGNAL_DN]
+    values = np.array([*temporal, *fixed, whole, 1.0, 1.0])
+    sd = np.array([(2 / COLUMNS / n) ** 0.5 / 3 for n in (FRAMES, FRAMES, 1, 1, 1, 1, 1)])
     exposures = [SimpleNamespace(name=e, numbers=tuple(range(FRAMES))) for e in SIGNAL_DN]
     places = {(e, "MONO"): s for e, s in SIGNAL_DN.items()}
     return SimpleNamespace(
@@ -51,13 +52,13 @@ def _state(moving: float, pattern: float, located: bool = True) -> Any:
             keys=tuple(Key(s, scope, e, "MONO", "") for s, scope, e in named), values=values
         ),
         null=SimpleNamespace(
-            mean=np.array([1.0, 1.0, *fixed, whole]), sd=sd, known=np.ones(5, bool)
+            mean=np.array([1.0, 1.0, *fixed, whole, 1.0, 1.0]), sd=sd, known=np.ones(7, bool)
         ),
         mismatches=[SimpleNamespace(statistic="column_variance")] if located else [],
     )
 
 
-WITHOUT = np.ones(5)
+WITHOUT = np.ones(7)
 
 
 @pytest.mark.parametrize("kind", ["column_fpn", "column_prnu"])

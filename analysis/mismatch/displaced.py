@@ -22,6 +22,7 @@ from analysis.mismatch.latelight import of_late_light
 from analysis.mismatch.layout import Place
 from analysis.mismatch.leftopen import Left, left_open
 from analysis.mismatch.leftout import left_out
+from analysis.mismatch.movinglines import moving_lines
 from analysis.mismatch.recalibrate import code_step
 from analysis.mismatch.resolved import FAR_OFF
 from analysis.mismatch.sharing import of_charge, shared_otherwise
@@ -39,7 +40,7 @@ _PAIRS = {"correlation_0_1": 2, "correlation_1_0": 2, "correlation_1_1": 4}
 _ADJACENT = ("correlation_0_1", "correlation_1_0")
 _GRAINS = np.geomspace(1.0, 8.0, 13)  # inverse correlations of neighbours in what they share
 _LEAST = 0.05  # of a variance is other noise
-_LINES = {"row_fpn": "row", "row_prnu": "row", "column_fpn": "column", "column_prnu": "column"}
+_LINES = frozenset({"row_fpn", "row_prnu", "column_fpn", "column_prnu"})
 _GREENS = frozenset({"channel_imbalance", "tap_mismatch"})
 _BESIDE = ("R", "Gr", "Gb", "B")
 _MOST = 0.5  # of a misfit, or of what white rows explain, that something else may make
@@ -78,7 +79,7 @@ def displaced(state: State, kind: str, mean: Array, without: Array | None = None
         return _of_neighbours(state) or _of_limits(state) or _of_codes(state)
     if kind in _LINES:
         denial = of_few_lines(state, kind, without) or of_parts(state, kind)
-        return denial or _of_new_lines(state, _LINES[kind], without)
+        return denial or moving_lines(state, kind, without)
     if kind in _SAID:
         denial = of_few_lines(state, kind, without) or _SAID[kind](state)
         return denial or of_alike_samples(state, kind, mean, without)
@@ -281,37 +282,6 @@ def _greens(state: State, change: Array, shared: Callable[[str], float], why: st
     if fake <= _MOST * seen or seen <= halves:  # which tell amplifiers by more
         return None
     return Denial(max(1 - fake / seen, 0.0), why)
-
-
-def _of_new_lines(state: State, axis: str, without: Array) -> Denial | None:
-    """Return how fixed lines are denied by lines that differ anew in each frame; None: not.
-
-    Of n frames the mean keeps 1 / n of their variance. Ratios of lines' variances to those of
-    pixels, less one, are the same of frames and of their mean, but for the pixels' own pattern.
-    """
-    left = left_open(state, (f"{axis}_variance",))
-    if not left:
-        return None
-    numbers: dict[tuple[Place, str], int] = {
-        ((key.exposure, key.channel), key.statistic): i
-        for i, key in enumerate(state.vector.keys)
-        if key.scope == "exposure" and state.null.known[i]
-    }
-    seen = fake = 0.0
-    for place, statistic in left:
-        new = numbers[place, statistic]
-        fixed = numbers.get((place, f"fixed_{axis}_variance"))
-        pattern = numbers.get((place, "fixed_pixel_variance"))
-        if fixed is None or pattern is None or not state.vector.values[pattern] > 0:
-            continue
-        values, expected = state.vector.values, state.null.mean
-        weight = 1 / float(state.null.sd[fixed]) ** 2
-        seen += weight * float(values[fixed] ** 3 - without[fixed] ** 3)
-        anew = float(values[new] ** 3 - expected[new] ** 3)
-        fake += weight * anew / float(values[pattern]) ** 3
-    if seen <= 0 or fake <= _MOST * seen:
-        return None
-    return Denial(1 - fake / seen, f"{axis}s that differ anew in each frame leave as much in means")
 
 
 def _of_alike_rows(state: State) -> Denial | None:

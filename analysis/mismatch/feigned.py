@@ -22,7 +22,7 @@ from analysis.mismatch.halves import halved
 from analysis.mismatch.inpatches import in_patches
 from analysis.mismatch.jumped import jumped
 from analysis.mismatch.leftopen import warm_left
-from analysis.mismatch.movinglines import moving_lines, of_means
+from analysis.mismatch.movinglines import of_means
 from analysis.mismatch.nofield import no_field
 from analysis.mismatch.persisting import persisting
 from analysis.mismatch.rivalled import rivalled
@@ -61,7 +61,6 @@ def of_another(state: State, effect: Effect, without: Array) -> Denial | None:
     kind = effect.kind
     return (
         feigned(state, kind, without)
-        or moving_lines(state, kind, without)
         or outlying(state, kind)
         or side_by_side(state, kind)
         or in_patches(state, kind)
@@ -121,7 +120,7 @@ def feigned(state: State, kind: str, without: Array) -> Denial | None:
         state,
         (_MAPS[kind], "fixed_pixel_variance"),
         larger,
-        without,
+        (without, state.null.mean - without > state.null.sd),
         "successive frames are alike for another reason, and feign a fixed pattern",
     )
 

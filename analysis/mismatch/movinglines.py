@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.grown import LEAST_NUMBER
 from analysis.mismatch.layout import Place
+from analysis.mismatch.leftopen import left_open
 from analysis.mismatch.state import State
 
 Array = NDArray[np.float64]
@@ -17,6 +18,7 @@ _LINES = {
     "row_prnu": ("row_variance", "gain"),
     "column_prnu": ("column_variance", "gain"),
 }
+_PIXELS = "fixed_pixel_variance"
 _CLEAR = 5.0  # standard errors of what stands out
 _MOST = 0.5  # of what a pattern would explain, that something else may feign
 
@@ -24,15 +26,16 @@ _MOST = 0.5  # of what a pattern would explain, that something else may feign
 def moving_lines(state: State, kind: str, without: Array) -> Denial | None:
     """Return how a pattern of lines is denied by lines that move anew in each frame; None: not.
 
-    A mean of n frames keeps 1 / n of what lines move by, and of the noise of pixels: beside that
-    they stand out as far as in each frame. Where lines that move are left unexplained, and make
-    half of what the pattern would explain, there may be no pattern. Nor where all of it that stood
-    out lies in maps over all exposures, and does no longer beyond that.
+    Of n frames the mean keeps 1 / n of their variance. Ratios of lines' variances to those of
+    pixels, less one, are the same of frames and of their mean, but for the pixels' own pattern.
+    Where lines that move are left unexplained, and make half of what the pattern would explain,
+    there may be no pattern. Nor where all of it that stood out lies in maps over all exposures, and
+    does no longer beyond that.
 
     Parameters
     ----------
     state
-        With the effect.
+        With the effect, or before it is taken in.
     kind
         The effect.
     without
@@ -41,24 +44,34 @@ def moving_lines(state: State, kind: str, without: Array) -> Denial | None:
     if kind not in _LINES:
         return None
     moving, own_map = _LINES[kind]
-    if all(m.statistic != moving for m in state.mismatches):
+    left = left_open(state, (moving,))
+    if not left:
         return None
-    # Numbers are cube roots of variances relative to the noise of pixels.
-    larger = {
-        (key.exposure, key.channel): float(state.vector.values[i] ** 3 - state.null.mean[i] ** 3)
-        for i, key in enumerate(state.vector.keys)
-        if key.statistic == moving and key.exposure and state.null.known[i]
+    ratios = {  # numbers are cube roots of variances relative to the noise of pixels
+        ((key.exposure, key.channel), key.statistic): float(value) ** 3
+        for key, value, known in zip(
+            state.vector.keys, state.vector.values, state.null.known, strict=True
+        )
+        if known and key.scope == "exposure"
     }
+    larger = {
+        place: (ratios[place, moving] - (np.cbrt(ratios[place, moving]) - rest) ** 3) / own
+        for (place, _), (rest, _) in left.items()
+        if (own := ratios.get((place, _PIXELS), 0.0)) > 0
+    }
+    seen = np.nan_to_num(state.vector.values - without) > state.null.sd
     pattern = (own_map, f"{own_map} alone"), f"fixed_{moving}"
-    why = "lines that move from frame to frame leave as much in a mean of few, and feign it"
-    return of_means(state, pattern, larger, without, why)
+    why = (
+        f"{moving.removesuffix('_variance')}s that differ anew in each frame leave as much in means"
+    )
+    return of_means(state, pattern, larger, (without, seen), why)
 
 
 def of_means(
     state: State,
     pattern: tuple[tuple[str, ...], str],
     larger: Mapping[Place, float],
-    without: Array,
+    without: tuple[Array, NDArray[np.bool_]],
     why: str,
 ) -> Denial | None:
     """Return how a pattern is denied by what makes means of frames scatter further; None: it isn't.
@@ -66,36 +79,32 @@ def of_means(
     Parameters
     ----------
     state
-        With the pattern.
+        With the pattern, or before it is taken in.
     pattern
         Its maps, and the statistic that it explains.
     larger
         By which share of their noise the variance of mean frames is larger for another reason.
     without
-        The numbers predicted without the pattern.
+        The numbers predicted without the pattern, and where it explains something.
     why
         Of the denial.
     """
     maps, statistic = pattern
+    before, explains = without
     seen, fake, clear, rest = 0.0, 0.0, False, False
     for i, key in enumerate(state.vector.keys):
-        if key.statistic != statistic:
+        if key.statistic != statistic or not (state.null.known[i] and explains[i]):
             continue
-        change, sd = state.null.mean[i] - without[i], state.null.sd[i]
-        if not (state.null.known[i] and change > sd):
-            continue  # the pattern explains nothing here, or nothing is known
         # Numbers are cube roots of variances relative to the noise of the mean frame.
-        explained = float(state.vector.values[i] ** 3 - without[i] ** 3)
-        place = (key.exposure, key.channel)
+        explained = float(state.vector.values[i] ** 3 - before[i] ** 3)
+        place, sd = (key.exposure, key.channel), float(state.null.sd[i])
         if place in larger:
             seen += explained / sd**2
             fake += larger[place] / sd**2
-            continue
-        if key.scope not in maps:
-            continue
-        unit = 3 * max(without[i], LEAST_NUMBER) ** 2 * sd
-        clear |= explained > _CLEAR * unit
-        rest |= explained - _in_map(state, larger, maps[0], key.channel) > _CLEAR * unit
+        elif key.scope in maps:
+            unit = 3 * max(before[i], LEAST_NUMBER) ** 2 * sd
+            clear |= explained > _CLEAR * unit
+            rest |= explained - _in_map(state, larger, maps[0], key.channel) > _CLEAR * unit
     if fake <= _MOST * seen and (rest or not clear):
         return None
     return Denial(1 - fake / seen if seen > 0 else 0.0, why)

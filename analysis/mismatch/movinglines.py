@@ -29,8 +29,8 @@ def moving_lines(state: State, kind: str, without: Array) -> Denial | None:
     Of n frames the mean keeps 1 / n of their variance. Ratios of lines' variances to those of
     pixels, less one, are the same of frames and of their mean, but for the pixels' own pattern.
     Where lines that move are left unexplained, and make half of what the pattern would explain,
-    there may be no pattern. Nor where all of it that stood out lies in maps over all exposures, and
-    does no longer beyond that.
+    there may be no pattern. Nor where what stands out of it, in exposures or in maps over all, does
+    no longer beyond that.
 
     Parameters
     ----------
@@ -61,9 +61,8 @@ def moving_lines(state: State, kind: str, without: Array) -> Denial | None:
     }
     seen = np.nan_to_num(state.vector.values - without) > state.null.sd
     pattern = (own_map, f"{own_map} alone"), f"fixed_{moving}"
-    why = (
-        f"{moving.removesuffix('_variance')}s that differ anew in each frame leave as much in means"
-    )
+    line = moving.removesuffix("_variance")
+    why = f"{line}s that differ anew in each frame leave as much in means"
     return of_means(state, pattern, larger, (without, seen), why)
 
 
@@ -99,12 +98,16 @@ def of_means(
         explained = float(state.vector.values[i] ** 3 - before[i] ** 3)
         place, sd = (key.exposure, key.channel), float(state.null.sd[i])
         if place in larger:
+            alike = larger[place]
             seen += explained / sd**2
-            fake += larger[place] / sd**2
+            fake += alike / sd**2
         elif key.scope in maps:
-            unit = 3 * max(before[i], LEAST_NUMBER) ** 2 * sd
-            clear |= explained > _CLEAR * unit
-            rest |= explained - _in_map(state, larger, maps[0], key.channel) > _CLEAR * unit
+            alike = _in_map(state, larger, maps[0], key.channel)
+        else:
+            continue
+        unit = 3 * max(before[i], LEAST_NUMBER) ** 2 * sd
+        clear |= explained > _CLEAR * unit
+        rest |= explained - alike > _CLEAR * unit
     if fake <= _MOST * seen and (rest or not clear):
         return None
     return Denial(1 - fake / seen if seen > 0 else 0.0, why)

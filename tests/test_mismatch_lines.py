@@ -108,16 +108,13 @@ def test_lines_do_not_correlate_pixels() -> None:
         assert abs(value) < SURE * sd
 
 
-@pytest.mark.parametrize("axis", ["rows", "columns"])
-def test_lines_that_move_as_a_whole_do_not_correlate_their_pixels(axis: str) -> None:
+def test_columns_that_move_as_a_whole_do_not_correlate_their_pixels() -> None:
     stack = frames()
-    lines = (*stack.shape[:-1], 1) if axis == "rows" else (*stack.shape[:-2], 1, stack.shape[-1])
-    sd = stack.std()
-    moving = stack + 0.3 * sd * np.random.default_rng(8).standard_normal(lines)
-    found = sums_of(moving).numbers()
+    moves = np.random.default_rng(8).standard_normal((*stack.shape[:-2], 1, COLUMNS))
+    found = sums_of(stack + 0.3 * stack.std() * moves).numbers()
     for lag in range(1, 9):
-        value, error = found[f"line_correlation along {axis} {lag}"]
-        assert abs(value) < SURE * error < 0.02  # lines have 0.08 of the variance
+        value, error = found[f"line_correlation along columns {lag}"]
+        assert abs(value) < SURE * error < 0.02  # columns have 0.08 of the variance
 
 
 def test_a_memory_stays_in_the_correlations() -> None:

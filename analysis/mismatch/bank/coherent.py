@@ -273,13 +273,14 @@ class SpectrumSums:
         """Return correlations along lines: of a memory, alike at all signals.
 
         A memory's spectrum is smooth: sinusoids, which correlate at their period, are taken out,
-        and so is what whole rows, columns and frames have in common.
+        and so is what whole columns have in common. What rows have stays: it is much of the power
+        of 1/f noise, whose samples are alike along rows.
         """
         n, m = self.shape
         names = {axis: _lag_names(axis, size) for axis, size in (("rows", m), ("columns", n))}
         if not self.waves:
             return {name: UNKNOWN for own in names.values() for name in own}
-        inner = without_lines(off_axes(self.relative), self.seen)
+        inner = without_lines(off_axes(self.relative, right=()), self.seen)
         covariance = np.fft.irfft2(inner, s=(n, m))
         sd = 1 / sqrt(n * m * self.seen)
         found: dict[str, Number] = {}

@@ -1,7 +1,6 @@
 """Lines of a spectrum: which bins are separate sinusoids, and what is left without them."""
 
 import numpy as np
-import pytest
 import scipy.stats
 from numpy.typing import NDArray
 

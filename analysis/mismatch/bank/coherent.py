@@ -11,7 +11,6 @@ from analysis.mismatch.bank.lines import (
     clearest_bin,
     log_chance,
     of_colour,
-    off_axes,
     separate,
     without_lines,
 )
@@ -280,7 +279,7 @@ class SpectrumSums:
         names = {axis: _lag_names(axis, size) for axis, size in (("rows", m), ("columns", n))}
         if not self.waves:
             return {name: UNKNOWN for own in names.values() for name in own}
-        inner = without_lines(off_axes(self.relative, right=()), self.seen)
+        inner = without_lines(_without_columns(self.relative), self.seen)
         covariance = np.fft.irfft2(inner, s=(n, m))
         sd = 1 / sqrt(n * m * self.seen)
         found: dict[str, Number] = {}
@@ -289,6 +288,14 @@ class SpectrumSums:
             values = (line[1 : len(own) + 1] / line[0]).tolist()
             found |= {name: (value, sd) for name, value in zip(own, values, strict=True)}
         return found
+
+
+def _without_columns(power: Array) -> Array:
+    """Return a spectrum without what whole columns have in common: as it is in the bins beside."""
+    found = power.copy()
+    if len(power) > 2:
+        found[0] = (power[1] + power[-1]) / 2
+    return found
 
 
 @cache

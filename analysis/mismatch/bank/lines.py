@@ -4,7 +4,6 @@ What makes neighbouring pixels alike (crosstalk, a memory, pink noise) bends a s
 sinusoid is a single bin, or leaks into few where its frequency lies between bins.
 """
 
-from collections.abc import Sequence
 from functools import lru_cache
 from math import exp, expm1, log, log1p, sqrt
 
@@ -46,25 +45,6 @@ def without_lines(power: Array, degrees: int) -> Array:
     found = power.copy()
     _cut_down(power, y, x, middle_of_gamma(degrees) / degrees, limit, found)
     return found
-
-
-def off_axes(power: Array, down: Sequence[int] = (0,), right: Sequence[int] = (0,)) -> Array:
-    """Return a spectrum with its axes as what is off them is on the mean.
-
-    They hold what rows, columns and frames have in common: samples of a line that moves as a whole
-    are alike at all distances, which is no memory.
-
-    Parameters
-    ----------
-    power
-        Half plane of a real transform (row, columns // 2 + 1), of any unit.
-    down, right
-        Rows and columns of bins that are axes: of a mosaic's, more than one.
-    """
-    held = np.zeros(power.shape, np.bool_)
-    held[list(down)] = True
-    held[:, list(right)] = True
-    return np.where(held, power[~held].mean(), power)
 
 
 def separate(power: Array, columns: int, white: float, most: int) -> list[tuple[int, int, float]]:

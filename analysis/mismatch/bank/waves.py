@@ -15,7 +15,7 @@ import scipy.fft
 from numpy.typing import NDArray
 
 from analysis.mismatch.bank.coherent import LAGS
-from analysis.mismatch.bank.lines import any_of, log_chance, off_axes, without_lines
+from analysis.mismatch.bank.lines import any_of, log_chance, without_lines
 from analysis.mismatch.bank.peaks import Peak, frequency, top, white_level
 from analysis.mismatch.bank.scalars import UNKNOWN, Number, score_of_log
 from dsis.compiled import inlined, kernel
@@ -194,7 +194,11 @@ class WaveSums:
         if not self.taken:
             return {name: UNKNOWN for axis in _PAIRED for _, name in self._odd(axis)}
         rows, columns = self.shape
-        power = off_axes(self.power[0, 0] / self.weight, (0, rows // 2), (0, columns // 2))
+        power = self.power[0, 0] / self.weight
+        held = np.zeros(power.shape, np.bool_)
+        held[[0, rows // 2]] = True
+        held[:, [0, columns // 2]] = True
+        power = np.where(held, power[~held].mean(), power)
         covariance = np.fft.irfft2(without_lines(power, self._degrees), s=self.shape)
         found: dict[str, Number] = {}
         for axis, line in (("rows", covariance[0]), ("columns", covariance[:, 0])):

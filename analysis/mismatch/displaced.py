@@ -22,7 +22,7 @@ from analysis.mismatch.latelight import of_late_light
 from analysis.mismatch.layout import Place
 from analysis.mismatch.leftopen import Left, left_open
 from analysis.mismatch.leftout import left_out
-from analysis.mismatch.movinglines import moving_lines
+from analysis.mismatch.movinglines import LINES, moving_lines
 from analysis.mismatch.recalibrate import code_step
 from analysis.mismatch.resolved import FAR_OFF
 from analysis.mismatch.sharing import of_charge, shared_otherwise
@@ -40,7 +40,6 @@ _PAIRS = {"correlation_0_1": 2, "correlation_1_0": 2, "correlation_1_1": 4}
 _ADJACENT = ("correlation_0_1", "correlation_1_0")
 _GRAINS = np.geomspace(1.0, 8.0, 13)  # inverse correlations of neighbours in what they share
 _LEAST = 0.05  # of a variance is other noise
-_LINES = frozenset({"row_fpn", "row_prnu", "column_fpn", "column_prnu"})
 _GREENS = frozenset({"channel_imbalance", "tap_mismatch"})
 _BESIDE = ("R", "Gr", "Gb", "B")
 _MOST = 0.5  # of a misfit, or of what white rows explain, that something else may make
@@ -77,7 +76,7 @@ def displaced(state: State, kind: str, mean: Array, without: Array | None = None
             why = "levels bend smoothly, not where a read-out path begins"
             return Denial(0.0, why) if at_no_switch(state, kind, mean) else None
         return _of_neighbours(state) or _of_limits(state) or _of_codes(state)
-    if kind in _LINES:
+    if kind in LINES:
         denial = of_few_lines(state, kind, without) or of_parts(state, kind)
         return denial or moving_lines(state, kind, without)
     if kind in _SAID:

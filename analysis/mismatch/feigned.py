@@ -116,13 +116,10 @@ def feigned(state: State, kind: str, without: Array) -> Denial | None:
         for i, key in enumerate(state.vector.keys)
         if key.statistic == "frame_correlation" and state.null.known[i] and key.exposure in numbers
     }
-    return of_means(
-        state,
-        (_MAPS[kind], "fixed_pixel_variance"),
-        larger,
-        (without, state.null.mean - without > state.null.sd),
-        "successive frames are alike for another reason, and feign a fixed pattern",
-    )
+    explains = state.null.mean - without > state.null.sd
+    share = of_means(state, (_MAPS[kind], "fixed_pixel_variance"), larger, without, explains)
+    why = "successive frames are alike for another reason, and feign a fixed pattern"
+    return None if share is None else Denial(share, why)
 
 
 def _in_means(rho: float, frames: int) -> float:

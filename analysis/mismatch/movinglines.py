@@ -12,12 +12,13 @@ from analysis.mismatch.leftopen import left_open
 from analysis.mismatch.state import State
 
 Array = NDArray[np.float64]
-_LINES = {
+LINES = {
     "row_fpn": ("row_variance", "offset"),
     "column_fpn": ("column_variance", "offset"),
     "row_prnu": ("row_variance", "gain"),
     "column_prnu": ("column_variance", "gain"),
 }
+"""Patterns of lines: the statistic of lines that move, and the pattern's map."""
 _PIXELS = "fixed_pixel_variance"
 _CLEAR = 5.0  # standard errors of what stands out
 _MOST = 0.5  # of what a pattern would explain, that something else may feign
@@ -41,39 +42,41 @@ def moving_lines(state: State, kind: str, without: Array) -> Denial | None:
     without
         The numbers predicted without it.
     """
-    if kind not in _LINES:
+    if kind not in LINES:
         return None
-    moving, own_map = _LINES[kind]
+    moving, own_map = LINES[kind]
     left = left_open(state, (moving,))
     if not left:
         return None
-    ratios = {  # numbers are cube roots of variances relative to the noise of pixels
-        ((key.exposure, key.channel), key.statistic): float(value) ** 3
+    numbers = {
+        ((key.exposure, key.channel), key.statistic): float(value)
         for key, value, known in zip(
             state.vector.keys, state.vector.values, state.null.known, strict=True
         )
         if known and key.scope == "exposure"
     }
-    larger = {
-        place: (ratios[place, moving] - (np.cbrt(ratios[place, moving]) - rest) ** 3) / own
-        for (place, _), (rest, _) in left.items()
-        if (own := ratios.get((place, _PIXELS), 0.0)) > 0
-    }
-    seen = np.nan_to_num(state.vector.values - without) > state.null.sd
-    pattern = (own_map, f"{own_map} alone"), f"fixed_{moving}"
-    line = moving.removesuffix("_variance")
+    larger = {}
+    for (place, _), (rest, _) in left.items():  # cube roots of variances relative to pixels' noise
+        number, pattern = numbers[place, moving], numbers.get((place, _PIXELS), 0.0)
+        if pattern > 0:
+            larger[place] = (number**3 - (number - rest) ** 3) / pattern**3
+    explains = np.nan_to_num(state.vector.values - without) > state.null.sd
+    maps, line = (own_map, f"{own_map} alone"), moving.removesuffix("_variance")
+    share = of_means(state, (maps, f"fixed_{moving}"), larger, without, explains)
     why = f"{line}s that differ anew in each frame leave as much in means"
-    return of_means(state, pattern, larger, (without, seen), why)
+    return None if share is None else Denial(share, why)
 
 
 def of_means(
     state: State,
     pattern: tuple[tuple[str, ...], str],
     larger: Mapping[Place, float],
-    without: tuple[Array, NDArray[np.bool_]],
-    why: str,
-) -> Denial | None:
-    """Return how a pattern is denied by what makes means of frames scatter further; None: it isn't.
+    without: Array,
+    explains: NDArray[np.bool_],
+) -> float | None:
+    """Return which share of a pattern is left beside what makes means of frames scatter further.
+
+    None: that is half or more, and what stands out of it does so beyond that.
 
     Parameters
     ----------
@@ -84,18 +87,17 @@ def of_means(
     larger
         By which share of their noise the variance of mean frames is larger for another reason.
     without
-        The numbers predicted without the pattern, and where it explains something.
-    why
-        Of the denial.
+        The numbers predicted without the pattern.
+    explains
+        Where the pattern explains something.
     """
     maps, statistic = pattern
-    before, explains = without
     seen, fake, clear, rest = 0.0, 0.0, False, False
     for i, key in enumerate(state.vector.keys):
         if key.statistic != statistic or not (state.null.known[i] and explains[i]):
             continue
         # Numbers are cube roots of variances relative to the noise of the mean frame.
-        explained = float(state.vector.values[i] ** 3 - before[i] ** 3)
+        explained = float(state.vector.values[i] ** 3 - without[i] ** 3)
         place, sd = (key.exposure, key.channel), float(state.null.sd[i])
         if place in larger:
             alike = larger[place]
@@ -105,12 +107,12 @@ def of_means(
             alike = _in_map(state, larger, maps[0], key.channel)
         else:
             continue
-        unit = 3 * max(before[i], LEAST_NUMBER) ** 2 * sd
+        unit = 3 * max(without[i], LEAST_NUMBER) ** 2 * sd
         clear |= explained > _CLEAR * unit
         rest |= explained - alike > _CLEAR * unit
     if fake <= _MOST * seen and (rest or not clear):
         return None
-    return Denial(1 - fake / seen if seen > 0 else 0.0, why)
+    return 1 - fake / seen if seen > 0 else 0.0
 
 
 def _in_map(state: State, larger: Mapping[Place, float], name: str, channel: str) -> float:
@@ -118,23 +120,18 @@ def _in_map(state: State, larger: Mapping[Place, float], name: str, channel: str
 
     Mean frames count by their inverse variances, and by the square of the signal or the time.
     """
-    exposures = {e.name: e for e in state.setting.layout.exposures}
     whole = more = 0.0
-    for place, level in state.setting.seen.levels.items():
-        exposure, own = place
-        if own != channel or exposure not in exposures or not level.variance_dn2 > 0:
+    for exposure in state.setting.layout.exposures:
+        place = (exposure.name, channel)
+        level = state.setting.seen.levels.get(place)
+        if level is None or not level.variance_dn2 > 0:
             continue
-        row = _counted_by(state, name, place)
-        weight = row**2 * len(exposures[exposure].numbers) / level.variance_dn2
+        row = 1.0
+        if name == "gain":
+            row = max(state.calibrated.fit.signal_dn[place], 0.0)
+        elif name == "time":
+            row = exposure.exposure_time_s
+        weight = row**2 * len(exposure.numbers) / level.variance_dn2
         whole += weight
         more += weight * larger.get(place, 0.0)
     return more / whole if whole > 0 else 0.0
-
-
-def _counted_by(state: State, name: str, place: Place) -> float:
-    """Return what an exposure's offsets are multiplied by in a map."""
-    if name == "offset":
-        return 1.0
-    if name == "gain":
-        return max(state.calibrated.fit.signal_dn[place], 0.0)
-    return next(e.exposure_time_s for e in state.setting.layout.exposures if e.name == place[0])

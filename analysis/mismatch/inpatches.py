@@ -4,13 +4,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.bank.parts import parts
+from analysis.mismatch.bank.patches import OUTLYING
 from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.likepatches import in_squares, patches_of
 from analysis.mismatch.state import State
 
 Array = NDArray[np.float64]
 _MAPS = {"dsnu": "offset", "prnu": "gain"}
-_CALL = "fixed_patch_variance"
+_CALLS = frozenset({"fixed_patch_variance", OUTLYING})
 _INSIDE = 0.5  # of a patch's depth, up to which pixels belong to it
 _MOST = 0.5  # of a pattern's variance, that patches may make
 _SURE = 4.0  # standard errors of the variance of the other pixels, from which there is a pattern
@@ -23,7 +24,7 @@ def in_patches(state: State, kind: str) -> Denial | None:
     of its variance beyond noise is left, or less, and not for sure, all pixels may be alike but for
     them.
     """
-    if kind not in _MAPS or all(m.statistic != _CALL for m in state.mismatches):
+    if kind not in _MAPS or all(m.statistic not in _CALLS for m in state.mismatches):
         return None
     plane = _plane(state, _MAPS[kind])
     if plane is None:

@@ -8,6 +8,8 @@ from numpy.typing import NDArray
 from analysis.mismatch.bank.home import TIME, homes, one_sided
 from analysis.mismatch.bank.key import MOSAIC, Key
 from analysis.mismatch.bank.motion import STATISTIC as MOTION
+from analysis.mismatch.bank.parts import parts
+from analysis.mismatch.bank.patches import OUTLYING, outlying
 from analysis.mismatch.bank.standing import NAME as FIXED_WAVE
 from analysis.mismatch.finding import Mismatch, Where
 from analysis.mismatch.layout import Layout
@@ -156,13 +158,20 @@ def _where(
             signals += layout.range_dn(keys[i].place)
     kinds = {e.kind for e in exposures}
     times = [e.exposure_time_s for e in exposures]
+    patch = _patch(layout, seen, keys[top])
+    rows, columns = (
+        own or lines_of(keys[top], axis, size)
+        for own, axis, size in zip(
+            patch, ("rows", "columns"), (layout.rows, layout.columns), strict=True
+        )
+    )
     return Where(
         exposures=tuple(e.name for e in exposures),
         kind=kinds.pop() if len(kinds) == 1 else None,
         channel=channel,
         signal_dn=(round(min(signals), 3), round(max(signals), 3)) if signals else None,
-        rows=lines_of(keys[top], "rows", layout.rows),
-        columns=lines_of(keys[top], "columns", layout.columns),
+        rows=rows,
+        columns=columns,
         spatial_frequency=_frequency(layout, seen, statistic, keys[top]),
         pixels=_pixels(layout, seen, keys[top]),
         exposure_time_s=(min(times), max(times))
@@ -180,6 +189,28 @@ def lines_of(key: Key, axis: str, size: int) -> tuple[int, int] | None:
     if key.statistic == "fixed_edge":
         return (0, _EDGE - 1) if "first" in key.detail else (size - _EDGE, size - 1)
     return None
+
+
+def _patch(
+    layout: Layout, seen: Observation, key: Key
+) -> tuple[tuple[int, int] | None, tuple[int, int] | None]:
+    """Return the rows and columns of the patch that a number is of; None: of none, or no matter."""
+    found = []
+    for channel in (key.channel,) if key.channel else layout.channels:
+        if key.statistic != OUTLYING or (channel, key.scope) not in seen.images:
+            continue
+        own = parts(*seen.images[channel, key.scope])
+        if (patch := outlying(own.pixels, own.square)) is not None:
+            found.append((patch, layout.sites[channel]))
+    if not found:
+        return None, None
+    (_, *corner, size), site = min(found)
+    step = 1 if layout.channels == ("MONO",) else 2
+    rows, columns = (
+        (step * at + first, step * (at + size - 1) + first)
+        for at, first in zip(corner, site, strict=True)
+    )
+    return rows, columns
 
 
 def _frequency(

@@ -46,6 +46,7 @@ _WORDS = {
     "fixed_smooth_falloff": "the mean frame falls or rises towards its corners",
     "fixed_edge": "the mean frame decays from an edge",
     "fixed_patch_variance": "pixels that lie together have fixed deviations in common",
+    "outlying_patch": "a patch of pixels stands out of the fixed pattern",
     "fixed_correlation_0_1": "fixed deviations of neighbours along a row are alike",
     "fixed_correlation_1_0": "fixed deviations of neighbours along a column are alike",
     "fixed_spectral_peak": "a wave stands still in the mean frame",

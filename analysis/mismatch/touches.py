@@ -60,6 +60,9 @@ _FOLLOWS = {
     "patch_variance": frozenset({"spectral_peak", "row_spectrum_peak"}) | _CORRELATIONS,
     "fixed_patch_variance": frozenset({"fixed_correlation_0_1", "fixed_correlation_1_0"})
     | _CORRELATIONS,
+    "outlying_patch": frozenset({"fixed_correlation_0_1", "fixed_correlation_1_0"})
+    | _CORRELATIONS
+    | {"fixed_smooth_variance"},
     # Few electrons of several DN each leave codes out.
     "code_imbalance": frozenset({"code_imbalance", "skewness"}),
     "code_spacing": frozenset({"code_spacing", "skewness"}),

@@ -50,6 +50,7 @@ STATISTICS = {
     "fixed_smooth_falloff": "fall of the fixed pattern towards the corners",
     "fixed_edge": "decay of the fixed pattern from an edge",
     "fixed_patch_variance": "fixed pattern of patches of pixels",
+    "outlying_patch": "patch of pixels that stands out",
     "fixed_correlation_0_1": "fixed pattern alike in neighbours of a row",
     "fixed_correlation_1_0": "fixed pattern alike in neighbours of a column",
     "fixed_spectral_peak": "wave that stands still in the mean frame",

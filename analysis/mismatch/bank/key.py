@@ -32,8 +32,8 @@ class Key:
 
     @property
     def is_peak(self) -> bool:
-        """Whether it is a normal score of the highest of many bins."""
-        return self.statistic.endswith(("spectrum_peak", "spectral_peak"))
+        """Whether it is a normal score of the highest of many bins, or patches."""
+        return self.statistic.endswith(("spectrum_peak", "spectral_peak", "outlying_patch"))
 
     @property
     def place(self) -> tuple[str, str]:

@@ -165,7 +165,7 @@ def clearest_bin(power: Array, degrees: float) -> int:
     return int((beside if chance_beside(beside) < _SURE else power).argmax())
 
 
-def any_of(log_least: float, count: int) -> float:
+def any_of(log_least: float, count: float) -> float:
     """Return the logarithm of the chance that the least of independent chances is no larger."""
     if log_least < _ALONE:
         return log_least + log(count)

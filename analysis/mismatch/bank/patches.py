@@ -1,12 +1,15 @@
-"""Patches of a map: how much pixels that lie together have in common, over several sizes."""
+"""Patches of a map: what pixels that lie together have in common, over several sizes."""
 
 from functools import lru_cache
-from math import cbrt, sqrt
+from math import cbrt, inf, log, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import log_ndtr
 
-from analysis.mismatch.bank.scalars import UNKNOWN, Number
+from analysis.mismatch.bank.lines import any_of
+from analysis.mismatch.bank.robust import typical_square
+from analysis.mismatch.bank.scalars import UNKNOWN, Number, score_of_log
 from dsis.compiled import kernel, pairwise_sum
 from dsis.measures.fixed_pattern import Smooth
 
@@ -14,6 +17,11 @@ Array = NDArray[np.float64]
 SIZES = (4, 8, 16)  # pixels of the plane along a side
 _NAMES = tuple(f"fixed_patch_variance of {size} pixels" for size in SIZES)
 _LEAST_PATCHES = 12.0  # beyond lines and smooth surfaces, to be worth a number
+OUTLYING = "outlying_patch"
+_FAR_OUT = 3.0  # standard deviations of a pixel, beyond which it counts as so far out
+_APART = 0.7  # of patches that overlap by half, for the largest of them
+_TELLS = 0.2  # of patches, by the median of their squares: independent ones of normal variates
+_CHANCE = 3.0  # standard errors of a typical square
 
 
 def patches(pixels: Array, square: float) -> dict[str, Number]:
@@ -36,7 +44,76 @@ def patches(pixels: Array, square: float) -> dict[str, Number]:
         ratio = _squares(pixels, size) / size**2 / free / square
         dof = (rows - 1) * (columns - 1)
         found[name] = cbrt(ratio), sqrt(2 / (9 * free) - 2 / (9 * dof))
+    found[OUTLYING] = _standing_out(pixels, square)
     return found
+
+
+def outlying(pixels: Array, square: float) -> tuple[float, int, int, int] | None:
+    """Return the chance of the patch that stands out most, its place and size; None: no patch.
+
+    Patches overlap by half, and are compared with white noise, or with the scatter of the many of
+    their size where that is more for sure; a single pixel counts little. The logarithm of the
+    chance is of the least of as many (Sidak, 1967), of all sizes.
+
+    Parameters
+    ----------
+    pixels, square
+        As of `patches`.
+    """
+    if not square > 0:
+        return None
+    found, cells, limit = [], pixels, _FAR_OUT * sqrt(square)
+    for size in SIZES:
+        if _free(*pixels.shape, size) < _LEAST_PATCHES:
+            break
+        cells, sums, y, x = _overlapping(cells, limit)  # cells are half as wide as patches
+        limit = inf
+        white = square * size**2 * _kept(pixels.shape, size)
+        typical = typical_square(sums.reshape(-1)) / (1 + _CHANCE * sqrt(2 / (_TELLS * sums.size)))
+        far = abs(float(sums[y, x])) / sqrt(max(typical, white))
+        chance = any_of(log(2) + float(log_ndtr(-far)), max(_APART * sums.size, 1.0))
+        found.append((chance, y * size // 2, x * size // 2, size))
+    if not found:
+        return None
+    chance, *place = min(found)
+    return any_of(chance, len(found)), *place
+
+
+def _standing_out(pixels: Array, square: float) -> Number:
+    """Return the normal score of the patch that stands out most."""
+    found = outlying(pixels, square)
+    return UNKNOWN if found is None else (score_of_log(found[0]), 1.0)
+
+
+@kernel
+def _overlapping(pixels: Array, limit: float) -> tuple[Array, Array, int, int]:
+    """Return sums over two by two pixels, over two by two of these, and where the latter are far.
+
+    Pixels beyond a limit count as so far out; what is left over belongs to none. The sums of sums
+    overlap by half: (row, column), and the row and column of the one farthest from 0.
+    """
+    rows, columns = pixels.shape[0] // 2, pixels.shape[1] // 2
+    cells, sums = np.empty((rows, columns)), np.empty((rows - 1, columns - 1))
+    top, left, farthest = 0, 0, -1.0
+    for y in range(rows):
+        above, below = pixels[2 * y], pixels[2 * y + 1]
+        for x in range(columns):
+            total = 0.0
+            for k in range(2 * x, 2 * x + 2):
+                total += min(max(above[k], -limit), limit) + min(max(below[k], -limit), limit)
+            cells[y, x] = total
+        for x in range(columns - 1 if y else 0):
+            own = cells[y - 1, x] + cells[y - 1, x + 1] + cells[y, x] + cells[y, x + 1]
+            sums[y - 1, x] = own
+            if abs(own) > farthest:
+                top, left, farthest = y - 1, x, abs(own)
+    return cells, sums, top, left
+
+
+def _kept(shape: tuple[int, ...], size: int) -> float:
+    """Return the share of a patch's variance that means of rows and columns do not take."""
+    rows, columns = shape
+    return (1 - size / rows) * (1 - size / columns)
 
 
 def names() -> list[str]:

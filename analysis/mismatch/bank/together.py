@@ -70,7 +70,7 @@ def together(
         size = sum(w * own[one][0] for w, own in zip(sharp, numbers, strict=True))
         found[f"{one}, {TOGETHER}"] = (float(size / norm), 1.0)
     for name, number in _patches(list(parts.values()), sharp).items():
-        found[f"{name}, {TOGETHER}"] = number
+        found[_shared(name)] = number
     for one in OUTLYING:
         halves = [own[one][0] / 2 for own in numbers]
         count = sum(half * half - 3 / 8 for half in halves)
@@ -81,11 +81,13 @@ def together(
     shape = sizes[names[0]]
     common = {**surfaces(surface, squares_too, dof), **slopes(surface, squares_too, shape)}
     for name, number in common.items():
-        joined = name.replace(" of ", ", ", 1) if " of " in name else name
-        statistic, _, order = joined.partition(", ")
-        detail = f"{order}, {TOGETHER}" if order else TOGETHER
-        found[f"{statistic} of {detail}"] = number
+        found[_shared(name)] = number
     return found
+
+
+def _shared(name: str) -> str:
+    """Return the name of a number that channels share: `parity of rows, all channels`."""
+    return f"{name}, {TOGETHER}" if " of " in name else f"{name} of {TOGETHER}"
 
 
 def _patches(parts: Sequence[Parts], sharpness: Sequence[float]) -> dict[str, Number]:

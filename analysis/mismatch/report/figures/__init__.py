@@ -31,7 +31,7 @@ from analysis.mismatch.report.sentences import strongest
 from analysis.mismatch.words import parted, statistic_words
 
 MOST = 12  # pictures on a page
-MAPPED = ("fixed_", "half_seam", "parity", "outlying_pixels")
+MAPPED = ("fixed_", "half_seam", "parity", "outlying_")
 AXES = {"fixed_row_variance": "rows", "fixed_column_variance": "columns"}
 GROUPS: Mapping[str, profiles.Groups] = {"half_seam": "halves", "parity": "parity"}
 NOISY_PIXELS = frozenset(
@@ -39,7 +39,7 @@ NOISY_PIXELS = frozenset(
 )
 OFF_AXIS = frozenset({"spectral_peak", "phase", "alternation_variance", "patch_variance"})
 OF_CODES = frozenset({"code_spacing", "code_imbalance"})
-_SURFACES = ("fixed_smooth_variance", "fixed_patch_variance")
+_SURFACES = ("fixed_smooth_variance", "fixed_patch_variance", "outlying_patch")
 NOISY_PARTS = "smooth_variance_spread"
 MANY_PIXELS = frozenset({"fixed_pixel_variance"})
 VARIANCE = "pixel_variance"

@@ -60,14 +60,13 @@ _FOLLOWS = {
     "patch_variance": frozenset({"spectral_peak", "row_spectrum_peak"}) | _CORRELATIONS,
     "fixed_patch_variance": frozenset({"fixed_correlation_0_1", "fixed_correlation_1_0"})
     | _CORRELATIONS,
-    "outlying_patch": frozenset({"fixed_correlation_0_1", "fixed_correlation_1_0"})
-    | _CORRELATIONS
-    | {"fixed_smooth_variance"},
     # Few electrons of several DN each leave codes out.
     "code_imbalance": frozenset({"code_imbalance", "skewness"}),
     "code_spacing": frozenset({"code_spacing", "skewness"}),
     # No effect leaves a wave in the mean of frames but by chance: what moves is allowed for.
     "fixed_spectral_peak": frozenset(),
+    # The largest of many patches says less of a field, a glow or a surface than their mean squares.
+    "outlying_patch": frozenset(),
 }
 
 SPECTRA, NEIGHBOURS, CARRY_OVER = "spectra", "neighbours", "carry_over"

@@ -29,6 +29,7 @@ from analysis.mismatch.rivalled import rivalled
 from analysis.mismatch.state import State
 from analysis.mismatch.unequal import unequal
 from analysis.mismatch.uneven import uneven
+from analysis.mismatch.warmspots import warm_spots
 from analysis.mismatch.waved import waved
 from analysis.mismatch.wholeframes import of_pink_noise
 from dsis.effects import Effect
@@ -73,6 +74,7 @@ def of_another(state: State, effect: Effect, without: Array) -> Denial | None:
         or single(state, effect)
         or rivalled(state, effect)
         or heated(state, kind)
+        or warm_spots(state, effect)
         or jumped(state, effect)
         or wandering(state, effect)
         or of_pink_noise(state, effect)

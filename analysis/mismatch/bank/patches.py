@@ -62,7 +62,8 @@ def outlying(pixels: Array, square: float) -> tuple[float, int, int, int] | None
     """
     if not square > 0:
         return None
-    found, cells, limit = [], pixels, _FAR_OUT * sqrt(square)
+    found: list[tuple[float, int, int, int]] = []
+    cells, limit = pixels, _FAR_OUT * sqrt(square)
     for size in SIZES:
         if _free(*pixels.shape, size) < _LEAST_PATCHES:
             break
@@ -75,8 +76,8 @@ def outlying(pixels: Array, square: float) -> tuple[float, int, int, int] | None
         found.append((chance, y * size // 2, x * size // 2, size))
     if not found:
         return None
-    chance, *place = min(found)
-    return any_of(chance, len(found)), *place
+    chance, row, column, size = min(found)
+    return any_of(chance, len(found)), row, column, size
 
 
 def _standing_out(pixels: Array, square: float) -> Number:

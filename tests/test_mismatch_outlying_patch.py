@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from analysis.mismatch import find_mismatch
 from analysis.mismatch.bank.parts import parts
-from analysis.mismatch.bank.patches import OUTLYING, outlying
+from analysis.mismatch.bank.patches import OUTLYING_PATCH, outlying
 from mismatch_recordings import COLUMNS, FEW_LEVELS, FRAMES, ROWS, camera, recorded
 
 Array = NDArray[np.float64]
@@ -25,7 +25,7 @@ def _white(seed: int, shape: tuple[int, int] = (ROWS, COLUMNS)) -> Array:
 
 
 def _score(image: Array) -> float:
-    return parts(image, 1.0).numbers[OUTLYING][0]
+    return parts(image, 1.0).numbers[OUTLYING_PATCH][0]
 
 
 @pytest.mark.parametrize("shape", [(48, 64), (90, 117), (96, 128), (240, 320)])
@@ -72,7 +72,7 @@ def test_a_speck_of_dust_is_located_and_named_nothing(cfa: str) -> None:
         stacks[f"flat-{i}"] = dithered.clip(0, 4095).astype(np.uint16)
     found = find_mismatch(camera(cfa=cfa), replace(recording, stacks=stacks), seed=1)
     assert not found.omitted_physics
-    (patch,) = (m for m in found.unexplained if m.statistic == OUTLYING)
+    (patch,) = (m for m in found.unexplained if m.statistic == OUTLYING_PATCH)
     assert patch.where.rows is not None
     assert patch.where.columns is not None
     assert patch.where.rows[0] <= ROW <= patch.where.rows[1]

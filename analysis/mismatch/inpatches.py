@@ -4,14 +4,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.bank.parts import parts
-from analysis.mismatch.bank.patches import OUTLYING
+from analysis.mismatch.bank.patches import OUTLYING_PATCH
 from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.likepatches import in_squares, patches_of
 from analysis.mismatch.state import State
 
 Array = NDArray[np.float64]
 _MAPS = {"dsnu": "offset", "prnu": "gain"}
-_CALLS = frozenset({"fixed_patch_variance", OUTLYING})
+_CALLS = frozenset({"fixed_patch_variance", OUTLYING_PATCH})
 _INSIDE = 0.5  # of a patch's depth, up to which pixels belong to it
 _MOST = 0.5  # of a pattern's variance, that patches may make
 _SURE = 4.0  # standard errors of the variance of the other pixels, from which there is a pattern

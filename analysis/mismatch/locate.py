@@ -9,7 +9,7 @@ from analysis.mismatch.bank.home import TIME, homes, one_sided
 from analysis.mismatch.bank.key import MOSAIC, Key
 from analysis.mismatch.bank.motion import STATISTIC as MOTION
 from analysis.mismatch.bank.parts import parts
-from analysis.mismatch.bank.patches import OUTLYING, outlying
+from analysis.mismatch.bank.patches import OUTLYING_PATCH, outlying
 from analysis.mismatch.bank.standing import NAME as FIXED_WAVE
 from analysis.mismatch.finding import Mismatch, Where
 from analysis.mismatch.layout import Layout
@@ -197,7 +197,7 @@ def _patch(
     """Return the rows and columns of the patch that a number is of; None: of none, or no matter."""
     found = []
     for channel in (key.channel,) if key.channel else layout.channels:
-        if key.statistic != OUTLYING or (channel, key.scope) not in seen.images:
+        if key.statistic != OUTLYING_PATCH or (channel, key.scope) not in seen.images:
             continue
         own = parts(*seen.images[channel, key.scope])
         if (patch := outlying(own.pixels, own.square)) is not None:

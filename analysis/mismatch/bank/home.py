@@ -11,7 +11,7 @@ from analysis.mismatch.bank.common import SIGNS
 from analysis.mismatch.bank.edges import names as edge_names
 from analysis.mismatch.bank.key import MOSAIC, Key
 from analysis.mismatch.bank.parts import STANDING_OUT
-from analysis.mismatch.bank.patches import OUTLYING, SIZES
+from analysis.mismatch.bank.patches import OUTLYING_PATCH, SIZES
 from analysis.mismatch.bank.periods import FEW_PIXELS
 from analysis.mismatch.bank.persistent import OUTSTANDING, SURFACE
 from analysis.mismatch.bank.seams import WHOLE
@@ -58,7 +58,7 @@ _POOLED = frozenset(
         ("fixed_column_variance", "offset", ""),
         *(("fixed_smooth_variance", name, LOW) for name in ("gain", "time")),
         *(("fixed_patch_variance", "gain", f"{size} pixels") for size in SIZES),
-        (OUTLYING, "gain", ""),
+        (OUTLYING_PATCH, "gain", ""),
         *((name, "gain", axis) for name in _STEPS for axis in _AXES),
         *(("half_seam", "gain", f"{axis}, {WHOLE}") for axis in _AXES),
         *(
@@ -88,7 +88,7 @@ _SPECTRA = frozenset({"spectral_peak", "row_spectrum_peak", "column_spectrum_pea
                       "patch_variance", "slow_row_variance", "row_correlation"})  # fmt: skip
 _SHARED = frozenset({"fixed_row_variance", "fixed_column_variance", "fixed_smooth_variance",
                      "fixed_smooth_tilt", "fixed_smooth_falloff", "fixed_edge",
-                     "fixed_patch_variance", OUTLYING, "half_seam",
+                     "fixed_patch_variance", OUTLYING_PATCH, "half_seam",
                      "outlying_pixels"})  # fmt: skip
 
 

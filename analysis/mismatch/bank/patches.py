@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 SIZES = (4, 8, 16)  # pixels of the plane along a side
 _NAMES = tuple(f"fixed_patch_variance of {size} pixels" for size in SIZES)
 _LEAST_PATCHES = 12.0  # beyond lines and smooth surfaces, to be worth a number
-OUTLYING = "outlying_patch"
+OUTLYING_PATCH = "outlying_patch"
 _FAR_OUT = 3.0  # standard deviations of a pixel, beyond which it counts as so far out
 _APART = 0.7  # of patches that overlap by half, for the largest of them
 _TELLS = 0.2  # of patches, by the median of their squares: independent ones of normal variates
@@ -44,7 +44,7 @@ def patches(pixels: Array, square: float) -> dict[str, Number]:
         ratio = _squares(pixels, size) / size**2 / free / square
         dof = (rows - 1) * (columns - 1)
         found[name] = cbrt(ratio), sqrt(2 / (9 * free) - 2 / (9 * dof))
-    found[OUTLYING] = _standing_out(pixels, square)
+    found[OUTLYING_PATCH] = _standing_out(pixels, square)
     return found
 
 

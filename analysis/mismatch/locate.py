@@ -142,7 +142,7 @@ def _where(
         single = [i for i in own if abs(z[i]) > 0.5 * most and z[i] * z[top] > 0]
     names = list(dict.fromkeys(keys[i].exposure for i in single))
     if not names:
-        shone = statistic == FIXED_WAVE and "gain" in keys[top].scope
+        shone = statistic in (FIXED_WAVE, OUTLYING_PATCH) and "gain" in keys[top].scope
         names = [e.name for e in layout.uniform if e.kind == "flat" or not shone]
     exposures = [e for e in layout.exposures if e.name in names]
     channels = {keys[i].channel for i in (*which, *single) if keys[i].channel}

@@ -7,6 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
+from matplotlib.patches import Rectangle
 
 from analysis.figures import ALARM, INK
 from analysis.mismatch.evidence import Array, Map
@@ -98,8 +99,13 @@ def limits(image: Array) -> tuple[float, float]:
 def _mark(axes: Axes, where: Where) -> None:
     for row, column in (where.pixels or ())[:PIXELS_MARKED]:
         axes.plot(column, row, "o", mfc="none", mec=ALARM, ms=8, mew=1.1)
-    for ends, span in ((where.rows, axes.axhspan), (where.columns, axes.axvspan)):
-        if ends is not None:
-            span(ends[0] - 0.5, ends[1] + 0.5, fill=False, ec=ALARM, lw=1.0, ls=(0, (4, 3)))
+    if where.rows is not None and where.columns is not None:
+        (top, bottom), (left, right) = where.rows, where.columns
+        corner, size = (left - 0.5, top - 0.5), (right - left + 1, bottom - top + 1)
+        axes.add_patch(Rectangle(corner, *size, fill=False, ec=ALARM, lw=1.2))
+    else:
+        for ends, span in ((where.rows, axes.axhspan), (where.columns, axes.axvspan)):
+            if ends is not None:
+                span(ends[0] - 0.5, ends[1] + 0.5, fill=False, ec=ALARM, lw=1.0, ls=(0, (4, 3)))
     for spine in axes.spines.values():
         spine.set(visible=True, color=INK)

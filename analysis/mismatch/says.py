@@ -11,6 +11,7 @@ _WORDS = {
     "row_variance": "whole rows move together from frame to frame",
     "column_variance": "whole columns move together from frame to frame",
     "frame_variance": "the mean of whole frames wanders",
+    "frame_noise": "frames of one exposure are not equally noisy",
     "skewness": "the noise is skewed",
     "kurtosis": "the noise has tails that a Gaussian has not",
     "kurtosis_within_pixels": "single pixels have tails that a Gaussian has not",

@@ -67,6 +67,8 @@ _FOLLOWS = {
     "fixed_spectral_peak": frozenset(),
     # The largest of many patches says less of a field, a glow or a surface than their mean squares.
     "outlying_patch": frozenset(),
+    # No effect makes frames of one exposure more or less noisy but by chance.
+    "frame_noise": frozenset(),
 }
 
 SPECTRA, NEIGHBOURS, CARRY_OVER = "spectra", "neighbours", "carry_over"

@@ -12,6 +12,7 @@ STATISTICS = {
     "row_variance": "noise common to a row",
     "column_variance": "noise common to a column",
     "frame_variance": "wander of whole frames",
+    "frame_noise": "noise of single frames",
     "first_frames": "first frames of exposures",
     "skewness": "asymmetry of the noise",
     "kurtosis": "tails of the noise",

@@ -23,12 +23,15 @@ class PairVariance:
         mean d^2 / 2, equation (1): their sum.
     pairs
         Number of pairs.
+    squares
+        mean d^2 of each, DN^2.
     """
 
     variance: Estimate
     removed: Estimate
     uncorrected: Estimate
     pairs: int
+    squares: tuple[float, ...]
 
 
 def pair_variance(
@@ -58,4 +61,5 @@ def pair_variance(
         estimate(removed, error_removed, noise.ms_pixel / size, null_removed),
         estimate(uncorrected, error * share + error_removed, nan, null),
         pairs,
+        tuple(squares),
     )

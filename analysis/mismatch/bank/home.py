@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from analysis.mismatch.bank.coherent import PATCHES
 from analysis.mismatch.bank.common import SIGNS
 from analysis.mismatch.bank.edges import names as edge_names
+from analysis.mismatch.bank.framenoise import NAME as FRAME_NOISE
 from analysis.mismatch.bank.key import MOSAIC, Key
 from analysis.mismatch.bank.parts import STANDING_OUT
 from analysis.mismatch.bank.patches import OUTLYING_PATCH, SIZES
@@ -39,6 +40,7 @@ SHAPED: Mapping[str, tuple[str, ...]] = {
     "kurtosis": (READ_NOISE,),
     "kurtosis_within_pixels": (READ_NOISE,),
     "variance_spread": (READ_NOISE, PERSISTENT),
+    FRAME_NOISE: ("at all levels",),
     "one_off_outliers": ("at all levels",),
     "code_imbalance": ("at all levels",),
     "correlation_0_1": ("with the signal", "with the signal squared", "at all levels"),

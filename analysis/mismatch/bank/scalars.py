@@ -11,6 +11,8 @@ from math import cbrt, exp, inf, isfinite, log, log2, nan, pi, sqrt
 import numpy as np
 import scipy.special
 
+from analysis.mismatch.bank.framenoise import NAME as FRAME_NOISE
+from analysis.mismatch.bank.framenoise import unequal_noise
 from dsis.measures import Channel, Estimate
 from dsis.measures.fixed_pattern import Smooth
 from dsis.measures.median import median
@@ -32,6 +34,7 @@ NAMES = (
     "row_variance",
     "column_variance",
     "frame_variance",
+    FRAME_NOISE,
     "skewness",
     "kurtosis",
     "kurtosis_within_pixels",
@@ -65,6 +68,7 @@ def scalars(channel: Channel, frames: int) -> dict[str, Number]:
         **_components(found, pixel, (frames, n, m)),
         **_fixed(found, pixel, (frames, n, m)),
         "kurtosis_within_pixels": _plain(channel.kurtosis_within_pixels),
+        FRAME_NOISE: ratio_root(*unequal_noise(channel)),
         "one_off_outliers": _largest(channel, frames),
         "variance_spread": _spread(found["variance_spread"], frames),
         "code_spacing": _spacing(found["code_spacing"]),

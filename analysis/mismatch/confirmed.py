@@ -5,6 +5,7 @@ from dataclasses import replace
 from functools import partial
 
 from analysis.mismatch.allframes import shown_by_all
+from analysis.mismatch.candidates import CANDIDATES
 from analysis.mismatch.finding import Gain
 from analysis.mismatch.fixedforetold import FIXED_LINES
 from analysis.mismatch.instance import same_place
@@ -110,7 +111,7 @@ def _gained(search: Search, final: State, trial: Trial) -> dict[str, Gained]:
         cameras = _fitted_without(search, final, some)
         told = trial.gains(final, cameras)
         for named in some:
-            one = told[named.name]
+            one = told[named.name] = _believed(final, named, told[named.name])
             if one.certain:
                 continue
             other = _foretold(search, named, cameras[named.name], trial, one)
@@ -125,6 +126,21 @@ def _gained(search: Search, final: State, trial: Trial) -> dict[str, Gained]:
         if not all(one.certain for one in found.values()):
             break
     return found
+
+
+def _believed(state: State, named: Named, told: Gained) -> Gained:
+    """Return a gain, which is chance where only a model that is wrong makes it certain.
+
+    Odds that an interval does not bear out are those of a model that is right but for the effect.
+    Where statistics that call for the effect are left unexplained beside it, the model is not:
+    whatever gives frames another spread or other tails may gain by that.
+    """
+    if told.gain.ci95[0] > 0 or named.kind not in CANDIDATES:
+        return told
+    left = {m.statistic for m in state.mismatches}
+    if left.isdisjoint(CANDIDATES[named.kind].calls):
+        return told
+    return replace(told, certain=False)
 
 
 def _foretold(search: Search, named: Named, without: Camera, trial: Trial, told: Gained) -> Gained:

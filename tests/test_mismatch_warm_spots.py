@@ -38,8 +38,11 @@ def _denied(
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_trails_in_a_corner_are_no_glow(monkeypatch: pytest.MonkeyPatch, seed: int) -> None:
-    assert _denied(monkeypatch, glow=0.0, trails=25.0, seed=seed)
+@pytest.mark.parametrize("trails", [25.0, 4000.0])
+def test_trails_in_a_corner_are_no_glow(
+    monkeypatch: pytest.MonkeyPatch, seed: int, trails: float
+) -> None:
+    assert _denied(monkeypatch, glow=0.0, trails=trails, seed=seed)
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -78,6 +78,8 @@ def proven(
         worst = min(weak, key=lambda named: gained[named.name].gain.nats_per_frame)
         nats = gained[worst.name].gain.nats_per_frame
         why = f"gains {nats:.3g} nats per locked frame, no more than chance"
+        if _calls_left(final, worst) and gained[worst.name].gain.ci95[0] <= 0 < nats:
+            why += " may where what calls for it is left"
         final = _without(search, final, (worst, why), judged=judged)
 
 
@@ -133,14 +135,18 @@ def _believed(state: State, named: Named, told: Gained) -> Gained:
 
     Odds that an interval does not bear out are those of a model that is right but for the effect.
     Where statistics that call for the effect are left unexplained beside it, the model is not:
-    whatever gives frames another spread or other tails may gain by that.
+    whatever gives frames another spread or other tails may gain by that. Whole frames may still
+    show it.
     """
-    if told.gain.ci95[0] > 0 or named.kind not in CANDIDATES:
-        return told
-    left = {m.statistic for m in state.mismatches}
-    if left.isdisjoint(CANDIDATES[named.kind].calls):
+    if told.gain.ci95[0] > 0 or not _calls_left(state, named):
         return told
     return replace(told, certain=False)
+
+
+def _calls_left(state: State, named: Named) -> bool:
+    """Return whether a statistic that calls for an effect is left unexplained beside it."""
+    left = {m.statistic for m in state.mismatches}
+    return named.kind in CANDIDATES and not left.isdisjoint(CANDIDATES[named.kind].calls)
 
 
 def _foretold(search: Search, named: Named, without: Camera, trial: Trial, told: Gained) -> Gained:

@@ -11,6 +11,7 @@ from analysis.mismatch.bank.motion import STATISTIC as MOTION
 from analysis.mismatch.bank.parts import parts
 from analysis.mismatch.bank.patches import OUTLYING_PATCH, outlying
 from analysis.mismatch.bank.standing import NAME as FIXED_WAVE
+from analysis.mismatch.bank.together import shared_pixels
 from analysis.mismatch.finding import Mismatch, Where
 from analysis.mismatch.layout import Layout
 from analysis.mismatch.null import Null, adjusted
@@ -142,7 +143,8 @@ def _where(
         single = [i for i in own if abs(z[i]) > 0.5 * most and z[i] * z[top] > 0]
     names = list(dict.fromkeys(keys[i].exposure for i in single))
     if not names:
-        shone = statistic in (FIXED_WAVE, OUTLYING_PATCH) and "gain" in keys[top].scope
+        of_map = f"{keys[top].scope} {keys[top].detail}"
+        shone = statistic in (FIXED_WAVE, OUTLYING_PATCH) and "gain" in of_map
         names = [e.name for e in layout.uniform if e.kind == "flat" or not shone]
     exposures = [e for e in layout.exposures if e.name in names]
     channels = {keys[i].channel for i in (*which, *single) if keys[i].channel}
@@ -194,22 +196,27 @@ def lines_of(key: Key, axis: str, size: int) -> tuple[int, int] | None:
 def _patch(
     layout: Layout, seen: Observation, key: Key
 ) -> tuple[tuple[int, int] | None, tuple[int, int] | None]:
-    """Return the rows and columns of the patch that a number is of; None: of none, or no matter."""
-    found = []
-    for channel in (key.channel,) if key.channel else layout.channels:
-        if key.statistic != OUTLYING_PATCH or (channel, key.scope) not in seen.images:
-            continue
-        own = parts(*seen.images[channel, key.scope])
-        if (patch := outlying(own.pixels, own.square)) is not None:
-            found.append((patch, layout.sites[channel]))
-    if not found:
+    """Return the rows and columns of the patch that a number is of; None: of none, or no matter.
+
+    Where channels show it together, of the map that they share.
+    """
+    name = key.detail if key.scope == "contrast" else key.scope
+    channels = (key.channel,) if key.channel else layout.channels
+    if key.statistic != OUTLYING_PATCH or any((one, name) not in seen.images for one in channels):
         return None, None
-    (_, *corner, size), site = min(found)
+    own = [parts(*seen.images[one, name]) for one in channels]
+    sharp = [
+        (layout.regressors(one).scales["gain"] if "gain" in name else 1.0)
+        / seen.images[one, name][1]
+        for one in channels
+    ]
+    found = outlying(*shared_pixels(own, sharp)) if len(own) > 1 else None
+    found = outlying(own[0].pixels, own[0].square) if len(own) == 1 else found
+    if found is None:
+        return None, None
+    _, top, left, size = found
     step = 1 if layout.channels == ("MONO",) else 2
-    rows, columns = (
-        (step * at + first, step * (at + size - 1) + first)
-        for at, first in zip(corner, site, strict=True)
-    )
+    rows, columns = ((step * at, step * (at + size) - 1) for at in (top, left))
     return rows, columns
 
 

@@ -10,6 +10,7 @@ import scipy.special
 import scipy.stats
 from numpy.typing import NDArray
 
+from analysis.mismatch.bank.framenoise import NAME as FRAME_NOISE
 from analysis.mismatch.bank.key import Key
 from analysis.mismatch.contrasts import Contrasts, contrasts
 from analysis.mismatch.fewpairs import widening
@@ -22,8 +23,11 @@ _OWN = 40.0  # degrees of freedom that the closed form, scaled by name, is worth
 _POOLED = 160.0  # and for the tails: a scale is shared by all numbers of a name
 _LEAST_SCALE = 0.8
 _SEVERAL = 5  # numbers of a name that tell whether they are alike
-# Of single pixels, which channels do not share: what lines and frames move by, they do.
-_OF_PIXELS = frozenset({"skewness", "kurtosis", "kurtosis_within_pixels", "variance_spread"})
+# Of single pixels, which channels do not share: what lines and frames move by, they do. And what
+# light that flickers spreads where there is some.
+_OF_PIXELS = frozenset(
+    {"skewness", "kurtosis", "kurtosis_within_pixels", "variance_spread", FRAME_NOISE}
+)
 _RARE = 1e-5  # chance of a departure that counts, among some hundred numbers
 _UNLIKE = 1e-4  # chance of spreads that differ so
 _ODD = 1e-3  # chance of simulations so far off that a score is not normal under the model

@@ -67,7 +67,7 @@ _FOLLOWS = {
     "fixed_spectral_peak": frozenset(),
     # The largest of many patches says less of a field, a glow or a surface than their mean squares.
     "outlying_patch": frozenset(),
-    # No effect makes frames of one exposure more or less noisy but by chance.
+    # What an effect makes frames differ by is in the model's own spread once it is named.
     "frame_noise": frozenset(),
 }
 

@@ -12,7 +12,7 @@ from dsis.effects.amp_glow import AmpGlow
 
 Array = NDArray[np.float64]
 _FAR_OUT = 2.0  # standard deviations from the glow, beyond which a pixel counts as so far out
-_ROUNDS = 20
+_ROUNDS = 50
 _MOST = 0.5  # of a glow, that few pixels may make
 
 
@@ -43,10 +43,14 @@ def _heights(image: Array, shapes: Array) -> tuple[float, float]:
 
     `image` is in units of its noise: (row, column), the shapes (2, row, column).
     """
-    design, seen = shapes.reshape(2, -1).T, image.reshape(-1)
-    solve = np.linalg.pinv(design)
-    found = solve @ seen
-    of_all = float(found[1])
-    for _ in range(_ROUNDS):  # of residuals drawn in, each a step of least squares
-        found = found + solve @ np.clip(seen - design @ found, -_FAR_OUT, _FAR_OUT)
-    return of_all, float(found[1])
+    one, two, seen = shapes[0].reshape(-1), shapes[1].reshape(-1), image.reshape(-1)
+    weights = np.ones(seen.size)
+    heights: list[float] = []
+    for _ in range(_ROUNDS):  # reweighted: however far out a pixel is, it pulls as one that is not
+        a, b, c = weights @ one**2, weights @ (one * two), weights @ two**2
+        u, v = (weights * one) @ seen, (weights * two) @ seen
+        level, height = (c * u - b * v) / (a * c - b * b), (a * v - b * u) / (a * c - b * b)
+        heights.append(float(height))
+        far = np.abs(seen - level * one - height * two)
+        weights = _FAR_OUT / np.maximum(far, _FAR_OUT)
+    return heights[0], heights[-1]

@@ -15,7 +15,7 @@ NAME = "frame_noise"
 
 
 def unequal_noise(channel: Channel) -> tuple[float, int]:
-    """Return how far the variances of pairs of frames scatter, and degrees of freedom of that.
+    """Return how far variances of disjoint pairs of frames scatter, and degrees of freedom of that.
 
     Of single pixels, beyond what rows, columns and frames have in common. The variance of a pair
     of n degrees of freedom scatters by 2 / n of its square: that is 1. None, of no degree, with

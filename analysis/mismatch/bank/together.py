@@ -69,7 +69,7 @@ def together(
     for one in _STEPS:
         size = sum(w * own[one][0] for w, own in zip(sharp, numbers, strict=True))
         found[f"{one}, {TOGETHER}"] = (float(size / norm), 1.0)
-    for name, number in _patches(list(parts.values()), sharp).items():
+    for name, number in patches(*shared_pixels(list(parts.values()), sharp)).items():
         found[_shared(name)] = number
     for one in OUTLYING:
         halves = [own[one][0] / 2 for own in numbers]
@@ -90,12 +90,15 @@ def _shared(name: str) -> str:
     return f"{name}, {TOGETHER}" if " of " in name else f"{name} of {TOGETHER}"
 
 
-def _patches(parts: Sequence[Parts], sharpness: Sequence[float]) -> dict[str, Number]:
-    """Return the numbers of patches that channels share."""
+def shared_pixels(parts: Sequence[Parts], sharpness: Sequence[float]) -> tuple[Array, float]:
+    """Return the pixels of the map that channels share, and their mean square, unbiased.
+
+    Of as many rows and columns as all have; see `together`.
+    """
     rows, columns = (min(own.pixels.shape[axis] for own in parts) for axis in (0, 1))
     pixels = _mean([own.pixels[:rows, :columns] for own in parts], sharpness)
     dof = (rows - 1) * (columns - 1) - Smooth.of(rows, columns).kinds
-    return patches(pixels, float((pixels**2).sum()) / dof)
+    return pixels, float((pixels**2).sum()) / dof
 
 
 def _mean(values: Sequence[Array], sharpness: Sequence[float]) -> Array:

@@ -100,10 +100,12 @@ def _of_codes(state: State, kind: str, mean: Array) -> Denial | None:
     The shape of noise that is no wider than the distance of the codes is theirs, and its mean lies
     by up to half of it off: where codes are farther apart than the model's, and that is
     unexplained, nothing else is told by it. `mean` are the numbers with the effect; most of what it
-    changes may be such.
+    changes may be such. Widths that scatter make codes rare; they do not leave them out in steps.
     """
     if all(m.statistic != "code_spacing" for m in state.mismatches):
         return None
+    if kind == "adc_dnl":
+        return Denial(0.0, "codes come in steps, which widths that scatter do not make")
     coarse = _coarse(state)
     known = state.null.known & np.isfinite(mean)
     moved = np.where(known, np.nan_to_num(mean) - state.null.mean, 0.0)

@@ -166,3 +166,10 @@ def test_codes_that_are_far_apart_move_levels(
     )
     found = _of_codes(state, "nonlinearity", np.where(of_levels, moved_dn, 0.0))
     assert (found is not None) is denied
+
+
+@pytest.mark.parametrize(("left", "denied"), [("code_spacing", True), ("code_imbalance", False)])
+def test_codes_in_steps_are_no_widths_that_scatter(left: str, denied: bool) -> None:
+    """As a camera that stores the square root of its codes leaves them."""
+    state: Any = SimpleNamespace(mismatches=[SimpleNamespace(statistic=left)])
+    assert (_of_codes(state, "adc_dnl", np.zeros(0)) is not None) is denied

@@ -53,10 +53,8 @@ def of_known_pattern(bench: Bench, size: float, pattern: Array, grows: Growth) -
     power = float((centred**2).sum())
     floor = floors.pixel_offset**2 + (floors.pixel_gain**2) * c.whole_square
     growth = {"offset": np.ones(1), "gain": c.whole_square, "time": c.whole_time**2}
-    return float(
-        size
-        * np.sqrt(np.sum(growth[grows] * power / (c.whole_variance / c.whole_frames + floor / 3)))
-    )
+    noise = c.whole_variance / c.whole_frames + floor / 3
+    return float(size * np.sqrt(np.sum(growth[grows] * power / noise)))
 
 
 def of_wander(bench: Bench, variance: Array | float, values: int = 1) -> float:

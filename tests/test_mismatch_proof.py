@@ -303,6 +303,21 @@ def test_scenes_are_judged_about_their_training_mean() -> None:
     assert after.frames["scene"][0] > closed
 
 
+def test_a_picture_in_which_the_greens_differ_hides_no_imbalance() -> None:
+    """Lines of light upon the rows of red: its greens differ by 40 %, those of flats by 0.4 %."""
+    true = camera(registry()["channel_imbalance"](gain_percent=0.4), cfa="RGGB")
+    lines = np.full((ROWS, COLUMNS), 300.0, np.float32)
+    lines[::2] = 420.0
+    gains = []
+    for scene in (None, lines):
+        held = held_of(recorded(true, 11, scene=scene))
+        known = signals() | ({} if scene is None else {"scene": lines.astype(np.float64)})
+        before, after = (loglik_of(held, c, known, seed=1) for c in (camera(cfa="RGGB"), true))
+        gains.append(sum(after.levels[name] - before.levels[name] for name in signals()))
+    assert gains[1] == pytest.approx(gains[0], rel=0.05)
+    assert gains[1] > 20
+
+
 def test_clipped_exposures_are_left_out() -> None:
     levels = (*LEVELS[:4], 4100.0)
     held = held_of(recorded(camera(), 2, levels=levels))

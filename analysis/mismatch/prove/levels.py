@@ -3,8 +3,8 @@
 Level = black level + light x (DN per light, by colour) + what the camera model adds. Black levels
 and DN per light are fitted to the training frames; each exposure is then predicted without its own,
 by Student's t law, whose scale is what the fit leaves. Locked frames wander about their exposure's
-training level. Where the other exposures do not tell a level (unknown light, scenes), the level
-tells nothing.
+training level. Where the other exposures do not tell a level (unknown light, scenes, whose greens
+see other parts of the picture), the level tells nothing.
 """
 
 from dataclasses import dataclass
@@ -125,15 +125,11 @@ def _training_levels(law: Law, held: Held) -> list[_Level]:
     """Return the training levels with their places in a common linear model."""
     colours = site_colours(held.cfa)
     sites, lit = len(colours), [e for e in held.exposures if e.kind == "flat" and e.light]
-    free = {
-        (e.name, colour): i
-        for i, (e, colour) in enumerate(
-            (e, c)
-            for e in held.exposures
-            if e.kind == "scene" or (e.kind == "flat" and not e.light)
-            for c in sorted(set(colours))
-        )
-    }
+    # Of a flat of unknown light one level a colour; sites of a scene see other parts of it.
+    places = {"scene": tuple(range(sites)), "flat": colours}
+    unknown = [e for e in held.exposures if e.kind == "scene" or (e.kind == "flat" and not e.light)]
+    own_levels = [(e.name, place) for e in unknown for place in sorted(set(places[e.kind]))]
+    free = {level: i for i, level in enumerate(own_levels)}
     width = sites + max(colours) + 1 + len(free)
     unit = float(np.mean([e.light for e in lit if e.light])) if lit else 1.0
     found = []
@@ -148,12 +144,13 @@ def _training_levels(law: Law, held: Held) -> list[_Level]:
         for site, colour in enumerate(colours):
             row = np.zeros(width)
             row[site] = 1.0
-            if (e.name, colour) in free:
-                row[sites + max(colours) + 1 + free[e.name, colour]] = 1.0
+            level = (e.name, places.get(e.kind, colours)[site])
+            if level in free:
+                row[sites + max(colours) + 1 + free[level]] = 1.0
             elif e.name not in black:
                 row[sites + colour] = (e.light or 0.0) / unit
             light = (RELATIVE_LIGHT * max(float(means[site]) - _dark(held, law), 0.0)) ** 2
-            known = e.name not in black and (e.name, colour) not in free
+            known = e.name not in black and level not in free
             found.append(
                 _Level(
                     e.name,

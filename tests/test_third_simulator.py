@@ -288,7 +288,7 @@ def test_nulls_are_silent_and_wrong_numbers_are_told_as_such() -> None:
     assert not crashed["silent"]
     assert shortfalls([crashed])
     off = case("null", **{"noise.slope": 1.1})
-    errors = [{"parameter": "noise.segment.0.noise.slope"}]
+    errors = [{"parameter": "noise.segment[0].slope"}]
     told = judge(off, finding(verdict="parameters", parameter_errors=errors))
     assert told["numbers_told"]
     other = [{"parameter": "black_level"}]

@@ -3,8 +3,8 @@
 Writes recordings and a sealed key with a simulator that was written from the contract and
 docs/effects.md alone, apart from the project and from the other two; prints the key's SHA-256,
 runs the diagnosis on the files alone, opens the key and prints what was found. Resumable:
-everything lies in --work, one line of JSON a case. Seed 1 has been used: what it says is no proof
-any more.
+everything lies in --work, one line of JSON a case. Seeds 1 and 2 have been used: what they say is
+no proof any more.
 """
 
 import argparse

@@ -21,7 +21,7 @@ from planter import ranking as rank
 from planter.deck import deal
 from planter.finder import FINDER, diagnose, named
 from planter.judgement import judge
-from planter.ledger import fingerprint, versions, work_through
+from planter.ledger import fingerprint, versions, work_through, write_ledger
 from planter.onreal import RealFrames
 from planter.seal import CROP, conceal, deal_values, reference, seal, vocabulary
 
@@ -113,8 +113,7 @@ def main() -> None:
         tasks[REFERENCE] = {**tasks[min(tasks)], "folder": folder, "vocabulary": None}
     found = work_through(options.work / "found.jsonl", tasks, examined, options.jobs)
     cases = opened_key(key, found)
-    lines = (json.dumps(case, sort_keys=True) + "\n" for case in cases)
-    (options.work / "judged.jsonl").write_text("".join(lines), encoding="utf-8")
+    write_ledger(options.work / "judged.jsonl", cases)
     report(cases)
     print("\n" + versions(found.values()))
 

@@ -17,7 +17,7 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parent))  # processes that are started afresh need it too
 from planter.finder import FINDER, diagnose
-from planter.ledger import fingerprint, versions, work_through
+from planter.ledger import fingerprint, versions, work_through, write_ledger
 from second.cases import conceal, hand_values, seal
 from second.dealing import deal, deal_unlisted
 from second.judging import judge
@@ -82,8 +82,7 @@ def main() -> None:
     cases = [
         judge(key[name], found[name]["values"], kinds_of(options.work / name)) for name in tasks
     ]
-    lines = (json.dumps(case, sort_keys=True) + "\n" for case in cases)
-    (options.work / "judged.jsonl").write_text("".join(lines), encoding="utf-8")
+    write_ledger(options.work / "judged.jsonl", cases)
     report(cases)
     print("\n" + versions(found.values()))
 

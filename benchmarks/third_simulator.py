@@ -16,7 +16,7 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parent))  # processes that are started afresh need it too
 from planter.finder import FINDER, diagnose
-from planter.ledger import fingerprint, versions, work_through
+from planter.ledger import fingerprint, versions, work_through, write_ledger
 from third.cases import conceal, seal
 from third.judging import judge
 from third.summary import figures, shortfalls
@@ -67,8 +67,7 @@ def main() -> None:
     }
     found = work_through(options.work / "found.jsonl", tasks, examined, options.jobs)
     cases = [judge(key[name], found[name]["values"]) for name in tasks]
-    lines = (json.dumps(case, sort_keys=True) + "\n" for case in cases)
-    (options.work / "judged.jsonl").write_text("".join(lines), encoding="utf-8")
+    write_ledger(options.work / "judged.jsonl", cases)
     report(cases)
     print("\n" + versions(found.values()))
 

@@ -160,13 +160,9 @@ def _where(
             signals += layout.range_dn(keys[i].place)
     kinds = {e.kind for e in exposures}
     times = [e.exposure_time_s for e in exposures]
-    patch = _patch(layout, seen, keys[top])
-    rows, columns = (
-        own or lines_of(keys[top], axis, size)
-        for own, axis, size in zip(
-            patch, ("rows", "columns"), (layout.rows, layout.columns), strict=True
-        )
-    )
+    rows = lines_of(keys[top], "rows", layout.rows)
+    columns = lines_of(keys[top], "columns", layout.columns)
+    rows, columns = _patch(layout, seen, keys[top]) or (rows, columns)
     return Where(
         exposures=tuple(e.name for e in exposures),
         kind=kinds.pop() if len(kinds) == 1 else None,
@@ -195,25 +191,20 @@ def lines_of(key: Key, axis: str, size: int) -> tuple[int, int] | None:
 
 def _patch(
     layout: Layout, seen: Observation, key: Key
-) -> tuple[tuple[int, int] | None, tuple[int, int] | None]:
-    """Return the rows and columns of the patch that a number is of; None: of none, or no matter.
+) -> tuple[tuple[int, int], tuple[int, int]] | None:
+    """Return the first and last row, and column, of the patch that a number is of; None: of none.
 
     Where channels show it together, of the map that they share.
     """
     name = key.detail if key.scope == "contrast" else key.scope
     channels = (key.channel,) if key.channel else layout.channels
     if key.statistic != OUTLYING_PATCH or any((one, name) not in seen.images for one in channels):
-        return None, None
+        return None
     own = [parts(*seen.images[one, name]) for one in channels]
-    sharp = [
-        (layout.regressors(one).scales["gain"] if "gain" in name else 1.0)
-        / seen.images[one, name][1]
-        for one in channels
-    ]
-    found = outlying(*shared_pixels(own, sharp)) if len(own) > 1 else None
-    found = outlying(own[0].pixels, own[0].square) if len(own) == 1 else found
+    sharp = [layout.regressors(one).sharpness(name, seen.images[one, name][1]) for one in channels]
+    found = outlying(*shared_pixels(own, sharp))
     if found is None:
-        return None, None
+        return None
     _, top, left, size = found
     step = 1 if layout.channels == ("MONO",) else 2
     rows, columns = ((step * at, step * (at + size) - 1) for at in (top, left))

@@ -40,9 +40,7 @@ def maps_of(
             part = parts(image, noise)
             numbers[name, kind] = part.numbers
             split.setdefault(kind, {})[name] = part
-            # What is common: a relative gain, or DN (alike, or per second).
-            scale = own.patterns.regressors.scales["gain"] if "gain" in kind else 1.0
-            sharp.setdefault(kind, {})[name] = scale / noise
+            sharp.setdefault(kind, {})[name] = own.patterns.regressors.sharpness(kind, noise)
         images[name, "variance"] = (own.variances.total, own.variances.squares**0.5)
     for kind, by_channel in split.items():
         if len(by_channel) == len(layout.sites) > 1:

@@ -32,6 +32,12 @@ def read_ledger(path: Path) -> dict[str, dict[str, Any]]:
     return done
 
 
+def write_ledger(path: Path, entries: Iterable[Mapping[str, Any]]) -> None:
+    """Write entries, a line of JSON each."""
+    lines = (json.dumps(entry, sort_keys=True) + "\n" for entry in entries)
+    path.write_text("".join(lines), encoding="utf-8")
+
+
 def work_through(
     path: Path, tasks: Mapping[str, Task], work: Callable[[Task], Mapping[str, Any]], jobs: int
 ) -> dict[str, dict[str, Any]]:

@@ -75,6 +75,13 @@ class Regressors:
         }
         return cls(tuple(kept), rows, scales, weights)
 
+    def sharpness(self, name: str, noise: float) -> float:
+        """Return what is common to channels in units of a map's noise, DN.
+
+        A relative gain where the map is one of gains, else an offset in DN, alike or per second.
+        """
+        return (self.scales["gain"] if "gain" in name else 1.0) / noise
+
 
 class PatternSums:
     """Sums over exposures from which the maps of one channel follow."""

@@ -22,6 +22,7 @@ from analysis.mismatch.prove.patterns import Halves, Pattern, pattern_of
 from analysis.mismatch.prove.residuals import residuals_of
 from analysis.mismatch.prove.shape import NORMAL
 from analysis.mismatch.prove.sites import site_places
+from analysis.mismatch.prove.teeth import teeth_of
 from analysis.mismatch.prove.virtual import (
     LEAST_DN2,
     Signals,
@@ -70,14 +71,15 @@ def law_of(camera: Camera, held: Held, signals: Signals, seed: int) -> Law:
     law = Law(camera, cells, plain, (), Conspicuous())
     if camera.effect or camera.saturation_dn or camera.noise.shot != "gaussian":
         other = virtual_sensor(base, held, signals, seed)
+        teeth = teeth_of(camera, held, signals)
         base_law = Law(base, cells, plain, (), Conspicuous())
         model = virtual_sensor(camera, held, signals, seed)
         calm, ties = without_spikes(camera), None
         if calm != camera and not _untied(calm):
             still = virtual_sensor(calm, held, signals, seed)
-            ties = _learned(replace(law, camera=calm), base_law, held, still, other, seed)
+            ties = _learned(replace(law, camera=calm), base_law, held, still, other, seed, teeth)
             ties = None if _odd(ties) else ties
-        law = _learned(law, base_law, held, model, other, seed, ties)
+        law = _learned(law, base_law, held, model, other, seed, teeth, ties)
     return law if cells.plain else _with_widths(law, held)
 
 
@@ -105,6 +107,7 @@ def _learned(
     model: Mapping[str, Stack],
     other: Mapping[str, Stack],
     seed: int,
+    teeth: Mapping[str, Image],
     ties: Law | None = None,
 ) -> Law:
     """Return the law with all that the virtual sensors show.
@@ -120,8 +123,8 @@ def _learned(
         law = replace(law, patterns=ties.patterns)
     elif not single:
         law = replace(law, patterns=_patterns(law, held, model, other))
-    base = residuals_of(base_law, held, other, seed)
-    own = residuals_of(law, held, model, seed)
+    base = residuals_of(base_law, held, other, seed, teeth)
+    own = residuals_of(law, held, model, seed, teeth)
     own = replace(own, law=with_variances(own, base, held))
     own = replace(own, law=with_groups(own, base, held))
     own = replace(own, law=with_shapes(own, base, held))

@@ -10,6 +10,7 @@ from analysis.mismatch.prove.cells import converted
 from analysis.mismatch.prove.held import Held
 from analysis.mismatch.prove.law import Law, Sensed, pixel_variance, sense
 from analysis.mismatch.prove.sites import means_of_most, spread_over
+from analysis.mismatch.prove.teeth import blurred
 from analysis.mismatch.prove.virtual import Stack, sensor_draw
 from dsis.effects import Image
 
@@ -46,8 +47,13 @@ class Residuals:
         return {}
 
 
-def residuals_of(law: Law, held: Held, stacks: Mapping[str, Stack], seed: int) -> Residuals:
-    """Return a virtual sensor with what its training frames tell under a law."""
+def residuals_of(
+    law: Law, held: Held, stacks: Mapping[str, Stack], seed: int, teeth: Mapping[str, Image]
+) -> Residuals:
+    """Return a virtual sensor with what its training frames tell under a law.
+
+    `teeth` of single electrons are blurred, see `blurred`.
+    """
     maps, variances = {}, {}
     for e in held.exposures:
         training = stacks[e.name].training
@@ -65,5 +71,5 @@ def residuals_of(law: Law, held: Held, stacks: Mapping[str, Stack], seed: int) -
         left = fresh - sensed.patterns[e.name].astype(np.float32)
         most = means_of_most(left, held.cfa, law.cells.step_dn)
         means = spread_over(most, held.shape, held.cfa)
-        residuals[e.name] = (left - means).astype(np.float32)
+        residuals[e.name] = blurred((left - means).astype(np.float32), teeth, e.name, seed)
     return Residuals(law, sensed, residuals)

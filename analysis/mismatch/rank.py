@@ -144,10 +144,17 @@ def ranked(
         left = frozenset(kinds) - strange
         return ranked(state, left, memory, step, settled, apart, possible, shown)
     fitted = _in_order(state, found, shown)
-    best = max((one.gain for one in fitted), default=SURE_GAIN)
-    if best >= SURE_GAIN or state.setting.large:
+    if state.setting.large or not fitted:
         return fitted
-    return _in_order(state, _once_more(state, found), shown)
+    if fitted[0].gain < SURE_GAIN or any(_close(state, fitted[0], one) for one in fitted[1:]):
+        return _in_order(state, _once_more(state, found), shown)
+    return fitted
+
+
+def _close(state: State, best: Ranked, other: Ranked) -> bool:
+    """Return whether few simulations may have put an effect before another that does the same."""
+    near = other.kind != best.kind and best.gain - other.gain < _FAR
+    return near and alike(state, best.mean, other.mean)
 
 
 def _fitted(state: State, proposal: Proposal) -> Polished | None:

@@ -15,6 +15,9 @@ _PAIRS = {
     frozenset({"line_flicker", "row_banding"}): "darks: only bands of offsets are there then",
     frozenset({"crosstalk", "brighter_fatter"}): "more signal levels: only one grows with them",
     frozenset({"crosstalk", "spatial_filtering"}): "darks: only a filter correlates read noise",
+    frozenset(
+        {"readout_memory", "spatial_filtering"}
+    ): "hot pixels or spikes: a filter smears them to both sides, memory to one",
     frozenset({"dsnu", "prnu"}): "darks and a bright flat of many frames",
     frozenset({"dsnu", "hot_pixels"}): "darks at two exposure times",
     frozenset({"hot_pixels", "rts"}): "darks at two exposure times",

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Container, Sequence
 from dataclasses import replace
+from math import log
 
 from analysis.mismatch.basenumbers import preferred
 from analysis.mismatch.instance import frequency_of, same_line
@@ -21,6 +22,7 @@ _TWINS = {
     "spatial_filtering": ("readout_memory",),
     "heavy_tailed_read_noise": ("read_noise_spread",),
     "read_noise_spread": ("heavy_tailed_read_noise",),
+    "rts": ("read_noise_spread", "heavy_tailed_read_noise"),
 }
 
 
@@ -40,9 +42,13 @@ def plainest(state: State, fitted: Sequence[Ranked]) -> list[Ranked]:
 def ties(state: State, best: Ranked, other: Ranked) -> bool:
     """Return whether another effect explains the same numbers nearly as well as the best.
 
-    What is seen in them, and no more, ties with nothing that says the same and more.
+    What is seen in them, and no more, ties with nothing that says the same and more. Which of many
+    lags it is costs nothing beside a twin that the same lag would be.
     """
-    near = other.gain > best.gain - TOLD_APART and other.kind != best.kind
+    gains = best.gain, other.gain
+    if other.kind in _TWINS.get(best.kind, ()):
+        gains = _unpriced(best), _unpriced(other)
+    near = gains[1] > gains[0] - TOLD_APART and other.kind != best.kind
     near |= smooth_as_well(state, best.mean, best.kind, other.kind)
     if not near or _SAYS_LESS.get(best.kind) == other.kind or _other_line(state, best, other):
         return False
@@ -64,7 +70,8 @@ def twin(
     Amplifiers of even and odd rows do nearly what greens that differ do to a mosaic whose light
     is of unknown colour: only the noise of each channel tells. Correlations have no side: memory of
     the sample before may be charge that neighbours exchange, or a filter. Noise that differs from
-    pixel to pixel has heavy tails in all of them together. Where that explains more, and also what
+    pixel to pixel has heavy tails in all of them together; pixels that jump at every other frame
+    are noisy ones. Where that explains more, and also what
     the best leaves alone, so much the more.
     """
     others = [kind for kind in _TWINS.get(best.kind, ()) if kind not in vocabulary]
@@ -98,6 +105,11 @@ def by_numbers(
     if first is rival and len(behind) < len(others):
         return [replace(rival, gain=best.gain), best, *behind]
     return None
+
+
+def _unpriced(one: Ranked) -> float:
+    """Return what an effect gains before it is paid for that it is one of many."""
+    return one.gain + log(one.proposal.best_of)
 
 
 def _other_line(state: State, best: Ranked, other: Ranked) -> bool:

@@ -16,8 +16,8 @@ from analysis.mismatch.ties import bends_as_well, twin
 MEMORY = (5.0, 0.0)  # changes of two numbers, in standard deviations
 
 
-def _ranked(kind: str, gain: float, mean: Sequence[float]) -> Ranked:
-    proposal: Any = SimpleNamespace(effect=SimpleNamespace(kind=kind))
+def _ranked(kind: str, gain: float, mean: Sequence[float], best_of: int = 1) -> Ranked:
+    proposal: Any = SimpleNamespace(effect=SimpleNamespace(kind=kind), best_of=best_of)
     polished: Any = SimpleNamespace(mean=np.array(mean))
     return Ranked(gain, kind, proposal, polished)
 
@@ -67,3 +67,18 @@ def test_a_bend_and_a_second_path_that_tie_are_told_by_nothing(
     path = Path(camera, 900.0, 50.0, gain, np.array(mean))
     assert bends_as_well(_state(), best, path) is (None if told else path)
     assert bends_as_well(_state(), best, None) is None
+
+
+@pytest.mark.parametrize(
+    ("kind", "best_of", "tied"),
+    [
+        ("readout_memory", 64, True),  # 31 + ln 64 = 35.2: which lag it is costs nothing
+        ("readout_memory", 1, False),
+        ("adc_memory", 64, False),  # no twin: that it is one of many counts
+    ],
+)
+def test_of_twins_the_one_of_many_lags_is_not_behind(
+    kind: str, best_of: int, *, tied: bool
+) -> None:
+    best = _ranked("spatial_filtering", 37.0, MEMORY)
+    assert ties.ties(_state(), best, _ranked(kind, 31.0, MEMORY, best_of)) is tied

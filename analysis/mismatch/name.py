@@ -26,6 +26,7 @@ from analysis.mismatch.rank import (
     SURE_GAIN,
     TOLD_APART,
     Ranked,
+    behind,
     ranked,
     replicates_for,
 )
@@ -229,7 +230,7 @@ class Search(Fitted):
         bent = [one.gain for one in fits if "pixel_variance" in CANDIDATES[one.kind].calls]
         tied = max(bent, default=0.0)
         if path is not None and path.gain > max(self.least, most, tied):
-            rivals = tuple((one.kind, path.gain - one.gain) for one in fitted[:3])
+            rivals = behind(path.kind, path.gain, fitted)
             error = {"switch_dn": path.error_dn}
             found = Named(path.kind, None, error, path.gain, rivals, path.switch_dn)
             return found, path.camera
@@ -237,7 +238,7 @@ class Search(Fitted):
             return None
         best = fitted[0]
         camera = joined(state.camera, best.polished.effects, self.setting.given)
-        rivals = tuple((one.kind, best.gain - one.gain) for one in fitted[1:4])
+        rivals = behind(best.kind, best.gain, fitted[1:])
         if path is not None:
             rivals = (*rivals, ("dual_gain", best.gain - path.gain))
         proposal = replace(best.proposal, effect=best.polished.effects[0])

@@ -31,6 +31,7 @@ LEAST_GAIN = 2.0  # of log-likelihood, below which an effect is not worth its pa
 # that something calls for it is as sure, the likelihood need only tell it from others.
 SURE_CHANCE = 1 / (20 * len(CANDIDATES))
 SURE_GAIN = -log(SURE_CHANCE)
+_TOLD_RIVALS = 3
 _MOST = 4  # kinds that are fitted, after all were tried as proposed
 _FAR = 15.0  # of log-likelihood behind the best as proposed: fitting does not make up for it
 _SHARE = 0.03  # or that share of what the best gains
@@ -144,17 +145,18 @@ def ranked(
         left = frozenset(kinds) - strange
         return ranked(state, left, memory, step, settled, apart, possible, shown)
     fitted = _in_order(state, found, shown)
+    return _in_order(state, _once_more(state, found), shown) if _unsure(state, fitted) else fitted
+
+
+def _unsure(state: State, fitted: Sequence[Ranked]) -> bool:
+    """Return whether few simulations may have put the best before none, or before its like."""
     if state.setting.large or not fitted:
-        return fitted
-    if fitted[0].gain < SURE_GAIN or any(_close(state, fitted[0], one) for one in fitted[1:]):
-        return _in_order(state, _once_more(state, found), shown)
-    return fitted
-
-
-def _close(state: State, best: Ranked, other: Ranked) -> bool:
-    """Return whether few simulations may have put an effect before another that does the same."""
-    near = other.kind != best.kind and best.gain - other.gain < _FAR
-    return near and alike(state, best.mean, other.mean)
+        return False
+    best, *others = fitted
+    return best.gain < SURE_GAIN or any(
+        one.kind != best.kind and best.gain - one.gain < _FAR and alike(state, best.mean, one.mean)
+        for one in others
+    )
 
 
 def _fitted(state: State, proposal: Proposal) -> Polished | None:
@@ -192,6 +194,15 @@ def _gained(state: State, start: Proposal, shown: Callable[[Effect], float]) -> 
         return -np.inf
     paid = 0.0 if effect.kind in _BY_JUMPS else start.price  # odds of all sizes have paid for them
     return shown(effect) - paid
+
+
+def behind(kind: str, gain: float, others: Sequence[Ranked]) -> tuple[tuple[str, float], ...]:
+    """Return the first kinds that are not `kind`, each once, and by how much they gain less."""
+    found: dict[str, float] = {}
+    for one in others:
+        if one.kind != kind:
+            found.setdefault(one.kind, gain - one.gain)
+    return tuple(found.items())[:_TOLD_RIVALS]
 
 
 def _once_more(state: State, found: Sequence[Fit]) -> list[Fit]:

@@ -1,4 +1,4 @@
-"""Codes that single electrons make more frequent: a comb that stays where it is as levels wander."""
+"""Codes that single electrons make more frequent: a comb that stays as levels wander."""
 
 from collections.abc import Mapping
 from zlib import crc32

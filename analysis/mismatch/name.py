@@ -248,9 +248,8 @@ class Search(Fitted):
             proposal = measured(proposal, *known)
             errors = dict(proposal.errors)
             camera = with_effects(state.camera, [proposal.effect])
-        if camera is None:
-            return None
-        return Named(best.kind, proposal, errors, best.gain, rivals), camera
+        named = Named(best.kind, proposal, errors, best.gain, rivals)
+        return None if camera is None else (named, camera)
 
     def _least(self, state: State, kind: str) -> float:
         """Return the gain from which an effect is taken in: at odds of 20 against none.

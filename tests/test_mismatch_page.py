@@ -17,10 +17,11 @@ from analysis.mismatch.evidence import Curve, Evidence, Histogram, Map, Series, 
 from analysis.mismatch.files import write_finding
 from analysis.mismatch.finding import Finding, FittedParameter, Gain, Where
 from analysis.mismatch.model import processes
+from analysis.mismatch.report import render
 from analysis.mismatch.report.figures import MOST, curves, pictures, series
 from analysis.mismatch.report.figures.spectra import folded
 from analysis.mismatch.report.numbers import measured
-from analysis.mismatch.report.sentences import numbers_in_short, parameters
+from analysis.mismatch.report.sentences import credited, numbers_in_short, parameters
 from analysis.mismatch.says import sentence
 from analysis.mismatch.words import effect_says, effect_words
 from dsis.effects import registry
@@ -303,3 +304,14 @@ def test_every_effect_has_words(kind: str) -> None:
 def test_correlations_along_lines_say_what_is_apart(key: Key, said: str) -> None:
     """Sums over channels put a word before axis and lag."""
     assert said in sentence(key.statistic, key, 5.0, Where(("flat-0",)))
+
+
+def test_what_is_gone_beside_all_effects_is_theirs_together() -> None:
+    """No effect alone changes it, and nothing is left: it is not said to be unexplained."""
+    gone = replace(ROWS, statistic="frame_noise", explained_by=None)
+    finding = replace(FOUND, mismatches=(*FOUND.mismatches, gone))
+    assert credited(gone, finding) == "all that is named, together"
+    assert not credited(gone, replace(finding, unexplained=(gone,)))
+    assert not credited(gone, replace(finding, omitted_physics=()))
+    page = Page(render(finding, [], ""))
+    assert "all that is named, together" in page.text

@@ -1,6 +1,6 @@
 """The report of a diagnosis: one self-contained page that needs no network."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -16,6 +16,7 @@ from analysis.mismatch.report.numbers import interval, measured, plain
 from analysis.mismatch.report.sentences import (
     because,
     considered,
+    credited,
     gain,
     joined,
     numbers_in_short,
@@ -55,7 +56,7 @@ class Difference:
     where: str
     z: float
     z_after: float
-    explained_by: str | None
+    explained: str
     says: str
     count: int
 
@@ -76,7 +77,7 @@ def write_page(finding: Finding, folder: Path, origin: str = "") -> None:
     figures.mkdir(exist_ok=True)
     ladder, some = ladder_picture(finding), pictures(finding)
     drawn = apart(partial(save, folder=figures), [*some, *([] if ladder is None else [ladder])])
-    shown = [_shown(picture, svg) for picture, svg in zip(some, drawn, strict=False)]
+    shown = [_shown(picture, svg, finding) for picture, svg in zip(some, drawn, strict=False)]
     page = render(finding, shown, "" if ladder is None else embedded(drawn[-1]), origin)
     (folder / "report.html").write_text(page, encoding="utf-8", newline="")
 
@@ -96,7 +97,7 @@ def render(
         "because": because,
     }
     evidence = finding.evidence if isinstance(finding.evidence, Evidence) else Evidence()
-    differences = _differences([*finding.mismatches, *_only_unexplained(finding)])
+    differences = _differences(finding)
     values = {
         "finding": finding,
         "headline": HEADLINES[finding.verdict]
@@ -124,15 +125,15 @@ def render(
     return render_page(TEMPLATE, values, filters)
 
 
-def _differences(mismatches: Iterable[Mismatch]) -> list[Difference]:
-    grouped: dict[tuple[str, str | None], list[Mismatch]] = {}
-    for mismatch in strongest(mismatches):
-        key = (parted(mismatch.statistic)[0], mismatch.explained_by)
+def _differences(finding: Finding) -> list[Difference]:
+    grouped: dict[tuple[str, str], list[Mismatch]] = {}
+    for mismatch in strongest([*finding.mismatches, *_only_unexplained(finding)]):
+        key = (parted(mismatch.statistic)[0], credited(mismatch, finding))
         grouped.setdefault(key, []).append(mismatch)
-    return [_difference(some) for some in grouped.values()]
+    return [_difference(some, explained) for (_, explained), some in grouped.items()]
 
 
-def _difference(some: Sequence[Mismatch]) -> Difference:
+def _difference(some: Sequence[Mismatch], explained: str) -> Difference:
     first = some[0]
     after = [abs(m.z_after) for m in some if not np.isnan(m.z_after)]
     statistics = {m.statistic for m in some}
@@ -142,7 +143,7 @@ def _difference(some: Sequence[Mismatch]) -> Difference:
         place(first.where),
         first.z,
         max(after, default=float("nan")),
-        first.explained_by,
+        explained,
         first.says,
         len(some),
     )
@@ -165,13 +166,14 @@ def _locked(finding: Finding) -> list[tuple[str, str]]:
     ]
 
 
-def _shown(picture: Picture, svg: bytes) -> dict[str, Any]:
-    explained = dict.fromkeys(m.explained_by for m in picture.mismatches)
-    names = [effect_words(name) if name else "nothing yet" for name in explained]
+def _shown(picture: Picture, svg: bytes, finding: Finding) -> dict[str, Any]:
+    explained = dict.fromkeys(credited(m, finding) for m in picture.mismatches)
+    names = [name for name in explained if name]
+    some = " in part" if names and "" in explained else ""
     return {
         "name": picture.name,
         "title": picture.title[0].upper() + picture.title[1:],
         "says": list(dict.fromkeys(m.says for m in picture.mismatches))[:_SAID],
-        "explained": joined(names),
+        "explained": f"{joined(names) or 'nothing yet'}{some}",
         "svg": embedded(svg),
     }

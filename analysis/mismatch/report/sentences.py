@@ -19,6 +19,7 @@ from analysis.mismatch.report.numbers import interval, measured, plain
 from analysis.mismatch.words import effect_words, place, statistic_words, unit
 
 _NAMED = 3
+_TOGETHER = "all that is named, together"
 _IN_FULL = 4  # effects that one sentence can hold with their numbers
 
 
@@ -168,6 +169,18 @@ def unproven(finding: Finding) -> list[str]:
 def because(effect: OmittedEffect) -> str:
     """Return what pointed to an effect."""
     return joined(statistic_words(name) for name in effect.because)
+
+
+def credited(mismatch: Mismatch, finding: Finding) -> str:
+    """Return what explains a departure, in words; empty: nothing does.
+
+    Of one that is gone beside all effects, though none by itself changes its numbers, all together.
+    """
+    if mismatch.explained_by:
+        return effect_words(mismatch.explained_by)
+    left = {one.statistic for one in finding.unexplained}
+    gone = bool(finding.omitted_physics) and mismatch.statistic not in left
+    return _TOGETHER if gone else ""
 
 
 def considered(finding: Finding) -> list[tuple[str, Alternative]]:

@@ -4,7 +4,14 @@ from collections.abc import Iterable, Mapping
 
 from analysis.mismatch.finding import Change, Finding
 from analysis.mismatch.report.numbers import plain
-from analysis.mismatch.report.sentences import considered, gain, parameters, strongest, verdict
+from analysis.mismatch.report.sentences import (
+    considered,
+    credited,
+    gain,
+    parameters,
+    strongest,
+    verdict,
+)
 from analysis.mismatch.words import effect_words, place, statistic_words
 
 _SHOWN = 8
@@ -26,7 +33,9 @@ def summary(finding: Finding) -> str:
         lines += ["", _row(head), _row("---" for _ in head).replace(" ", "")]
     for m in strongest(finding.mismatches)[:_SHOWN]:
         cells = (statistic_words(m.statistic), place(m.where), plain(m.z))
-        rest = (plain(m.z_after), m.explained_by or "nothing") if after else ()
+        rest = (
+            (plain(m.z_after), m.explained_by or credited(m, finding) or "nothing") if after else ()
+        )
         lines.append(_row((*cells, *rest)))
     more = len(finding.mismatches) - _SHOWN
     if more > 0:

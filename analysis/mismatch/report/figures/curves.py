@@ -169,11 +169,11 @@ def _standard(axes: Axes, curves: Sequence[Curve], threshold_z: float) -> None:
     least = 1.5 * threshold_z
     low = min(1.15 * float(seen.min(initial=0.0)), -least)
     high = max(1.15 * float(seen.max(initial=0.0)), least)
+    axes.set_ylabel("departure, standard deviations")
     if max(-low, high) > 4 * threshold_z:
         symmetric_scale(axes, 1.6 * low, 1.6 * high, threshold_z)
     else:
         axes.set_ylim(low, high)
-    axes.set_ylabel("departure, standard deviations")
     axes.set_title("Before and after" if _named(curves) else "How far", loc="left")
     axes.legend(loc="best", ncols=3, columnspacing=0.8, handlelength=1.2, handletextpad=0.5)
     _finish(axes, curves)

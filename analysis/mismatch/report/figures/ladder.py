@@ -11,6 +11,7 @@ from matplotlib.ticker import MaxNLocator, SymmetricalLogLocator
 from analysis.figures import COLOURS, GREY, INK
 from analysis.mismatch.finding import Finding, Gain
 from analysis.mismatch.report.figures.ticks import plain_numbers
+from analysis.mismatch.report.numbers import plain
 from analysis.mismatch.report.sentences import effect_label
 from analysis.mismatch.words import effect_words
 
@@ -92,4 +93,5 @@ def _scale(axes: Axes, values: Sequence[float]) -> None:
         return
     axes.set_xscale("symlog", linthresh=_LINEAR, linscale=0.6)
     axes.xaxis.set_major_locator(SymmetricalLogLocator(base=10, linthresh=_LINEAR))
+    axes.set_xlabel(f"{axes.get_xlabel()} (logarithmic beyond ±{plain(_LINEAR)})")
     plain_numbers(axes.xaxis)

@@ -16,7 +16,7 @@ def plain_numbers(axis: Axis) -> None:
 
 
 def symmetric_scale(axes: Axes, low: float, high: float, linear: float) -> None:
-    """Make y linear within +-`linear` and logarithmic beyond, from `low` to `high`."""
+    """Make y linear within +-`linear` and logarithmic beyond, from `low` to `high`; say so."""
     axes.set_yscale("symlog", linthresh=linear)
     axes.set_ylim(low, high)
     steps = [10.0**e * step for e in range(-12, 13) for step in (1, 3)]
@@ -27,3 +27,4 @@ def symmetric_scale(axes: Axes, low: float, high: float, linear: float) -> None:
     axes.yaxis.set_major_locator(FixedLocator([t for t in ticks if low <= t <= high]))
     axes.yaxis.set_minor_locator(NullLocator())
     plain_numbers(axes.yaxis)
+    axes.set_ylabel(f"{axes.get_ylabel()}\nlogarithmic beyond ±{plain(linear)}")

@@ -1,15 +1,12 @@
 """Codes that never occur: a digital gain or a table of codes, not widths that scatter."""
 
-from collections.abc import Iterable
-
 import numpy as np
 
+from analysis.mismatch.candidates.steps import FEW, absent
 from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.state import State
-from dsis.measures import Middle
 
 _MOST = 0.5  # of the mean square of unevenness, that absent codes may make
-_FEW = 8  # absent codes that a converter of uneven steps may have
 
 
 def left_out(state: State) -> Denial | None:
@@ -27,7 +24,7 @@ def left_out(state: State) -> Denial | None:
         if key.statistic == "code_imbalance" and key.scope == "exposure" and np.isfinite(value)
     }
     both = [(one, measured[place]) for place, one in seen.middles.items() if place in measured]
-    if len(absent(one for one, _ in both)) < _FEW:
+    if len(absent(one for one, _ in both)) < FEW:
         return None
     made = sum(one.absent.size / one.codes for one, _ in both)
     whole = sum(max(value, 0.0) ** 2 for _, value in both)
@@ -35,15 +32,3 @@ def left_out(state: State) -> Denial | None:
         return None
     why = "codes between others never occur, and those that do are about alike"
     return Denial(max(1 - made / whole, 0.0), why)
-
-
-def absent(some: Iterable[Middle]) -> frozenset[int]:
-    """Return the codes that are absent wherever one of some histograms could hold them."""
-    own = list(some)
-    found = {int(code) for one in own for code in one.absent}
-    there = {
-        int(code)
-        for one in own
-        for code in np.setdiff1d(range(one.first, one.last + 1, one.step), one.absent)
-    }
-    return frozenset(found - there)

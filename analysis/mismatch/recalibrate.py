@@ -234,7 +234,7 @@ def code_step(camera: Camera) -> float:
 
 def codes_of(camera: Camera) -> tuple[float, float]:
     """Return the step between codes and the lowest code, its phase, DN: 1 and 0, or coarser."""
-    own = [(e.step_dn, float(e.phase_dn)) for e in camera.effect if isinstance(e, Quantisation)]
+    own = [(e.step_dn, e.phase_dn) for e in camera.effect if isinstance(e, Quantisation)]
     return max(own, key=lambda one: one[0], default=(1.0, 0.0))
 
 

@@ -5,6 +5,8 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.special import ndtr
 
+from dsis.effects.quantisation import whole_codes
+
 Array = NDArray[np.float64]
 _WIDE = 1.0  # DN; above, and away from the ends, rounding adds 1/12 to 1e-8
 _REACH = 8.0
@@ -29,7 +31,8 @@ def rounded(
     if step_dn != 1:
         mean, last = (mean_dn - phase_dn) / step_dn, (white_dn - phase_dn) // step_dn
         shift, added = rounded(mean, variance_dn2 / step_dn**2, last)
-        return shift * step_dn, added * step_dn**2
+        more = _whole(mean_dn, variance_dn2, white_dn, step_dn, phase_dn)
+        return shift * step_dn + more[0], added * step_dn**2 + more[1]
     sigma = max(variance_dn2, 1e-12) ** 0.5
     inside = _REACH * sigma < mean_dn < white_dn - _REACH * sigma
     if sigma > _WIDE and inside:
@@ -40,6 +43,22 @@ def rounded(
     mean = float((share * codes).sum())
     variance = float((share * (codes - mean) ** 2).sum())
     return mean - mean_dn, variance - max(variance_dn2, 0.0)
+
+
+def _whole(
+    mean_dn: float, variance_dn2: float, white_dn: float, step_dn: float, phase_dn: float
+) -> tuple[float, float]:
+    """Return what whole codes add to the mean and the variance of steps that are none."""
+    if step_dn.is_integer() and phase_dn.is_integer():
+        return 0.0, 0.0
+    sigma = max(variance_dn2, 1e-12) ** 0.5 / step_dn
+    numbers, share = _codes((mean_dn - phase_dn) / step_dn, sigma, (white_dn - phase_dn) // step_dn)
+    steps = phase_dn + step_dn * numbers
+    (first, before), (second, after) = (
+        (mean := float(share @ own), float(share @ (own - mean) ** 2))
+        for own in (steps, whole_codes(numbers, step_dn, phase_dn))
+    )
+    return second - first, after - before
 
 
 def _codes(mean_dn: float, sigma_dn: float, white_dn: float) -> tuple[Array, Array]:
@@ -72,6 +91,8 @@ def unrounded(
     and the third and the fourth are infinite.
     """
     if step_dn != 1:
+        shift, added = _whole(mean_dn, variance_dn2, white_dn, step_dn, phase_dn)
+        mean_dn, variance_dn2 = mean_dn - shift, max(variance_dn2 - added, 0.0)
         mean, last = (mean_dn - phase_dn) / step_dn, (white_dn - phase_dn) // step_dn
         before, variance, *errors = unrounded(mean, variance_dn2 / step_dn**2, last)
         return before * step_dn + phase_dn, variance * step_dn**2, errors[0], errors[1]

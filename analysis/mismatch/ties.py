@@ -16,6 +16,7 @@ from dsis.camera import BaseNoise
 # That greens differ is seen; what amplifiers of even and odd rows make of red and blue is not.
 # Memory of a sample is that of a residue whose steps lie beyond the noise.
 _SAYS_LESS = {"channel_imbalance": "tap_mismatch", "readout_memory": "adc_memory"}
+_BY_CODES = "quantisation"
 _TWINS = {
     "tap_mismatch": ("channel_imbalance",),
     "readout_memory": ("crosstalk", "spatial_filtering"),
@@ -42,9 +43,12 @@ def plainest(state: State, fitted: Sequence[Ranked]) -> list[Ranked]:
 def ties(state: State, best: Ranked, other: Ranked) -> bool:
     """Return whether another effect explains the same numbers nearly as well as the best.
 
-    What is seen in them, and no more, ties with nothing that says the same and more. Which of many
-    lags it is costs nothing beside a twin that the same lag would be.
+    What is seen in them, and no more, ties with nothing that says the same and more; nor do steps
+    of codes, which are told by those that never occur. Which of many lags it is costs nothing
+    beside a twin that the same lag would be.
     """
+    if best.kind == _BY_CODES:
+        return False
     gains = best.gain, other.gain
     if other.kind in _TWINS.get(best.kind, ()):
         gains = _unpriced(best), _unpriced(other)

@@ -8,6 +8,7 @@ from math import log, sqrt
 import numpy as np
 
 from analysis.mismatch.candidates.candidate import Candidate, Proposal, proposals
+from analysis.mismatch.candidates.steps import absent, fractional_step
 from analysis.mismatch.clues import Clues
 from dsis.measures import Lattice
 
@@ -97,14 +98,21 @@ def _counted(clues: Clues, most_dn: float) -> list[tuple[float, float]]:
 
 
 def _quantisation(clues: Clues) -> Sequence[Proposal]:
-    """Propose the step and the phase of all codes; where few stray, those of most exposures."""
+    """Propose the step and the phase of all codes; where few stray, those of most exposures.
+
+    A step that is no whole number leaves some codes out, see `fractional_step`.
+    """
     lattices = list(clues.seen.lattices.values())
     step = reduce(Lattice.joined, lattices).step if lattices else 1
     if step <= 1:
         step = _step_of_most(clues)
         lattices = [own for own in lattices if own.step % step == 0]
     if step <= 1 or not lattices:
-        return []
+        middles = clues.seen.middles.values()
+        found = fractional_step(middles, absent(middles))
+        if found is None:
+            return []
+        return proposals("quantisation", [], step_dn=found[0], phase_dn=found[1])
     phase = Counter(own.phase(step) for own in lattices).most_common(1)[0][0]
     return proposals("quantisation", [], step_dn=float(step), phase_dn=phase)
 
@@ -141,6 +149,6 @@ CANDIDATES = (
         _rts,
     ),
     Candidate("impulse", ("one_off_outliers", "kurtosis", "skewness"), _impulse),
-    Candidate("quantisation", ("code_spacing",), _quantisation),
+    Candidate("quantisation", ("code_spacing", "code_imbalance"), _quantisation),
     Candidate("adc_dnl", ("code_imbalance",), _dnl),
 )  # fmt: skip

@@ -35,7 +35,6 @@ from analysis.mismatch.wholelines import of_parts
 from dsis.effects.readout_memory import ReadoutMemory
 
 Array = NDArray[np.float64]
-_MEMORY = "readout_memory"
 _BENDS = frozenset({"nonlinearity", "dual_gain", "dual_gain_mismatch"})
 _PAIRS = {"correlation_0_1": 2, "correlation_1_0": 2, "correlation_1_1": 4}
 """How many neighbours of a pixel a correlation is that of."""
@@ -61,7 +60,8 @@ def displaced(state: State, kind: str, mean: Array, without: Array | None = None
     counted photons and amplifiers of greens, by how much levels show them; of noise of whole lines,
     how alike samples along them are; of greens that differ, what other colours share with them; of
     frames that move as a whole, whether their parts do so alike. Of widths of codes, whether it is
-    codes that never occur which make them differ; of memory, other lags; of pixels, whether those side by side do alike.
+    codes that never occur which make them differ; of memory, whether samples are alike at other
+    lags as well; of pixels, whether those side by side do alike.
 
     Parameters
     ----------
@@ -88,9 +88,11 @@ def displaced(state: State, kind: str, mean: Array, without: Array | None = None
         denial = _of_colours(state, mean - without) or _of_memory(state, mean - without)
         if denial is not None:
             return denial
-    if kind == _MEMORY and (denial := other_lags(state, mean, without)) is not None:
-        return denial
-    denial = of_moving_parts(state, kind, without) or otherwise_by_level(state, kind, without, mean)
+    denial = (
+        other_lags(state, kind, mean, without)
+        or of_moving_parts(state, kind, without)
+        or otherwise_by_level(state, kind, without, mean)
+    )
     denial = denial or of_few_lines(state, kind, without, mean) or of_late_light(state, kind)
     denial = denial or shared_otherwise(state, kind, without)
     return denial or no_brighter_alike(state, kind, without)

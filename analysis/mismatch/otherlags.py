@@ -7,12 +7,13 @@ from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.state import State
 
 Array = NDArray[np.float64]
+_KIND = "readout_memory"
 _STATISTIC = "line_correlation"
 _CLEAR = 5.0  # standard deviations, from which a lag stands out
 _MOST = 1.0  # of what the memory's own lag shows, that another may
 
 
-def other_lags(state: State, mean: Array, without: Array) -> Denial | None:
+def other_lags(state: State, kind: str, mean: Array, without: Array) -> Denial | None:
     """Return how memory is denied by other lags along the same lines; None: it is not.
 
     A sample that remembers one read before is alike at that lag. Where others that the memory does
@@ -23,9 +24,13 @@ def other_lags(state: State, mean: Array, without: Array) -> Denial | None:
     ----------
     state
         With the memory, or before it is taken in.
+    kind
+        The effect; of any other nothing is said.
     mean, without
         The numbers predicted with it, and without it.
     """
+    if kind != _KIND:
+        return None
     keys = state.vector.keys
     known = state.null.known & np.isfinite(mean) & np.isfinite(without)
     own = np.array([key.statistic == _STATISTIC for key in keys]) & known

@@ -107,3 +107,10 @@ def test_late_light_beside_uneven_gains_is_no_glow() -> None:
         return _shaded(signal, time) + _late(signal, time)
 
     assert of_late_light(_state(both, beside=("shading",)), "amp_glow") is not None
+
+
+def test_what_all_exposures_have_alike_is_not_light_of_any() -> None:
+    """Of an offset neither law says anything: one of several shapes is likelier by chance."""
+    for seed in range(60):
+        state = _state(lambda _s, _t: 2.0 * DOWN, seed=seed)
+        assert of_late_light(state, "line_settling") is None

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import chi2
 
 from analysis.mismatch.contradicted import Denial, rival
 from analysis.mismatch.rank import TOLD_APART
@@ -12,6 +13,7 @@ from analysis.mismatch.state import State
 Array = NDArray[np.float64]
 _OF_SIGNAL = frozenset({"shading", "tap_mismatch", "line_settling", "smooth_prnu"})
 _OF_TIME = frozenset({"amp_glow"})
+_CHANCE = 1e-3  # that late light explains as much of what is alike in all exposures
 
 
 def of_late_light(state: State, kind: str) -> Denial | None:
@@ -21,15 +23,16 @@ def of_late_light(state: State, kind: str) -> Denial | None:
     exposed for longer by the same time always, they collect more by their signal over the exposure
     time. Asked is how much each exposure leans and bows, beside what all have alike, and beside a
     glow or an uneven gain that is there as well: where that law is likelier at odds of 20, nothing
-    else of these is there for certain. Exposures of one time do not tell, nor need they: what is
-    uneven is then so by the same share at every level.
+    else of these is there for certain. Of what all exposures have alike but for chance it says
+    nothing: one law of many shapes is then likelier than another by chance. Exposures of one time
+    do not tell, nor need they: what is uneven is then so by the same share at every level.
     """
     if kind not in _OF_SIGNAL | _OF_TIME:
         return None
     others = {own.kind for own in state.camera.effect} & (
         _OF_SIGNAL if kind in _OF_TIME else _OF_TIME
     )
-    signals, behind = state.calibrated.fit.signal_dn, 0.0
+    signals, behind, gained, shapes = state.calibrated.fit.signal_dn, 0.0, 0.0, 0
     times = {e.name: float(e.exposure_time_s) for e in state.setting.layout.uniform}
     for channel in state.setting.layout.channels:
         names = [e for e in times if (e, channel) in state.setting.seen.surfaces]
@@ -43,8 +46,10 @@ def of_late_light(state: State, kind: str) -> Denial | None:
         law, other = (time, signal) if kind in _OF_TIME else (signal, time)
         beside = [np.ones_like(time), *([other] if others else [])]
         late = _left([*beside, signal / time], values, weights)
+        gained += _left(beside, values, weights) - late
+        shapes += values.shape[1]
         behind += (_left([*beside, law], values, weights) - late) / 2
-    if behind <= TOLD_APART:
+    if behind <= TOLD_APART or chi2.sf(gained, shapes) > _CHANCE:
         return None
     why = "it is uneven as light is that some pixels see for longer, the same time in each exposure"
     return rival(behind, why)

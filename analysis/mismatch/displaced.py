@@ -127,17 +127,37 @@ def _of_grains(state: State, left: Left) -> Denial | None:
     """Return how a bend is denied by noise that neighbours share as it grows; None: it is not.
 
     Noise on top of all other, in grains of some pixels - of light that interferes, say - adds to
-    variances k times the covariance of pixels side by side, 1 / k its own correlation.
+    variances k times the covariance of pixels side by side, 1 / k its own correlation. It goes with
+    the square of the signal, see `upwards`.
     """
     if not upwards(state):
         return None
-    shared: dict[Place, float] = {}
-    for (place, statistic), (rest, _) in left.items():
-        if statistic in _ADJACENT:
-            shared[place] = shared.get(place, 0.0) + max(rest, 0.0) / len(_ADJACENT)
+    shared = _shared_squared(state, left)
     why = "neighbours are alike, and what they share makes variances grow"
     found = [_straightened(state, partial(_less, shared, k), why) for k in _GRAINS]
     return min((one for one in found if one), key=lambda one: one.share, default=None)
+
+
+def _shared_squared(state: State, left: Left) -> dict[Place, float]:
+    """Return the share of each variance that neighbours along rows or columns have in common.
+
+    Their covariances are fitted, all places together, by the square of the signal: the correlations
+    of single places are noisy. A direction along which nothing is shared for certain has none.
+    """
+    levels, signals = state.setting.seen.levels, state.calibrated.fit.signal_dn
+    found: dict[Place, float] = {}
+    for direction in _ADJACENT:
+        own = {at: one for (at, name), one in left.items() if name == direction and at in signals}
+        squares = np.array([signals[at] ** 2 / levels[at].variance_dn2 for at in own])
+        rest, sd = np.array(list(own.values())).reshape(-1, 2).T
+        weight = float(((squares / sd) ** 2).sum())
+        if weight <= 0 or (rate := float((squares * rest / sd**2).sum()) / weight) < (
+            FAR_OFF / weight**0.5
+        ):
+            continue
+        for at, square in zip(own, squares.tolist(), strict=True):
+            found[at] = max(found.get(at, 0.0), rate * square)
+    return found
 
 
 def _less(shared: Mapping[Place, float], times: float, at: Place, usual: float) -> float:
@@ -200,8 +220,12 @@ def _of_codes(state: State) -> Denial | None:
 
 
 def _straightened(state: State, factor: Callable[[Place, float], float], why: str) -> Denial | None:
-    """Return how a bend is denied where variances times a factor lie on lines; None: not."""
-    before, after = misfits(state, factor)
+    """Return how a bend is denied where variances times a factor lie on lines; None: not.
+
+    Beyond what chance makes them misfit.
+    """
+    chance = sum(signal.size - 2 for signal, *_ in curves(state))
+    before, after = (max(one - chance, 0.0) for one in misfits(state, factor))
     if before <= 0 or after > _MOST * before:
         return None
     return Denial(after / before, why)

@@ -9,16 +9,16 @@ from analysis.mismatch.state import State
 Array = NDArray[np.float64]
 _KIND = "readout_memory"
 _STATISTIC = "line_correlation"
-_CLEAR = 5.0  # standard deviations, from which a lag stands out
-_MOST = 1.0  # of what the memory's own lag shows, that another may
+_CLEAR = 4.0  # standard deviations, from which a lag stands out
+_LEAST = 0.5  # of the squares of what stands out along lines, that the memory must explain
 
 
 def other_lags(state: State, kind: str, mean: Array, without: Array) -> Denial | None:
     """Return how memory is denied by other lags along the same lines; None: it is not.
 
-    A sample that remembers one read before is alike at that lag. Where others that the memory does
-    not change are left as far off as its own lag was, something correlates samples at all of them -
-    lines that are left over, noise of whole rows - of which one is the largest.
+    A sample that remembers one read before is alike at that lag. Where more is left at lags that
+    the memory does not change than it explains, something correlates samples at all of them - lines
+    that are left over, noise of whole rows - of which one is the largest.
 
     Parameters
     ----------
@@ -40,13 +40,11 @@ def other_lags(state: State, kind: str, mean: Array, without: Array) -> Denial |
     left = np.where(own, state.vector.values - mean, 0.0) / state.null.sd
     first = int(np.argmax(np.abs(change)))
     axis = keys[first].detail.split(" ")[0]
-    shown = abs(float(change[first] + left[first]))
     others = [
-        abs(float(left[i]))
+        float(left[i]) ** 2
         for i in np.flatnonzero(own)
         if keys[i].detail.split(" ")[0] == axis and abs(change[i]) < abs(change[first]) / 2
     ]
-    most = max(others, default=0.0)
-    if most < _CLEAR or most < _MOST * shown:
-        return None
-    return Denial(1 - shown / (shown + most), "samples are alike at other lags as well")
+    shown, more = float(change[first]) ** 2, sum(z2 for z2 in others if z2 > _CLEAR**2)
+    share = shown / max(shown + more, 1e-300)
+    return Denial(share, "samples are alike at other lags as well") if share < _LEAST else None

@@ -67,6 +67,7 @@ class Seen:
         low = np.maximum(there.max(1) - 0.5, absent.max(1) - steps + 0.5)
         high = np.minimum(there.min(1) + 0.5, absent.min(1) - 0.5)
         phases = (phases + (low + high) / 2) % steps
+        phases[phases >= steps] = 0.0  # of a negative that rounds to none
         there, absent = self._beside(steps, phases)
         outside = np.abs(there) > 0.5 + _EDGE
         inside = np.minimum(absent, size - absent) < 0.5 - _EDGE

@@ -299,11 +299,11 @@ class Search(Fitted):
                 continue  # all that was fitted of a kind is denied: others were too far behind it
             if not fitted or fitted[0].gain < LEAST_GAIN:
                 return fitted
-            rival: Ranked | Path | None
-            rival = next((one for one in fitted[1:] if ties(state, fitted[0], one)), None)
-            rival = rival or self._named_otherwise(fitted[0])
+            tied = (one for one in fitted[1:] if ties(state, fitted[0], one))
+            rival: Ranked | Path | None = next(tied, self._named_otherwise(fitted[0]))
             rival = rival or bends_as_well(state, fitted[0], path)
-            rival = rival or twin(state, fitted[0], self.vocabulary, self.memory, self.step)
+            if self._shown(fitted[0].proposal.effect) < SURE_GAIN:  # else frames tell it from all
+                rival = rival or twin(state, fitted[0], self.vocabulary, self.memory, self.step)
             if rival is None:
                 return fitted
             if (told := by_numbers(state, self.camera.noise, fitted, rival)) is not None:

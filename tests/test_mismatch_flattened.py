@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import scipy.stats
 
 from analysis.mismatch.bank.key import Key
 from analysis.mismatch.flattened import flattened
@@ -54,13 +55,13 @@ SIGNALS = [100.0, 400.0, 900.0, 1600.0, 2500.0]
 def test_flats_at_the_full_well_are_left_out(
     full_well: float, curvature: float, expected: set[str]
 ) -> None:
-    found = flattened(_layout(5), _levels(SIGNALS, full_well, curvature), MODEL)
+    found = flattened(_layout(5), _levels(SIGNALS, full_well, curvature), MODEL, {})
     assert found == expected
 
 
 def test_two_flats_below_are_needed() -> None:
-    assert flattened(_layout(2), _levels(SIGNALS[:2], 300.0), MODEL) == frozenset()
-    assert flattened(_layout(3), _levels(SIGNALS[:3], 800.0), MODEL) == {"flat-2"}
+    assert flattened(_layout(2), _levels(SIGNALS[:2], 300.0), MODEL, {}) == frozenset()
+    assert flattened(_layout(3), _levels(SIGNALS[:3], 800.0), MODEL, {}) == {"flat-2"}
 
 
 def _two_paths(signals: list[float], switch: float, slope: float) -> Any:
@@ -77,18 +78,18 @@ def test_a_path_of_less_slope_is_no_full_well(slope: float) -> None:
     signals = [150.0, 300.0, 600.0, 900.0, 1200.0, 2000.0, 3300.0]
     levels = _two_paths(signals, 1000.0, slope)
     two = camera(segments=((SLOPE, READ, 1000.0), (slope, 2 * READ, None)))
-    assert flattened(_layout(7), levels, two) == frozenset()
+    assert flattened(_layout(7), levels, two, {}) == frozenset()
     # Slope and intercept a fifth off are numbers to be fitted.
     off = camera(segments=((1.2 * SLOPE, READ, 1000.0), (0.8 * slope, 2 * READ, None)))
-    assert flattened(_layout(7), levels, off) == frozenset()
+    assert flattened(_layout(7), levels, off, {}) == frozenset()
     levels["flat-6", "MONO"].variance_dn2 = 2 * READ  # the well is full, not only the first path
-    assert flattened(_layout(7), levels, two) == {"flat-6"}
+    assert flattened(_layout(7), levels, two, {}) == {"flat-6"}
 
 
 @pytest.mark.parametrize("slope", [0.5, 0.3])
 def test_a_path_that_the_camera_lacks_is_no_full_well(slope: float) -> None:
     signals = [150.0, 300.0, 600.0, 900.0, 1200.0, 1700.0, 2500.0, 3300.0]
-    assert flattened(_layout(8), _two_paths(signals, 1000.0, slope), MODEL) == frozenset()
+    assert flattened(_layout(8), _two_paths(signals, 1000.0, slope), MODEL, {}) == frozenset()
 
 
 def test_levels_are_known_no_better_than_frames_that_wander_allow() -> None:
@@ -132,3 +133,20 @@ def test_a_glow_may_reach_all_of_the_sensor(rate: float, denied: bool) -> None:
     assert (found is not None) is denied
     # A glow of 1 / r has so much where it is least, of 0.06 at its edge and 0.2 of the sensor.
     assert pytest.approx(0.01) == 0.06 * 0.2 / (1 + 0.2)
+
+
+@pytest.mark.parametrize(
+    ("above", "left_out"), [(0.0, True), (0.5, True), (0.9, True), (2.0, False), (20.0, False)]
+)
+def test_a_flat_whose_noise_is_cut_is_left_out_by_its_skewness(
+    above: float, *, left_out: bool
+) -> None:
+    """A full well so many standard deviations above the brightest signal: a third or more stays."""
+    top = SIGNALS[-1]
+    full_well = top + above * (SLOPE * top) ** 0.5
+    rng = np.random.default_rng(2)
+    shot = np.minimum(rng.normal(top, (SLOPE * top) ** 0.5, 20_000), full_well)
+    skewness = {("flat-4", "MONO"): float(scipy.stats.skew(shot))}
+    levels = _levels(SIGNALS, full_well)
+    assert flattened(_layout(5), levels, MODEL, skewness) == ({"flat-4"} if left_out else set())
+    assert flattened(_layout(5), levels, MODEL, {}) == set()

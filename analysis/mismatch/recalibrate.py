@@ -98,7 +98,8 @@ def calibrate(
     """
     switches = tuple(s.upper_dn for s in camera.noise.segment if s.upper_dn is not None)
     left_out = frozenset([interpolated] if interpolated else [])
-    left_out |= flattened(layout, seen.levels, camera)
+    skewness = {at: own["skewness"][0] for at, own in seen.scalars.items() if "skewness" in own}
+    left_out |= flattened(layout, seen.levels, camera, skewness)
     start = camera.black_level - layout.black_dn
     slopes = [s.slope for s in camera.noise.segment]
     spiky = _spiky(seen.levels)

@@ -21,6 +21,7 @@ _TWINS = {
     "tap_mismatch": ("channel_imbalance",),
     "readout_memory": ("crosstalk", "spatial_filtering"),
     "spatial_filtering": ("readout_memory",),
+    "crosstalk": ("spatial_filtering",),
     "heavy_tailed_read_noise": ("read_noise_spread",),
     "read_noise_spread": ("heavy_tailed_read_noise",),
     "rts": ("read_noise_spread", "heavy_tailed_read_noise"),
@@ -73,10 +74,10 @@ def twin(
 
     Amplifiers of even and odd rows do nearly what greens that differ do to a mosaic whose light
     is of unknown colour: only the noise of each channel tells. Correlations have no side: memory of
-    the sample before may be charge that neighbours exchange, or a filter. Noise that differs from
-    pixel to pixel has heavy tails in all of them together; pixels that jump at every other frame
-    are noisy ones. Where that explains more, and also what
-    the best leaves alone, so much the more.
+    the sample before may be charge that neighbours exchange, or a filter, and such charge a filter,
+    which makes read noise alike, too. Noise that differs from pixel to pixel has heavy tails in all
+    of them together; pixels that jump at every other frame are noisy ones. Where that explains
+    more, and also what the best leaves alone, so much the more.
     """
     others = [kind for kind in _TWINS.get(best.kind, ()) if kind not in vocabulary]
     if not others:

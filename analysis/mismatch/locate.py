@@ -8,6 +8,8 @@ from numpy.typing import NDArray
 from analysis.mismatch.bank.home import TIME, homes, one_sided
 from analysis.mismatch.bank.key import MOSAIC, Key
 from analysis.mismatch.bank.motion import STATISTIC as MOTION
+from analysis.mismatch.bank.movingbands import DETAIL as MOVING_BANDS
+from analysis.mismatch.bank.movingbands import KIND as MOVING_PLACE
 from analysis.mismatch.bank.parts import parts
 from analysis.mismatch.bank.patches import OUTLYING_PATCH, outlying
 from analysis.mismatch.bank.standing import NAME as FIXED_WAVE
@@ -28,6 +30,7 @@ _ROOTS = 2e-3  # of a ratio: 0.6 % of the finer mean square
 _PATTERNS = frozenset(f"fixed_{part}_variance" for part in ("pixel", "row", "column", "smooth"))
 _NO_PATTERN = 1.02  # cube root of a ratio of mean squares: 6 % above noise alone
 _EDGE = 16  # lines at an edge: a decay is seen there
+_BANDS = {"light": "rows of light", MOVING_BANDS: MOVING_PLACE}  # where their peak is
 _FLOORS = {
     "pixel_variance": 1e-3,
     "skewness": 1e-3,
@@ -223,7 +226,7 @@ def _frequency(
         return top * (name != "rows"), top * (name != "columns")
     kind = {
         "spectral_peak": f"spectrum, {key.detail}" if key.detail else "spectrum",
-        "row_spectrum_peak": "rows of light" if key.detail == "light" else "rows",
+        "row_spectrum_peak": _BANDS.get(key.detail, "rows"),
         FIXED_WAVE: f"{FIXED_WAVE}, {key.scope}",
     }.get(statistic)
     peak = seen.peaks.get((key.channel, kind or ""))

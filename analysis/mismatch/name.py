@@ -394,7 +394,7 @@ class Search(Fitted):
         if why != NEEDLESS or (own := named.proposal) is None:
             return False
         gain = gained(state, bare, own.effect, replicates_for(self.setting, [own.effect]))
-        return gain - own.price >= self._least(bare, named.kind)
+        return max(gain, self._shown(own.effect)) - own.price >= self._least(bare, named.kind)
 
     def _judge(self, state: State) -> Judge:
         return Judge(state, lambda named: self.without(state, named), self.setting.nulls)

@@ -21,6 +21,7 @@ from analysis.mismatch.predict import Predictor, Reference
 from analysis.mismatch.recalibrate import Calibrated, calibrate
 from analysis.mismatch.replicates import Replicates, known, replicates, same_kinds
 from analysis.mismatch.simulations import Simulations
+from analysis.mismatch.steadybands import unknown_advances
 from analysis.mismatch.touches import ALL_SUMS
 from analysis.mismatch.vector import Vector, vector
 from dsis.camera import Camera
@@ -164,6 +165,7 @@ class State:
         own = vector(layout, seen, calibrated.residual)
         null = null_of(layout, of_model.vectors, own, of_model.unsure)
         untold = unknown_combs(calibrated.model.camera, layout, own.keys)
+        untold |= unknown_advances(calibrated.model.camera, own.keys)
         null = replace(null, known=null.known & ~untold)
         z, chances = tested(layout, null, own)
         simulations = Simulations(

@@ -13,6 +13,9 @@ from analysis.mismatch.bank.coherent import SpectrumSums
 from analysis.mismatch.bank.common import common
 from analysis.mismatch.bank.linemeans import Axis, LineMeans, line_means
 from analysis.mismatch.bank.maps import PatternSums, Regressors
+from analysis.mismatch.bank.movingbands import KIND as MOVING_PLACE
+from analysis.mismatch.bank.movingbands import LABEL as MOVING
+from analysis.mismatch.bank.movingbands import MovingBands
 from analysis.mismatch.bank.peaks import Peak
 from analysis.mismatch.bank.periods import NUMBER, PLACE, Periods, PeriodSums
 from analysis.mismatch.bank.persistent import VarianceSums
@@ -119,6 +122,9 @@ class SensorSums:
         self.shape = (layout.rows, layout.columns)
         self.common: dict[str, Mapping[str, Number]] = {}
         self.bands = Bands(layout.rows, layout.sites)
+        self.numbers_of = {e.name: e.numbers for e in layout.uniform}
+        last = max((max(own, default=0) for own in self.numbers_of.values()), default=0)
+        self.moving = MovingBands(layout.rows, layout.sites, last)
         self.waves = WaveSums(self.shape, 1 + self.mosaic, taken=SPECTRA in made)
         self.periods = PeriodSums(self.shape, 1 + self.mosaic)
         self.memory = CarryOverSums()
@@ -146,8 +152,9 @@ class SensorSums:
         expected = {name: self.layout.variance_dn2[place] for name, place in places.items()}
         self.waves.add(one.lines, found, expected)
         self.periods.add(one.cells, *of_sensor(found, expected))
+        signals = {name: self.layout.signal_dn[place] for name, place in places.items()}
+        self.moving.add(found, expected, signals, self.numbers_of[one.exposure])
         if self.mosaic:
-            signals = {name: self.layout.signal_dn[place] for name, place in places.items()}
             sites = self.layout.sites
             self.common[one.exposure] = common(found, signals, one.frames, sites)
             self.bands.add(found, expected, signals, one.frames)
@@ -160,11 +167,12 @@ class SensorSums:
         """Return spectra and memories of the whole sensor."""
         own = self.bands.numbers() if self.mosaic else {}
         waves = {"spectral_peak": self.waves.number(), **self.waves.odd_lags()}
-        waves[NUMBER] = self.periods.number()
+        waves |= {NUMBER: self.periods.number(), MOVING: self.moving.number()}
         return {**own, **self.memory.numbers(), **waves}
 
     def peaks(self) -> dict[str, Peak]:
         """Return where its spectra are largest, by kind."""
         own = self.bands.peaks() if self.mosaic else {}
         whole = {"spectrum": self.waves.peak(), PLACE: self.periods.peak()}
+        whole[MOVING_PLACE] = self.moving.peak()
         return {**own, **{kind: peak for kind, peak in whole.items() if peak is not None}}

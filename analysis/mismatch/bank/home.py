@@ -11,6 +11,7 @@ from analysis.mismatch.bank.common import SIGNS
 from analysis.mismatch.bank.edges import names as edge_names
 from analysis.mismatch.bank.framenoise import NAME as FRAME_NOISE
 from analysis.mismatch.bank.key import MOSAIC, Key
+from analysis.mismatch.bank.movingbands import DETAIL as MOVING_BANDS
 from analysis.mismatch.bank.parts import STANDING_OUT
 from analysis.mismatch.bank.patches import OUTLYING_PATCH, SIZES
 from analysis.mismatch.bank.periods import FEW_PIXELS
@@ -80,6 +81,7 @@ _POOLED = frozenset(
         *(("patch_variance", "all", f"{size} pixels") for size in PATCHES),
         ("row_spectrum_peak", "all", ""),
         ("row_spectrum_peak", "all", "light"),
+        ("row_spectrum_peak", "all", MOVING_BANDS),
         ("column_spectrum_peak", "all", "colour"),
         ("column_spectrum_peak", "all", ""),
         ("slow_row_variance", "all", ""),

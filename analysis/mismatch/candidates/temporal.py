@@ -8,6 +8,8 @@ import numpy as np
 
 from analysis.mismatch.bank import periods
 from analysis.mismatch.bank.coherent import RANKS, line_name
+from analysis.mismatch.bank.movingbands import KIND as MOVING_PLACE
+from analysis.mismatch.bank.movingbands import LABEL as MOVING
 from analysis.mismatch.bank.peaks import Peak
 from analysis.mismatch.bank.scalars import UNKNOWN
 from analysis.mismatch.candidates.candidate import Candidate, Proposal, measured, proposals
@@ -28,7 +30,11 @@ _SLOW = ("row_variance", "slow_row_variance", "row_correlation", "line_correlati
          "frame_variance", "row_spectrum_peak", "column_variance",
          "column_spectrum_peak")  # fmt: skip
 _CLEAR = 3.0  # standard errors of what columns vary by
-_BANDS = {"rows of light": "row_spectrum_peak of light", "rows": "row_spectrum_peak"}
+_BANDS = {
+    "rows of light": "row_spectrum_peak of light",
+    MOVING_PLACE: MOVING,
+    "rows": "row_spectrum_peak",
+}
 _PERSISTS = 1.0  # of log-likelihood: more than a parameter gains by chance (Akaike, 1974)
 _TINY = 1e-300
 _WAVES = 64  # a row: means over rows have next to nothing of shorter ones
@@ -78,9 +84,9 @@ def _flicker(clues: Clues) -> Sequence[Proposal]:
 
 
 def _line_flicker(clues: Clues) -> Sequence[Proposal]:
-    """Start from the clearer of two peaks: of bands that grow with light, or are alike in DN.
+    """Start from the clearest of peaks: of bands that grow with light, move on, or are alike in DN.
 
-    How high a peak is tells nothing of where it is: no trial finds the right one of two.
+    How high a peak is tells nothing of where it is: no trial finds the right one of several.
     """
     found = {
         kind: own

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
-from math import inf, isfinite, nan, sqrt
+from math import inf, isfinite, log, nan, sqrt
 
 import numpy as np
 
@@ -27,6 +27,7 @@ _LEAST = 0.01  # of a signal: with the above, half a thousandth of it is as good
 _SAME = 0.05  # of an error: the fit has settled
 _CLOSER = 0.3  # a round's change beside that of the one before, unless two have shown it
 _SWITCH_DEVIANCE = 12.0  # by which another gap must fit better before the switch is moved
+_FREE = 5  # numbers of two lines and a switch
 _APART = 1.005  # ratio of signals from which they are two levels
 
 
@@ -300,20 +301,26 @@ def _moved(
     fit: BaseFit,
     fitted: Callable[[tuple[float, ...]], BaseFit],
 ) -> tuple[float, ...]:
-    """Return the switch; moved to another gap between levels where that fits far better."""
+    """Return the switch; moved to another gap between levels where that fits far better.
+
+    Beside how far variances scatter about the better one: codes of uneven widths, say, make them.
+    """
     signals = sorted(set(fit.signal_dn.values()))
 
+    def misfits(switch: float) -> list[float]:
+        return [
+            levels[place].dof / 2 * log(levels[place].variance_dn2 / expected) ** 2
+            for place, expected in fitted((switch,)).expected_dn2.items()
+            if place[0] not in left_out and levels[place].variance_dn2 > 0 and expected > 0
+        ]
+
     def deviance(switch: float) -> float:
-        total = 0.0
-        for place, expected in fitted((switch,)).expected_dn2.items():
-            level = levels[place]
-            if place[0] in left_out or level.variance_dn2 <= 0 or expected <= 0:
-                continue
-            total += level.dof / 2 * float(np.log(level.variance_dn2 / expected)) ** 2
-        return total
+        return sum(misfits(switch))
 
     # Both greens of an exposure are one level; a switch may part its colours.
     gaps = [sqrt(max(a, b / 100) * b) for a, b in pairwise(signals) if b > _APART * a and b > 1.0]
     here = deviance(switches[0])
     best = min(gaps, key=deviance, default=switches[0])
-    return (best,) if deviance(best) < here - _SWITCH_DEVIANCE else switches
+    there = misfits(best)
+    scatter = max(sum(there) / max(len(there) - _FREE, 1), 1.0)
+    return (best,) if sum(there) < here - _SWITCH_DEVIANCE * scatter else switches

@@ -17,4 +17,9 @@ def test_the_brightest_exposure_is_looked_at(levels: int, frames: int) -> None:
         assert sorted(sum(parts, ())) == list(range(len(exposure.frames)))
     brightest = max(recording.of_kind("flat"), key=lambda e: e.light or e.exposure_time_s)
     assert split.development.get(brightest.name)
-    assert bool(split.locked) == (frames >= 6 or levels >= 4)
+    assert bool(split.locked) == (frames >= 4 or levels >= 4)
+    # Two darks: where they have few frames some of each are locked, for no other are.
+    assert ("dark-0" in split.locked) == ("dark-1" in split.locked) == (frames >= 4)
+    if frames == 5:
+        assert split.locked["dark-0"] == (4,)
+        assert ("flat-0" in split.locked) == (levels < 4)

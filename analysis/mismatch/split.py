@@ -2,8 +2,10 @@
 
 Frames are split by number in alternating blocks (train, select, train, locked), so that slow drift
 is in all parts. Exposures of fewer than six frames are given whole to one part; the brightest is
-not locked, for no other shows where a full well ends or what a long exposure gathers. One flat
-level is left out of the re-calibration, so that the line's interpolation is tested.
+not locked, for no other shows where a full well ends or what a long exposure gathers. Where of few
+darks, or flats, none would be locked, the last frame of each that has four or more is: read noise
+alone is proven nowhere else. One flat level is left out of the re-calibration, so that the line's
+interpolation is tested.
 """
 
 from collections.abc import Collection, Mapping
@@ -12,6 +14,7 @@ from dataclasses import dataclass, replace
 from dsis.recording import RecordedExposure, Recording
 
 LEAST_FRAMES = 6
+_LEAST_SPREAD = 4  # frames, of which three are left to look at
 _BLOCKS = 16  # about so many blocks in a long exposure
 _ORDER = (0, 1, 0, 2)  # train, select, train, locked
 _LOCKED = 2
@@ -73,8 +76,14 @@ class Split:
                 e for e in recording.exposures if e.kind == kind and len(e.frames) < LEAST_FRAMES
             ]
             given = _whole(len(few))
+            locked = {e.name for e in recording.of_kind(kind)} & parts[_LOCKED].keys()
+            spread = kind != "scene" and not locked and _LOCKED not in given
             for own, exposure in zip(given, sorted(few, key=_brightness), strict=True):
-                parts[own][exposure.name] = tuple(range(len(exposure.frames)))
+                numbers = tuple(range(len(exposure.frames)))
+                if spread and len(numbers) >= _LEAST_SPREAD:
+                    parts[_LOCKED][exposure.name] = numbers[-1:]
+                    numbers = numbers[:-1]
+                parts[own][exposure.name] = numbers
         return cls(parts[0], parts[1], parts[2], _spared(recording))
 
 

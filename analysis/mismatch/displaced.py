@@ -17,6 +17,7 @@ from analysis.mismatch.bylevel import otherwise_by_level
 from analysis.mismatch.candidates.response import skewness_below
 from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.fewlines import of_few_lines
+from analysis.mismatch.framelag import alike_without_light
 from analysis.mismatch.gathered import gathered
 from analysis.mismatch.latelight import of_late_light
 from analysis.mismatch.layout import Place
@@ -60,8 +61,8 @@ def displaced(state: State, kind: str, mean: Array, without: Array | None = None
     counted photons and amplifiers of greens, by how much levels show them; of noise of whole lines,
     how alike samples along them are; of greens that differ, what other colours share with them; of
     frames that move as a whole, whether their parts do so alike. Of widths of codes, whether it is
-    codes that never occur which make them differ; of memory, whether samples are alike at other
-    lags as well; of pixels, whether those side by side do alike.
+    codes that never occur which make them differ; of lag, whether darks are alike; of memory,
+    whether samples are alike at other lags as well; of pixels, whether those side by side do alike.
 
     Parameters
     ----------
@@ -95,6 +96,7 @@ def displaced(state: State, kind: str, mean: Array, without: Array | None = None
     )
     denial = denial or of_few_lines(state, kind, without, mean) or of_late_light(state, kind)
     denial = denial or shared_otherwise(state, kind, without)
+    denial = denial or alike_without_light(state, kind, without)
     return denial or no_brighter_alike(state, kind, without)
 
 

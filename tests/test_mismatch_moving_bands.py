@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from analysis.mismatch.bank.key import Key
 from analysis.mismatch.bank.movingbands import DETAIL, MovingBands
 from analysis.mismatch.bank.peaks import largest_line
-from analysis.mismatch.steadybands import unknown_advances
+from analysis.mismatch.untold import untold_order
 from dsis.cfa import Cfa
 from dsis.effects import registry
 from dsis.measures import Accumulator
@@ -81,5 +81,5 @@ def test_what_is_no_series_of_lit_frames_says_nothing() -> None:
 def test_a_model_with_bands_does_not_say_how_they_move_on() -> None:
     keys = [Key("row_spectrum_peak", "all", "", "MONO", detail) for detail in ("light", DETAIL)]
     flicker = registry()["line_flicker"](depth_percent=0.1, cycles_per_frame=3.0)
-    assert unknown_advances(camera(flicker), keys).tolist() == [False, True]
-    assert not unknown_advances(camera(), keys).any()
+    assert untold_order(camera(flicker), keys).tolist() == [False, True]
+    assert not untold_order(camera(), keys).any()

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.candidates import CANDIDATES, measured
+from analysis.mismatch.codegain import gain_of_codes
 from analysis.mismatch.contradicted import refuted
 from analysis.mismatch.credited import joined, kept_up
 from analysis.mismatch.displaced import displaced
@@ -138,7 +139,7 @@ class Search(Fitted):
             stays = any(other.name in why for other in self.named)
             if why.startswith(LITTLE) or (why.startswith(INSTEAD) and not stays):
                 found[one.name] = self.refused.pop(one.name)
-                line = frequency_of(None if one.proposal is None else one.proposal.effect)
+                line = frequency_of(one.effect)
                 self.settled = [own for own in self.settled if own != (one.kind, line)]
         return found
 
@@ -181,14 +182,12 @@ class Search(Fitted):
     def _take(self, named: Named) -> None:
         self.named.append(named)
         self.sized = set()
-        line = frequency_of(None if named.proposal is None else named.proposal.effect)
-        if line is not None:
+        if (line := frequency_of(named.effect)) is not None:
             self.settled += [(kind, line) for kind in sorted(LINES)]
 
     def _refuse(self, kind: str, effect: Effect | None, why: str) -> None:
         self.refused[instance(kind, effect)] = why
-        line = frequency_of(effect)
-        if line is not None:
+        if (line := frequency_of(effect)) is not None:
             self.settled.append((kind, line))
 
     def drop(self, state: State, named: Named, why: str) -> State:
@@ -197,7 +196,7 @@ class Search(Fitted):
         return self._asked_of_all(self._dropped(bare, named, why))
 
     def _dropped(self, bare: State, named: Named, why: str) -> State:
-        self._refuse(named.kind, None if named.proposal is None else named.proposal.effect, why)
+        self._refuse(named.kind, named.effect, why)
         self.named.remove(named)
         self.named = kept_up(self.named, bare.camera, self.setting.given)
         self.memory.gains.clear()  # what it hid may gain more than before
@@ -356,8 +355,9 @@ class Search(Fitted):
         return denial is None
 
     def _shown(self, effect: Effect) -> float:
-        """Return what whole frames gain by a line; minus infinity: nothing, or it is none."""
-        return -np.inf if self.lines is None else self.lines.gain(effect)
+        """Return what whole frames gain by a line, or codes; minus infinity: nothing of either."""
+        by_codes = gain_of_codes(self.setting.seen, effect)
+        return by_codes if self.lines is None else max(by_codes, self.lines.gain(effect))
 
     def denied(self, state: State) -> tuple[Named, str] | None:
         """Return the effect that the recording denies most, and why; None: it denies none."""

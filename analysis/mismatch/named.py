@@ -57,9 +57,14 @@ class Named:
     switch_dn: float = float("nan")
 
     @property
+    def effect(self) -> Effect | None:
+        """The effect; None: it is a second read-out segment."""
+        return None if self.proposal is None else self.proposal.effect
+
+    @property
     def name(self) -> str:
         """Its kind, and of a line its frequency, of a decay its edge: there may be several."""
-        return instance(self.kind, None if self.proposal is None else self.proposal.effect)
+        return instance(self.kind, self.effect)
 
     @property
     def measured(self) -> bool:
@@ -79,7 +84,7 @@ def unclear(named: Named) -> str:
     Asked of what draws nothing at random, whose size is known as a mean is. Where an error is
     unknown, or is that of a shape which is sure itself, nothing is said.
     """
-    effect = None if named.proposal is None else named.proposal.effect
+    effect = named.effect
     if named.proposal is None or effect is None or effect.draws:
         return ""
     free = named.proposal.free

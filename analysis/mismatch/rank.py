@@ -41,7 +41,7 @@ _COSINE = 0.5  # of what two predictions change, from which they change the same
 _SPARSE = 4  # times as many simulations
 _BY_FRAME = frozenset({"frame_variance"})
 _BY_JUMPS = frozenset({"rts"})
-_BY_FRAMES = _BY_JUMPS | LINES
+_BY_FRAMES = _BY_JUMPS | LINES | {"adc_dnl"}  # codes in step with powers of two
 # A sign: half of the pairs of frames show nothing, half show it twice. A band: one bin's phase.
 # Pink noise and bands of rows: most of it in a frame's mean and in the first few bins. Gains that
 # neighbours share: in few patches. Hot pixels: the few brightest ones.

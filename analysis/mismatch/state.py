@@ -21,8 +21,8 @@ from analysis.mismatch.predict import Predictor, Reference
 from analysis.mismatch.recalibrate import Calibrated, calibrate
 from analysis.mismatch.replicates import Replicates, known, replicates, same_kinds
 from analysis.mismatch.simulations import Simulations
-from analysis.mismatch.steadybands import unknown_advances
 from analysis.mismatch.touches import ALL_SUMS
+from analysis.mismatch.untold import untold_order
 from analysis.mismatch.vector import Vector, vector
 from dsis.camera import Camera
 from dsis.effects import Effect
@@ -165,7 +165,7 @@ class State:
         own = vector(layout, seen, calibrated.residual)
         null = null_of(layout, of_model.vectors, own, of_model.unsure)
         untold = unknown_combs(calibrated.model.camera, layout, own.keys)
-        untold |= unknown_advances(calibrated.model.camera, own.keys)
+        untold |= untold_order(calibrated.model.camera, own.keys)
         null = replace(null, known=null.known & ~untold)
         z, chances = tested(layout, null, own)
         simulations = Simulations(

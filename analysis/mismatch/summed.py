@@ -9,6 +9,9 @@ from numpy.typing import NDArray
 
 from analysis.mismatch.bank.bands import Bands
 from analysis.mismatch.bank.carryover import CarryOver, CarryOverSums
+from analysis.mismatch.bank.codephase import KIND as CODE_PLACE
+from analysis.mismatch.bank.codephase import LABEL as CODE_PHASE
+from analysis.mismatch.bank.codephase import CodePhases
 from analysis.mismatch.bank.coherent import SpectrumSums
 from analysis.mismatch.bank.common import common
 from analysis.mismatch.bank.linemeans import Axis, LineMeans, line_means
@@ -127,7 +130,7 @@ class SensorSums:
         self.moving = MovingBands(layout.rows, layout.sites, last)
         self.waves = WaveSums(self.shape, 1 + self.mosaic, taken=SPECTRA in made)
         self.periods = PeriodSums(self.shape, 1 + self.mosaic)
-        self.memory = CarryOverSums()
+        self.memory, self.codes = CarryOverSums(), CodePhases()
 
     def looked(self, exposure: str, frames: int, seen: Iterable[NDArray[np.generic]]) -> "Looked":
         """Return what an exposure's frames show; nothing is summed yet."""
@@ -154,6 +157,7 @@ class SensorSums:
         self.periods.add(one.cells, *of_sensor(found, expected))
         signals = {name: self.layout.signal_dn[place] for name, place in places.items()}
         self.moving.add(found, expected, signals, self.numbers_of[one.exposure])
+        self.codes.add(found)
         if self.mosaic:
             sites = self.layout.sites
             self.common[one.exposure] = common(found, signals, one.frames, sites)
@@ -168,11 +172,12 @@ class SensorSums:
         own = self.bands.numbers() if self.mosaic else {}
         waves = {"spectral_peak": self.waves.number(), **self.waves.odd_lags()}
         waves |= {NUMBER: self.periods.number(), MOVING: self.moving.number()}
+        waves[CODE_PHASE] = self.codes.number()
         return {**own, **self.memory.numbers(), **waves}
 
     def peaks(self) -> dict[str, Peak]:
         """Return where its spectra are largest, by kind."""
         own = self.bands.peaks() if self.mosaic else {}
         whole = {"spectrum": self.waves.peak(), PLACE: self.periods.peak()}
-        whole[MOVING_PLACE] = self.moving.peak()
+        whole |= {MOVING_PLACE: self.moving.peak(), CODE_PLACE: self.codes.peak()}
         return {**own, **{kind: peak for kind, peak in whole.items() if peak is not None}}

@@ -6,6 +6,7 @@ one side. What may have either sign (a step, a ratio of gains, a memory) is look
 
 from collections.abc import Mapping, Sequence
 
+from analysis.mismatch.bank.codephase import DETAIL as CODE_PHASE
 from analysis.mismatch.bank.coherent import PATCHES
 from analysis.mismatch.bank.common import SIGNS
 from analysis.mismatch.bank.edges import names as edge_names
@@ -82,6 +83,7 @@ _POOLED = frozenset(
         ("row_spectrum_peak", "all", ""),
         ("row_spectrum_peak", "all", "light"),
         ("row_spectrum_peak", "all", MOVING_BANDS),
+        ("code_imbalance", "all", CODE_PHASE),
         ("column_spectrum_peak", "all", "colour"),
         ("column_spectrum_peak", "all", ""),
         ("slow_row_variance", "all", ""),
@@ -89,7 +91,8 @@ _POOLED = frozenset(
     }
 )
 _SPECTRA = frozenset({"spectral_peak", "row_spectrum_peak", "column_spectrum_peak",
-                      "patch_variance", "slow_row_variance", "row_correlation"})  # fmt: skip
+                      "patch_variance", "slow_row_variance", "row_correlation",
+                      "code_imbalance"})  # fmt: skip
 _SHARED = frozenset({"fixed_row_variance", "fixed_column_variance", "fixed_smooth_variance",
                      "fixed_smooth_tilt", "fixed_smooth_falloff", "fixed_edge",
                      "fixed_patch_variance", OUTLYING_PATCH, "half_seam",

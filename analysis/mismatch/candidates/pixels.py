@@ -7,6 +7,7 @@ from math import log, sqrt
 
 import numpy as np
 
+from analysis.mismatch.bank.codephase import KIND as CODES
 from analysis.mismatch.candidates.candidate import Candidate, Proposal, proposals
 from analysis.mismatch.candidates.steps import absent, fractional_step
 from analysis.mismatch.clues import Clues
@@ -129,6 +130,10 @@ def _step_of_most(clues: Clues) -> int:
 def _dnl(clues: Clues) -> Sequence[Proposal]:
     values = [v for v, _ in clues.excess("code_imbalance").values()]
     rms = float(np.median(values)) if values else 0.0
+    in_step = max(
+        (p.power for (_, kind), p in clues.seen.peaks.items() if kind == CODES), default=0
+    )
+    rms = max(rms, in_step)
     if rms <= 0:
         rms = 0.3
     return proposals("adc_dnl", ["rms_lsb"], rms_lsb=min(max(rms, 0.02), 1.5))

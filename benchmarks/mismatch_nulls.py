@@ -27,6 +27,8 @@ from planter.layout import BAYER
 from planter.ledger import versions, work_through
 from planter.tables import share, table
 
+from dsis.errors import InputError
+
 Task = dict[str, Any]
 ALLOWED = 0.01
 
@@ -71,7 +73,10 @@ def judged(task: Task) -> dict[str, Any]:
             other = folder
             if origin == "fitted to another":
                 other = plant(folder / "calibration", replace(case, seed=case.seed + 2**33))
-            fit_into(folder, other)
+            try:
+                fit_into(folder, other)
+            except InputError:  # too few levels for a line: the camera stays as it is
+                origin = "true"
         values = diagnose(folder, finder=task["finder"], seed=task["number"])
     finally:
         if not task["keep"]:

@@ -72,11 +72,13 @@ def test_narrow_noise_and_clipped_codes_say_nothing() -> None:
 
 
 def test_what_codes_gain_is_that_of_uneven_widths_alone() -> None:
-    seen: Any = SimpleNamespace(pooled={"": {LABEL: (8.0, 1.0)}, "MONO": {}})
-    assert gain_of_codes(seen, registry()["adc_dnl"](rms_lsb=0.1)) == pytest.approx(30.0)
-    assert gain_of_codes(seen, registry()["prnu"](sigma_percent=1.0)) == -np.inf
-    unknown: Any = SimpleNamespace(pooled={"": {LABEL: (np.nan, 1.0)}})
-    assert gain_of_codes(unknown, registry()["adc_dnl"](rms_lsb=0.1)) == -np.inf
+    def seen(score: float) -> Any:
+        pooled = {"": {LABEL: (score, 1.0)}, "MONO": {}}
+        return SimpleNamespace(seen=SimpleNamespace(pooled=pooled))
+
+    assert gain_of_codes(seen(8.0), registry()["adc_dnl"](rms_lsb=0.1)) == pytest.approx(30.0)
+    assert gain_of_codes(seen(8.0), registry()["prnu"](sigma_percent=1.0)) == -np.inf
+    assert gain_of_codes(seen(np.nan), registry()["adc_dnl"](rms_lsb=0.1)) == -np.inf
     keys = [Key("code_imbalance", "all", "", "MONO", DETAIL), Key("code_imbalance", "exposure")]
     assert untold_order(camera(registry()["adc_dnl"](rms_lsb=0.1)), keys).tolist() == [True, False]
 

@@ -1,6 +1,7 @@
 """An effect that a recording would call for again at once is not dropped as needless."""
 
 from dataclasses import replace
+from math import inf
 from types import SimpleNamespace
 from typing import Any
 
@@ -26,7 +27,9 @@ def test_what_a_state_without_an_effect_would_take_in_is_needed(there: bool) -> 
     state, bare = state_of(recording, camera(ROW_NOISE)), state_of(recording, camera())
     gain = gained(state, bare, ROW_NOISE, 2)
     assert gain > 50 if there else gain == 0
-    search: Any = SimpleNamespace(setting=state.setting, _least=lambda *_: SURE_GAIN)
+    search: Any = SimpleNamespace(
+        setting=state.setting, _least=lambda *_: SURE_GAIN, _shown=lambda _: -inf
+    )
     named = Named("row_noise", Proposal(ROW_NOISE, ("sigma_dn",)), {}, gain, ())
     for why, left, needed in (
         (NEEDLESS, (), there),

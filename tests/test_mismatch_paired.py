@@ -18,7 +18,7 @@ SHARED = 0.12
 
 
 def recording(*, paired: bool) -> InMemory:
-    """Return frames that share noise with the one before: every second, or each."""
+    """Return frames that share with the one before: every second noise, or each charge."""
     draws = np.random.default_rng(6)
     like = recorded(BASE, 1, rows=64, columns=80, levels=(250.0, 900.0))
     assert like.stacks is not None
@@ -30,8 +30,11 @@ def recording(*, paired: bool) -> InMemory:
             noise = white[1:].copy()
             noise[1::2] = SHARED * white[1::2] + (1 - SHARED**2) ** 0.5 * white[2::2]
         else:
-            noise = (1 - SHARED) * white[1:] + SHARED * white[:-1]
-            noise /= ((1 - SHARED) ** 2 + SHARED**2) ** 0.5
+            charge = (1 - SHARED) * white[1:] + SHARED * white[:-1]
+            charge /= ((1 - SHARED) ** 2 + SHARED**2) ** 0.5
+            read = draws.standard_normal(charge.shape)  # darks keep nothing
+            noise = charge * np.sqrt(SLOPE * signal) + read * np.sqrt(INTERCEPT)
+            noise /= np.sqrt(SLOPE * signal + INTERCEPT)
         sd = np.sqrt(SLOPE * signal + INTERCEPT)
         stacks[exposure.name] = np.rint(BLACK + signal + noise * sd).astype(np.uint16)
     return replace(like, stacks=stacks)

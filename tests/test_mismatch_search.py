@@ -46,7 +46,7 @@ def _ranked(kind: str, gain: float, *changed: int) -> Any:
         gain=gain,
         polished=SimpleNamespace(mean=mean, effects=(None,)),
         mean=mean,
-        proposal=SimpleNamespace(effect=None),
+        proposal=SimpleNamespace(effect=None, best_of=1),
     )
 
 

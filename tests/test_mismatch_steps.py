@@ -47,11 +47,11 @@ def test_a_step_is_told_by_the_codes_it_leaves_out(
     middles = [_middle(codes, level, level + 40 + level // 60) for level in levels]
     never = absent(middles)
     found = fractional_step(middles, never)
-    if found is None:  # too few codes are left out
-        assert len(never) < 8
+    if found is None:  # too few codes are left out of exposures that lie far apart
+        assert len(never) < 8 * len(levels)
         return
     seen = {c for one in middles for c in range(one.first, one.last + 1)}
-    made = {floor(found[1] + found[0] * n + 0.5) for n in range(int(10_000 / found[0]) + 2)}
+    made = {round(found[1] + found[0] * n) for n in range(int(10_000 / found[0]) + 2)}
     assert len((made & seen) ^ (codes & seen)) <= 0.01 * len(seen)
 
 
@@ -62,7 +62,7 @@ def test_plain_steps_are_told_as_they_are(step: float, phase: float) -> None:
     found = fractional_step(middles, absent(middles))
     assert found is not None
     assert found[0] == step
-    made = {floor(found[1] + step * n + 0.5) for n in range(3000)}
+    made = {round(found[1] + step * n) for n in range(3000)}
     assert made & set(range(60, 3060)) == codes & set(range(60, 3060))
 
 
@@ -84,7 +84,7 @@ def test_moments_of_whole_codes_of_steps(step: float, phase: float, sigma: float
     rng = np.random.default_rng(2)
     mean, drawn = 800.3, rng.standard_normal(2_000_000)
     drawn = mean + sigma * (drawn - drawn.mean()) / drawn.std()
-    codes = np.floor(phase + step * np.rint((drawn - phase) / step) + 0.5)
+    codes = np.rint(phase + step * np.rint((drawn - phase) / step))
     shift, added = rounded(mean, sigma**2, 4095.0, step, phase)
     assert codes.mean() == pytest.approx(mean + shift, abs=0.01)
     assert codes.var() == pytest.approx(sigma**2 + added, rel=0.005)
@@ -103,7 +103,7 @@ def test_the_effect_gives_whole_codes_of_its_steps(step: float, phase: float) ->
     exposure = Exposure(grid, 0, draw, draw, volts, own.read_out, lambda image, _: image)
     codes = effect.apply(volts, exposure) + np.float32(64.3)
     number = np.rint((volts.astype(np.float64) + 64.3 - phase) / step)
-    expected = np.floor(phase + step * np.maximum(number, 0) + 0.5)
+    expected = np.rint(phase + step * np.maximum(number, 0))
     assert np.mean(np.abs(codes - expected) < 1e-3) > 0.999  # float32 at the edges of steps
 
 

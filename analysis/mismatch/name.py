@@ -356,7 +356,7 @@ class Search(Fitted):
 
     def _shown(self, effect: Effect) -> float:
         """Return what whole frames gain by a line, or codes; minus infinity: nothing of either."""
-        by_codes = gain_of_codes(self.setting.seen, effect)
+        by_codes = gain_of_codes(self.setting, effect)
         return by_codes if self.lines is None else max(by_codes, self.lines.gain(effect))
 
     def denied(self, state: State) -> tuple[Named, str] | None:

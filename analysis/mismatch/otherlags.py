@@ -33,7 +33,7 @@ def other_lags(state: State, kind: str, mean: Array, without: Array) -> Denial |
         return None
     keys = state.vector.keys
     known = state.null.known & np.isfinite(mean) & np.isfinite(without)
-    own = np.array([key.statistic == _STATISTIC for key in keys]) & known
+    own = np.array([key.statistic == _STATISTIC for key in keys], np.bool_) & known
     if not own.any():
         return None
     change = np.where(own, mean - without, 0.0) / state.null.sd

@@ -49,7 +49,7 @@ def _whole(
     mean_dn: float, variance_dn2: float, white_dn: float, step_dn: float, phase_dn: float
 ) -> tuple[float, float]:
     """Return what whole codes add to the mean and the variance of steps that are none."""
-    if step_dn.is_integer() and phase_dn.is_integer():
+    if float(step_dn).is_integer() and float(phase_dn).is_integer():
         return 0.0, 0.0
     sigma = max(variance_dn2, 1e-12) ** 0.5 / step_dn
     numbers, share = _codes((mean_dn - phase_dn) / step_dn, sigma, (white_dn - phase_dn) // step_dn)

@@ -15,10 +15,10 @@ class Quantisation(Effect):
     """Codes come in steps: only phase + n step occur, n = 0, 1 .., at both ends too.
 
     c = phase + step min(round((v + black - phase) / step), floor((white - phase) / step)), no code
-    below the phase; what a fractional step gives is rounded to whole codes, halves up: codes that
-    were multiplied by a digital gain leave some out. The phase is 0 where codes are multiples of
-    the step, and another where black, from which steps were counted, is none. It is below the step
-    and alike in all channels. Where the noise is wider than half a step the variance grows by
+    below the phase; what a fractional step gives is rounded to whole codes, halves to even: codes
+    that were multiplied by a digital gain leave some out. The phase is 0 where codes are multiples
+    of the step, and another where black, from which steps were counted, is none. It is below the
+    step and alike in all channels. Where the noise is wider than half a step the variance grows by
     (step^2 - 1) / 12, the finer rounding to whole codes having been there before.
     """
 
@@ -80,6 +80,6 @@ class Quantisation(Effect):
 
 
 def whole_codes(number: NDArray[np.floating], step: float, phase: float) -> NDArray[np.float64]:
-    """Return the whole codes that steps of any size become, of how many: halves are rounded up."""
-    codes: NDArray[np.float64] = np.floor(phase + step * number.astype(np.float64) + 0.5)
+    """Return the whole codes that steps of any size become, of how many: halves go to even."""
+    codes: NDArray[np.float64] = np.rint(phase + step * number.astype(np.float64))
     return codes

@@ -74,7 +74,7 @@ class Seen:
         return outside.sum(1) + inside.sum(1), phases
 
     def missed(self, step: float, phase: float) -> int:
-        """Return how many codes whole steps from a phase on foretell wrongly, halves rounded up."""
+        """Return how many codes whole steps from a phase on foretell wrongly."""
         most = max(self.there[-1], self.absent[-1])
         made = whole_codes(np.arange(most // step + 2), step, phase)
         return int((~np.isin(self.there, made)).sum() + np.isin(self.absent, made).sum())

@@ -32,8 +32,10 @@ def other_lags(state: State, kind: str, mean: Array, without: Array) -> Denial |
     if kind != _KIND:
         return None
     keys = state.vector.keys
+    if all(key.statistic != _STATISTIC for key in keys):
+        return None
     known = state.null.known & np.isfinite(mean) & np.isfinite(without)
-    own = np.array([key.statistic == _STATISTIC for key in keys], np.bool_) & known
+    own = np.array([key.statistic == _STATISTIC for key in keys]) & known
     if not own.any():
         return None
     change = np.where(own, mean - without, 0.0) / state.null.sd

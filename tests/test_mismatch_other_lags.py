@@ -45,3 +45,9 @@ def test_memory_is_denied_by_what_is_left_at_other_lags(
     state, mean, without = _state(own, others, axis)
     assert (other_lags(state, "readout_memory", mean, without) is not None) is denied
     assert other_lags(state, "crosstalk", mean, without) is None
+
+
+def test_of_memory_that_no_lag_shows_nothing_is_said() -> None:
+    state, _, without = _state(0.0, 10.0, "rows")
+    assert other_lags(state, "readout_memory", without, without) is None
+    assert other_lags(state, "readout_memory", without + 0.3, without) is None

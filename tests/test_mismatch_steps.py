@@ -15,6 +15,7 @@ from analysis.mismatch.rounding import rounded, unrounded
 from dsis.cfa import Cfa
 from dsis.draw import Draw
 from dsis.effects import Exposure, registry
+from dsis.effects.quantisation import whole_codes
 from dsis.grid import PixelGrid
 from dsis.measures import Middle
 from mismatch_recordings import camera
@@ -64,6 +65,23 @@ def test_plain_steps_are_told_as_they_are(step: float, phase: float) -> None:
     assert found[0] == step
     made = {round(found[1] + step * n) for n in range(3000)}
     assert made & set(range(60, 3060)) == codes & set(range(60, 3060))
+
+
+@pytest.mark.parametrize("step", [1.1, 1.25, 1.5, 1.75, 2.5])
+def test_the_steps_of_the_effect_itself_are_told(step: float) -> None:
+    """Its halves go to even: they fit at the ratio itself and nowhere beside it."""
+    codes = {int(code) for code in whole_codes(np.arange(4000), step, 0.0)}
+    middles = [_middle(codes, level, level + 60) for level in (64, 500, 1100, 3000)]
+    assert fractional_step(middles, absent(middles)) == (step, 0.0)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_few_codes_that_are_missing_are_no_step(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    codes = set(range(4000)) - set(rng.choice(np.arange(700, 2900), 12, replace=False).tolist())
+    middles = [_middle(codes, level, level + 700) for level in (700, 1400, 2200)]
+    assert len(absent(middles)) >= 8
+    assert fractional_step(middles, absent(middles)) is None
 
 
 def test_codes_of_a_table_or_of_chance_have_no_step() -> None:

@@ -41,12 +41,15 @@ def other_lags(state: State, kind: str, mean: Array, without: Array) -> Denial |
     change = np.where(own, mean - without, 0.0) / state.null.sd
     left = np.where(own, state.vector.values - mean, 0.0) / state.null.sd
     first = int(np.argmax(np.abs(change)))
-    axis = keys[first].detail.split(" ")[0]
-    others = [
-        float(left[i]) ** 2
-        for i in np.flatnonzero(own)
-        if keys[i].detail.split(" ")[0] == axis and abs(change[i]) < abs(change[first]) / 2
-    ]
-    shown, more = float(change[first]) ** 2, sum(z2 for z2 in others if z2 > _CLEAR**2)
-    share = shown / max(shown + more, 1e-300)
+    if abs(change[first]) < _CLEAR:
+        return None  # lags along lines do not show it
+    axis, lag = keys[first].detail.split(" ")
+    shown = more = 0.0
+    for i in np.flatnonzero(own).tolist():
+        where, number = keys[i].detail.split(" ")
+        if where == axis and number == lag:
+            shown += float(change[i]) ** 2
+        elif where == axis and abs(left[i]) > _CLEAR:
+            more += float(left[i]) ** 2
+    share = shown / (shown + more)
     return Denial(share, "samples are alike at other lags as well") if share < _LEAST else None

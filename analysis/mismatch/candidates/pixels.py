@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import reduce
 from math import log, sqrt
 
@@ -113,7 +114,8 @@ def _quantisation(clues: Clues) -> Sequence[Proposal]:
         found = fractional_step(middles, absent(middles))
         if found is None:
             return []
-        return proposals("quantisation", [], step_dn=found[0], phase_dn=found[1])
+        made = proposals("quantisation", [], step_dn=found[0], phase_dn=found[1])
+        return [replace(one, errors={"step_dn": 0.0, "phase_dn": 0.0}) for one in made]
     phase = Counter(own.phase(step) for own in lattices).most_common(1)[0][0]
     return proposals("quantisation", [], step_dn=float(step), phase_dn=phase)
 

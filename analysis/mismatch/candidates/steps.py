@@ -12,7 +12,7 @@ from dsis.measures import Middle
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
 FEW = 8  # absent codes that a converter of uneven steps may have: fewer tell no step
-_WRONG = 0.01  # of the codes, that a step may foretell wrongly
+_WRONG = 0.01  # of the codes that are absent, or of the others: a step may foretell so many wrongly
 _FINE = (
     0.04  # of what absent codes leave open, by which steps that are tried next part at the far end
 )
@@ -56,8 +56,11 @@ class Seen:
         """How far apart the first and the last are, DN."""
         return float(np.ptp(np.concatenate([self.there, self.absent])))
 
-    def wrong(self, steps: Array) -> tuple[Counts, Array]:
-        """Return how many codes each of some steps foretells wrongly, and its best phase, DN."""
+    def wrong(self, steps: Array, slack: float = 0.0) -> tuple[Counts, Array]:
+        """Return how many codes each of some steps foretells wrongly, and its best phase, DN.
+
+        Those that lie nearer than `slack`, DN, to where codes begin and end count as foretold.
+        """
         size = steps[:, np.newaxis]
         # On a circle of one step codes that occur fill an arc of one code, absent ones the rest.
         few, aside = (self.absent, 0.5) if self.absent.size < self.there.size else (self.there, 0.0)
@@ -69,8 +72,8 @@ class Seen:
         phases = (phases + (low + high) / 2) % steps
         phases[phases >= steps] = 0.0  # of a negative that rounds to none
         there, absent = self._beside(steps, phases)
-        outside = np.abs(there) > 0.5 + _EDGE
-        inside = np.minimum(absent, size - absent) < 0.5 - _EDGE
+        outside = np.abs(there) > 0.5 + _EDGE + slack
+        inside = np.minimum(absent, size - absent) < 0.5 - _EDGE - slack
         return outside.sum(1) + inside.sum(1), phases
 
     def missed(self, step: float, phase: float) -> int:
@@ -89,9 +92,10 @@ class Seen:
 def fractional_step(some: Collection[Middle], never: Collection[int]) -> tuple[float, float] | None:
     """Return step and phase, DN, of codes some of which never occur; None: there is no such step.
 
-    A digital gain of 1.5 makes codes 0, 2, 3, 5, 6 .. of 0, 1, 2, 3, 4: how many are left out tells
-    the step roughly, and which are left out, of exposures ever farther from one another, ever more
-    exactly. It must foretell them but for a hundredth. Of steps that do as well a ratio of small
+    A digital gain of 1.5 makes codes 0, 2, 3, 4, 6 .. of 0, 1, 2, 3, 4, or 0, 2, 3, 5, 6 .. where
+    halves are rounded up, which is a phase of a quarter. How many are left out tells the step
+    roughly, and which are left out, of exposures ever farther from one another, ever more exactly.
+    It must foretell both kinds but for a hundredth. Of steps that do as well a ratio of small
     numbers is taken, and the phase 0.
 
     Parameters
@@ -117,7 +121,7 @@ def fractional_step(some: Collection[Middle], never: Collection[int]) -> tuple[f
         apart = fine * _FINE * arc * step / max(stage.reach, step)
         if sum(high - low for low, high in runs) > _MOST * apart:
             return None
-        runs = list(_likeliest(stage, runs, apart))
+        runs = list(_likeliest(stage, runs, apart, fine * _FINE * arc))
     return _plainest(seen, runs)
 
 
@@ -132,14 +136,17 @@ def _ever_farther(own: Sequence[Middle], never: Collection[int]) -> Iterator[See
 
 
 def _likeliest(
-    seen: Seen, runs: Sequence[tuple[float, float]], apart: float
+    seen: Seen, runs: Sequence[tuple[float, float]], apart: float, slack: float
 ) -> Iterator[tuple[float, float]]:
-    """Return the ranges of steps within some that foretell fewest codes wrongly."""
+    """Return the ranges of steps within some that foretell fewest codes wrongly.
+
+    `slack`: by which steps that are tried part at the far end; halves lie on edges.
+    """
     grids = [low + apart * np.arange(int((high - low) / apart) + 2) for low, high in runs]
     steps = np.concatenate(grids)
     steps = steps[steps > 1]
     pieces = np.array_split(steps, -(-steps.size * seen.size // _AT_ONCE))
-    counts = np.concatenate([seen.wrong(piece)[0] for piece in pieces])
+    counts = np.concatenate([seen.wrong(piece, slack)[0] for piece in pieces])
     best = steps[counts == counts.min()]
     for own in np.split(best, np.flatnonzero(np.diff(best) > 1.5 * apart) + 1):
         yield max(float(own[0]) - apart, 1.0), float(own[-1]) + apart
@@ -172,4 +179,5 @@ def _plainest(seen: Seen, runs: Sequence[tuple[float, float]]) -> tuple[float, f
             tried.append((seen.missed(own, 0.0), 2 * rank, own, 0.0))
             tried.append((seen.missed(own, phase), 2 * rank + 1, own, phase))
     wrong, _, step, phase = min(tried)
-    return (step, phase) if wrong <= _WRONG * seen.size else None
+    few = min(seen.there.size, seen.absent.size)
+    return (step, phase) if wrong <= _WRONG * few else None

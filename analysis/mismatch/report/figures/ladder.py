@@ -93,5 +93,5 @@ def _scale(axes: Axes, values: Sequence[float]) -> None:
         return
     axes.set_xscale("symlog", linthresh=_LINEAR, linscale=0.6)
     axes.xaxis.set_major_locator(SymmetricalLogLocator(base=10, linthresh=_LINEAR))
-    axes.set_xlabel(f"{axes.get_xlabel()} (logarithmic beyond ±{plain(_LINEAR)})")
+    axes.set_xlabel(f"{axes.get_xlabel()}\nlogarithmic beyond ±{plain(_LINEAR)}")
     plain_numbers(axes.xaxis)

@@ -15,7 +15,7 @@ from analysis.mismatch.rounding import rounded, unrounded
 from dsis.cfa import Cfa
 from dsis.draw import Draw
 from dsis.effects import Exposure, registry
-from dsis.effects.quantisation import whole_codes
+from dsis.effects.quantisation import last_step, whole_codes
 from dsis.grid import PixelGrid
 from dsis.measures import Middle
 from mismatch_recordings import camera
@@ -106,10 +106,17 @@ def test_moments_of_whole_codes_of_steps(step: float, phase: float, sigma: float
     shift, added = rounded(mean, sigma**2, 4095.0, step, phase)
     assert codes.mean() == pytest.approx(mean + shift, abs=0.01)
     assert codes.var() == pytest.approx(sigma**2 + added, rel=0.005)
-    if sigma > 0.8 * step:
-        before, variance, *_ = unrounded(codes.mean(), codes.var(), 4095.0, step, phase)
-        assert before == pytest.approx(mean, abs=0.03)
-        assert variance == pytest.approx(sigma**2, rel=0.03)
+    before, variance, *errors = unrounded(mean + shift, sigma**2 + added, 4095.0, step, phase)
+    assert np.isfinite(errors).all()
+    assert before == pytest.approx(mean, abs=1e-3)
+    assert variance == pytest.approx(sigma**2, rel=0.01)
+
+
+def test_the_last_step_is_that_of_the_ratio() -> None:
+    """Floats make 3899.9999 of 4095 / 1.05, which is 3900."""
+    assert last_step(4095.0, 1.05, 0.0) == 3900
+    assert last_step(4095.0, 4.0, 1.0) == 1023
+    assert last_step(4095.0, 1.1, 0.0) == 3722
 
 
 @pytest.mark.parametrize(("step", "phase"), [(1.5, 0.0), (1.1, 0.25), (2.5, 1.0)])

@@ -9,8 +9,9 @@ from analysis.mismatch.candidates import Proposal
 from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.judge import Judge
 from analysis.mismatch.named import Named
+from analysis.mismatch.otherlags import alike
 from analysis.mismatch.state import State
-from analysis.mismatch.unmet import alike, mirrored, unmet
+from analysis.mismatch.unmet import mirrored, unmet
 from dsis.effects import Effect, registry
 from mismatch_recordings import camera, recorded, state_of
 

@@ -14,11 +14,12 @@ from analysis.mismatch.edged import outlined
 from analysis.mismatch.feigned import of_another
 from analysis.mismatch.instance import LINES
 from analysis.mismatch.named import Named
+from analysis.mismatch.otherlags import alike
 from analysis.mismatch.predict import Predictor
 from analysis.mismatch.rank import LEAST_GAIN
 from analysis.mismatch.resolved import locates, resolved
 from analysis.mismatch.state import State
-from analysis.mismatch.unmet import alike, mirrored, unmet
+from analysis.mismatch.unmet import mirrored, unmet
 from dsis.camera import Camera
 
 Array = NDArray[np.float64]

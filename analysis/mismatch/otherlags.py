@@ -1,15 +1,18 @@
-"""Memory of one lag among many that stand out: the largest of them is no lag of its own."""
+"""Memory of one lag among many that are alike or stand out: it is no lag of its own."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.state import State
+from dsis.effects import Effect
+from dsis.effects.readout_memory import ReadoutMemory
 
 Array = NDArray[np.float64]
 _KIND = "readout_memory"
 _STATISTIC = "line_correlation"
 _CLEAR = 4.0  # standard deviations, from which a lag stands out
+_ALIKE = 0.5  # of what it explains, that most other lags must keep to be like it
 _LEAST = 0.5  # of the squares of what stands out along lines, that the memory must explain
 
 
@@ -53,3 +56,28 @@ def other_lags(state: State, kind: str, mean: Array, without: Array) -> Denial |
             more += float(left[i]) ** 2
     share = shown / (shown + more)
     return Denial(share, "samples are alike at other lags as well") if share < _LEAST else None
+
+
+def alike(state: State, effect: Effect, without: Array) -> Denial | None:
+    """Return how memory of one lag is denied by lags that are all alike; None: it is not.
+
+    What samples of a line have in common makes them alike at all distances; a memory does at its
+    own. Where most other lags along the axis keep half of what it explains, it is one of those.
+    """
+    if not isinstance(effect, ReadoutMemory):
+        return None
+    step = 1 if state.setting.layout.channels == ("MONO",) else 2
+    own = f"{effect.along} {effect.lag_pixels / step:g}"
+    explained, left = 0.0, []
+    for i, key in enumerate(state.vector.keys):
+        if key.statistic != _STATISTIC or not state.null.known[i]:
+            continue
+        if key.detail == own:
+            explained = float(state.null.mean[i] - without[i])
+        elif key.detail.startswith(effect.along):
+            left.append(float(state.vector.values[i] - state.null.mean[i]))
+    typical = float(np.median(left)) if left else 0.0
+    if typical * explained <= 0 or abs(typical) < _ALIKE * abs(explained):
+        return None
+    why = "samples of a line are as much alike at other distances"
+    return Denial(max(1 - abs(typical / explained), 0.0), why)

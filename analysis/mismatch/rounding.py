@@ -5,11 +5,12 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.special import ndtr
 
-from dsis.effects.quantisation import whole_codes
+from dsis.effects.quantisation import last_step, whole_codes
 
 Array = NDArray[np.float64]
 _WIDE = 1.0  # DN; above, and away from the ends, rounding adds 1/12 to 1e-8
 _REACH = 8.0
+_ROUNDS = 12  # of steps that are no whole number of codes
 _LEAST_LOG = -14.0  # of a variance, codes^2: less is none
 _SOLVED = 1e-8  # codes and squared codes
 _CUT = 5.0  # recorded standard deviations: nearer to an end noise was cut, and was wider before
@@ -29,7 +30,7 @@ def rounded(
     The codes are phase, phase + step .. up to white; 0 <= phase < step.
     """
     if step_dn != 1:
-        mean, last = (mean_dn - phase_dn) / step_dn, (white_dn - phase_dn) // step_dn
+        mean, last = (mean_dn - phase_dn) / step_dn, last_step(white_dn, step_dn, phase_dn)
         shift, added = rounded(mean, variance_dn2 / step_dn**2, last)
         more = _whole(mean_dn, variance_dn2, white_dn, step_dn, phase_dn)
         return shift * step_dn + more[0], added * step_dn**2 + more[1]
@@ -52,7 +53,9 @@ def _whole(
     if float(step_dn).is_integer() and float(phase_dn).is_integer():
         return 0.0, 0.0
     sigma = max(variance_dn2, 1e-12) ** 0.5 / step_dn
-    numbers, share = _codes((mean_dn - phase_dn) / step_dn, sigma, (white_dn - phase_dn) // step_dn)
+    numbers, share = _codes(
+        (mean_dn - phase_dn) / step_dn, sigma, last_step(white_dn, step_dn, phase_dn)
+    )
     steps = phase_dn + step_dn * numbers
     (first, before), (second, after) = (
         (mean := float(share @ own), float(share @ (own - mean) ** 2))
@@ -91,11 +94,15 @@ def unrounded(
     and the third and the fourth are infinite.
     """
     if step_dn != 1:
-        shift, added = _whole(mean_dn, variance_dn2, white_dn, step_dn, phase_dn)
-        mean_dn, variance_dn2 = mean_dn - shift, max(variance_dn2 - added, 0.0)
-        mean, last = (mean_dn - phase_dn) / step_dn, (white_dn - phase_dn) // step_dn
-        before, variance, *errors = unrounded(mean, variance_dn2 / step_dn**2, last)
-        return before * step_dn + phase_dn, variance * step_dn**2, errors[0], errors[1]
+        last, before, variance = last_step(white_dn, step_dn, phase_dn), mean_dn, variance_dn2
+        whole = float(step_dn).is_integer() and float(phase_dn).is_integer()
+        for _ in range(1 if whole else _ROUNDS):  # what whole codes add depends on what was before
+            shift, added = _whole(before, variance, white_dn, step_dn, phase_dn)
+            mean = (mean_dn - shift - phase_dn) / step_dn
+            left = max(variance_dn2 - added, 0.0) / step_dn**2
+            before, variance, *errors = unrounded(mean, left, last)
+            before, variance = before * step_dn + phase_dn, variance * step_dn**2
+        return before, variance, errors[0], errors[1]
     end = min(mean_dn, white_dn - mean_dn)
     if variance_dn2 > 4 * _WIDE**2 and variance_dn2**0.5 * _REACH < end:
         return mean_dn, variance_dn2 - 1 / 12, 1.0, 1.0

@@ -114,31 +114,6 @@ def mirrored(state: State, effect: Effect, without: Array) -> Denial | None:
     return Denial(share, f"as much stays the other way: {statistic_words(across)}")
 
 
-def alike(state: State, effect: Effect, without: Array) -> Denial | None:
-    """Return how memory of one lag is denied by lags that are all alike; None: it is not.
-
-    What samples of a line have in common makes them alike at all distances; a memory does at its
-    own. Where most other lags along the axis keep half of what it explains, it is one of those.
-    """
-    if not isinstance(effect, ReadoutMemory):
-        return None
-    step = 1 if state.setting.layout.channels == ("MONO",) else 2
-    own = f"{effect.along} {effect.lag_pixels / step:g}"
-    explained, left = 0.0, []
-    for i, key in enumerate(state.vector.keys):
-        if key.statistic != "line_correlation" or not state.null.known[i]:
-            continue
-        if key.detail == own:
-            explained = float(state.null.mean[i] - without[i])
-        elif key.detail.startswith(effect.along):
-            left.append(float(state.vector.values[i] - state.null.mean[i]))
-    typical = float(np.median(left)) if left else 0.0
-    if typical * explained <= 0 or abs(typical) < _LEFT * abs(explained):
-        return None
-    why = "samples of a line are as much alike at other distances"
-    return Denial(max(1 - abs(typical / explained), 0.0), why)
-
-
 def _largest(state: State, statistic: str, departures: Array) -> float:
     """Return the largest departure of a statistic, with its sign; 0 where it has none."""
     own = [z for key, z in zip(state.null.keys, departures, strict=True)

@@ -1,6 +1,7 @@
 """Quantisation: codes coarser than one DN."""
 
 from collections.abc import Mapping
+from math import floor
 from operator import not_
 from typing import Annotated, ClassVar, Literal, Self
 
@@ -9,6 +10,8 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, ReadOut, Stage
+
+_ROUNDED = 1e-9  # of a step: 4095 / 1.05 is 3900
 
 
 class Quantisation(Effect):
@@ -63,7 +66,8 @@ class Quantisation(Effect):
         """Round to whole steps from the phase on, none of them above the white level."""
         black, step = np.float32(exposure.read_out.black_level_dn), np.float32(self.step_dn)
         phase = np.float32(self.phase_dn)
-        top = np.float32((exposure.read_out.white_level_dn - self.phase_dn) // self.step_dn)
+        white = exposure.read_out.white_level_dn
+        top = np.float32(last_step(white, self.step_dn, self.phase_dn))
         number = np.clip(np.rint((image + black - phase) / step), np.float32(0), top)
         if self.step_dn.is_integer() and self.phase_dn.is_integer():
             return np.asarray(step * number + phase - black)
@@ -83,3 +87,8 @@ def whole_codes(number: NDArray[np.floating], step: float, phase: float) -> NDAr
     """Return the whole codes that steps of any size become, of how many: halves go to even."""
     codes: NDArray[np.float64] = np.rint(phase + step * number.astype(np.float64))
     return codes
+
+
+def last_step(white_dn: float, step: float, phase: float) -> float:
+    """Return how many steps from a phase on reach the white level, or stay just below it."""
+    return floor((white_dn - phase) / step + _ROUNDED)

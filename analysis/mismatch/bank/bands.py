@@ -48,27 +48,18 @@ class Bands:
         frames: int,
     ) -> None:
         """Take one exposure; the variance and signal that are expected weigh it."""
-        if not all(c.estimates["pixel_variance"].value > 0 for c in channels.values()):
+        shapes = {name: (1.0, max(signal_dn[name], 0.0)) for name in channels}
+        found = matched(channels, variance_dn2, shapes, self.sites, self.rows)
+        if found is None:
             return
-        series = np.zeros((len(_LABELS), frames, self.rows))
-        noise, told = dict.fromkeys(_LABELS, 0.0), dict.fromkeys(_LABELS, 0.0)
-        for name, channel in channels.items():
-            lines, across = channel.mean_frame.shape
-            shapes = {"": 1.0, "signal": max(signal_dn[name], 0.0)}
-            weights = []
-            for key, shape in shapes.items():
-                own = shape * across / variance_dn2[name]
-                noise[key] += lines * own**2 * channel.estimates["pixel_variance"].value / across
-                told[key] += lines * own * shape
-                weights.append(own)
-            _add(series, tuple(weights), self.sites[name][0], channel.moving_rows)
+        series, noise, told = found
         powers = (np.abs(np.fft.rfft(series, 2 * self.rows, axis=2)) ** 2).sum(1)
         seen = frames - 1
-        for key, power in zip(_LABELS, powers, strict=True):
-            if noise[key] > 0:
-                self.power[key] += told[key] * power / noise[key]
-                self.weight[key][0] += told[key] * seen
-                self.weight[key][1] += told[key] ** 2 * seen
+        for k, (key, power) in enumerate(zip(_LABELS, powers, strict=True)):
+            if noise[k] > 0:
+                self.power[key] += told[k] * power / noise[k]
+                self.weight[key][0] += told[k] * seen
+                self.weight[key][1] += told[k] ** 2 * seen
 
     def numbers(self) -> dict[str, Number]:
         """Return the largest of each weighting, and what rows share of one amplitude in DN."""
@@ -95,10 +86,55 @@ class Bands:
         return found
 
 
+def matched(
+    channels: Mapping[str, Channel],
+    variance_dn2: Mapping[str, float],
+    shapes: Mapping[str, tuple[float, ...]],
+    sites: Mapping[str, tuple[int, int]],
+    rows: int,
+) -> tuple[Array, list[float], list[float]] | None:
+    """Return series of all rows, a matched filter of all channels; None: one has no noise.
+
+    Parameters
+    ----------
+    channels
+        Of one exposure.
+    variance_dn2
+        Of a pixel, as it is expected.
+    shapes
+        What a band moves each channel by, in each weighting.
+    sites
+        First row and column of each channel.
+    rows
+        Of the sensor.
+
+    Returns
+    -------
+    series, noise, told
+        By weighting: rows (weighting, frame, row), the power of noise in their spectrum, and what a
+        band of unit size has in it.
+    """
+    pixels = {name: own.estimates["pixel_variance"].value for name, own in channels.items()}
+    if not all(value > 0 for value in pixels.values()):
+        return None
+    count = len(next(iter(shapes.values())))
+    frames = len(next(iter(channels.values())).moving_rows)
+    series = np.zeros((count, frames, rows))
+    noise, told = [0.0] * count, [0.0] * count
+    for name, channel in channels.items():
+        lines, across = channel.mean_frame.shape
+        weights = tuple(shape * across / variance_dn2[name] for shape in shapes[name])
+        for k, (own, shape) in enumerate(zip(weights, shapes[name], strict=True)):
+            noise[k] += lines * own**2 * pixels[name] / across
+            told[k] += lines * own * shape
+        _add(series, weights, sites[name][0], 1 if len(sites) == 1 else 2, channel.moving_rows)
+    return series, noise, told
+
+
 @kernel
-def _add(series: Array, weights: tuple[float, ...], first: int, moved: Array) -> None:
-    """Add a channel's rows (frame, row) to series of all (weighting, frame, row of the mosaic)."""
+def _add(series: Array, weights: tuple[float, ...], first: int, step: int, moved: Array) -> None:
+    """Add a channel's rows (frame, row) to series of all (weighting, frame, row of the sensor)."""
     for k in range(len(weights)):
         for t in range(moved.shape[0]):
             for y in range(moved.shape[1]):
-                series[k, t, first + 2 * y] += weights[k] * moved[t, y]
+                series[k, t, first + step * y] += weights[k] * moved[t, y]

@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.mismatch.bank.bands import matched
 from analysis.mismatch.bank.peaks import Peak, largest, line_top
 from analysis.mismatch.bank.scalars import UNKNOWN, Number
 from dsis.measures import Channel
@@ -51,19 +52,12 @@ class MovingBands:
         numbers: Sequence[int],
     ) -> None:
         """Take one exposure; the variance and signal that are expected weigh its rows."""
-        step, frames = 1 if len(self.sites) == 1 else 2, len(numbers)
-        pixels = {name: own.estimates["pixel_variance"].value for name, own in channels.items()}
-        if frames < _LEAST or not all(value > 0 for value in pixels.values()):
+        frames = len(numbers)
+        shapes = {name: (max(signal_dn[name], 0.0),) for name in channels}
+        found = matched(channels, variance_dn2, shapes, self.sites, self.rows)
+        if frames < _LEAST or found is None:
             return
-        series, noise, told = np.zeros((frames, self.rows)), 0.0, 0.0
-        for name, channel in channels.items():
-            lines, across = channel.mean_frame.shape
-            signal = max(signal_dn[name], 0.0)
-            own = signal * across / variance_dn2[name]
-            first = self.sites[name][0]
-            series[:, first : first + step * lines : step] += own * channel.moving_rows
-            noise += lines * own**2 * pixels[name] / across
-            told += lines * own * signal
+        (series,), (noise,), (told,) = found
         if not noise > 0:
             return
         turns = np.exp(-2j * np.pi * np.outer(self.advances, np.asarray(numbers, np.float64)))

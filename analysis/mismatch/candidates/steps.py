@@ -13,9 +13,7 @@ Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
 FEW = 8  # absent codes that a converter of uneven steps may have: fewer tell no step
 _WRONG = 0.01  # of the codes that are absent, or of the others: a step may foretell so many wrongly
-_FINE = (
-    0.04  # of what absent codes leave open, by which steps that are tried next part at the far end
-)
+_FINE = 0.04  # of what absent codes leave open: so far apart are steps that are tried
 _FINER = 0.25  # of that, at last
 _ENDS = 2.0  # codes by which a range is no whole number of steps
 _AT_ONCE = 1 << 18  # steps times codes

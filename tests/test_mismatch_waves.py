@@ -1,5 +1,6 @@
 """Waves over the whole sensor, on bins and between them: found, placed, as rare as they say."""
 
+import itertools
 from math import sqrt
 
 import numpy as np
@@ -17,16 +18,21 @@ Array = NDArray[np.float64]
 ROWS, COLUMNS, FRAMES = 48, 64, 8
 SURE = 5.0  # standard errors
 HALFWAY = 8 / np.pi**2  # of its power a wave keeps that lies halfway between bins
-ALL = {"MONO": 1.0, "R": 1.0, "Gr": 1.0, "Gb": 1.0, "B": 1.0}
+ALL = ("MONO", "R", "Gr", "Gb", "B")
 
 
-def summed(stacks: list[Array], cfa: Cfa, shape: tuple[int, int] = (ROWS, COLUMNS)) -> WaveSums:
+def summed(
+    stacks: list[Array],
+    cfa: Cfa,
+    shape: tuple[int, int] = (ROWS, COLUMNS),
+    variances: tuple[float, ...] = (1.0,),
+) -> WaveSums:
     step = 1 if cfa is Cfa.MONO else 2
     sums = WaveSums(shape, step)
-    for stack in stacks:
+    for stack, variance in zip(stacks, itertools.cycle(variances)):
         waves = Waves(shape)
         measured = measure_exposure(waves.watching(stack), cfa, 0.0, 65535.0)
-        sums.add(waves, measured.channels, ALL)
+        sums.add(waves, measured.channels, dict.fromkeys(ALL, variance))
     return sums
 
 
@@ -114,6 +120,20 @@ def test_a_memory_from_one_colour_to_another_is_seen_at_its_lag(
     assert value == pytest.approx(fraction, abs=SURE * sd)
     assert value / sd == pytest.approx(fraction * sqrt(stack[1:].size), rel=0.3)
     assert max(abs(rest / error) for rest, error in numbers.values()) < SURE
+
+
+@pytest.mark.parametrize("frames", [2, FRAMES])
+def test_all_exposures_show_a_memory_between_colours(frames: int) -> None:
+    """In proportion to the noise it is alike in all: loud ones say as much as the dark."""
+    rng = np.random.default_rng(14)
+    fraction, stacks = 0.05, []
+    for loud in (1.0, 4.0, 12.0, 30.0):
+        own = loud * (noise(rng)[:frames] - 1000)
+        stacks.append(2000 + own + fraction * np.roll(own, 3, 2))
+    numbers = summed(stacks, Cfa.GRBG, variances=(1.0, 16.0, 144.0, 900.0)).odd_lags()
+    value, sd = numbers["line_correlation along rows 1.5"]
+    assert value == pytest.approx(fraction, abs=SURE * sd)
+    assert sd == pytest.approx(1 / sqrt(len(stacks) * stacks[0][1:].size), rel=0.05)
 
 
 def test_lags_between_colours_have_the_errors_that_they_say() -> None:

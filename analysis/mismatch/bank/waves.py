@@ -90,6 +90,15 @@ class Waves:
             power += per_bin * self.power
             add_power(self.total, -per_bin / self.frames, power)
 
+    def add_bins_to(self, power: Array, weight: float) -> None:
+        """Add the power of the bins alone, (row, column // 2 + 1), in the same units."""
+        per_bin = weight / (self.pixels * (self.frames - 1))
+        whole = self.total.real**2 + self.total.imag**2
+        if self.power is None:
+            power += per_bin / 2 * whole
+        else:
+            power += per_bin * (self.power[0, 0] - whole / self.frames)
+
 
 @dataclass(frozen=True)
 class Moving:
@@ -114,7 +123,9 @@ class Moving:
 
 
 class WaveSums:
-    """Power of waves over all exposures, white noise scaled to 1; amplitudes constant in DN.
+    """Power of waves over all exposures, white noise scaled to 1.
+
+    Of waves, amplitudes are constant in DN; of lags, in proportion to the noise.
 
     Parameters
     ----------
@@ -131,7 +142,8 @@ class WaveSums:
         rows, columns = shape
         self.power = np.zeros((2, 2, rows, columns // 2 + 1))
         self.weight = self.squares = 0.0
-        self.uneven = dict.fromkeys(_PAIRED, 0.0)
+        self.relative = np.zeros(self.power.shape[2:] if step == 2 else (0, 0))
+        self.seen, self.uneven = 0, dict.fromkeys(_PAIRED, 0.0)
         self._moving: Moving | None = None  # every map asks for it
 
     def add(
@@ -152,7 +164,10 @@ class WaveSums:
             each = {name: c.estimates["pixel_variance"].value for name, c in channels.items()}
             for axis, pairs in _PAIRED.items():
                 alike = sum(each[a] * each[b] for a, b in pairs) / len(pairs)
-                self.uneven[axis] += weight**2 / seen * alike / white**2
+                self.uneven[axis] += seen * alike / white**2
+            self.seen += seen
+            if self.taken:
+                waves.add_bins_to(self.relative, seen / white)
 
     def number(self) -> Number:
         """Return the normal score of the largest power, on bins or between them.
@@ -194,15 +209,15 @@ class WaveSums:
         if not self.taken:
             return {name: UNKNOWN for axis in _PAIRED for _, name in self._odd(axis)}
         rows, columns = self.shape
-        power = self.power[0, 0] / self.weight
+        power = self.relative / self.seen
         held = np.zeros(power.shape, np.bool_)
         held[[0, rows // 2]] = True
         held[:, [0, columns // 2]] = True
         power = np.where(held, power[~held].mean(), power)
-        covariance = np.fft.irfft2(without_lines(power, self._degrees), s=self.shape)
+        covariance = np.fft.irfft2(without_lines(power, self.seen), s=self.shape)
         found: dict[str, Number] = {}
         for axis, line in (("rows", covariance[0]), ("columns", covariance[:, 0])):
-            sd = float(np.sqrt(self.uneven[axis] / (rows * columns))) / self.weight
+            sd = float(np.sqrt(self.uneven[axis] / (rows * columns))) / self.seen
             for lag, name in self._odd(axis):
                 found[name] = (float(line[lag] / line[0]), sd)
         return found

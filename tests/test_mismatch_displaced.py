@@ -135,15 +135,18 @@ def test_neighbours_that_are_explained_deny_nothing() -> None:
 
 
 @pytest.mark.parametrize("kind", BENDS)
-def test_a_law_that_no_correlation_shows_by_itself_denies_a_bend(kind: str) -> None:
-    """Charge that is shared as it grows, and the share that is the same at all levels."""
+@pytest.mark.parametrize("left", [(), ("correlation_0_1",)])
+def test_a_law_that_no_correlation_shows_by_itself_denies_a_bend(
+    kind: str, left: tuple[str, ...]
+) -> None:
+    """Charge that is shared as it grows, of which one direction stands out at most."""
     for share, denied in ((1e-5, True), (0.0, False)):
         made = {name: _shared(f, share * SIGNALS[name]) for name, f in _frames(1).items()}
         variances = {name: float(f.var()) for name, f in made.items()}
         if not denied:  # as much less, with no covariance
             variances = {name: v * (1 - 2e-5 * SIGNALS[name]) for name, v in variances.items()}
         values = {(s, name): r for name, f in made.items() for s, r in _correlations(f).items()}
-        state = _state(variances, values, left=())
+        state = _state(variances, values, left=left)
         assert (displaced(state, kind, _none(state)) is not None) == denied
 
 

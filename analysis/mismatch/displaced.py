@@ -122,7 +122,8 @@ def _of_neighbours(state: State) -> Denial | None:
     for (place, statistic), (rest, _) in left.items():
         factors[place] = factors.get(place, 1.0) + _PAIRS[statistic] * rest
     why = "neighbours are alike for another reason, and have as covariance what variances lack"
-    return _straightened(state, factors.get, why) or _of_grains(state, left)
+    denial = _straightened(state, factors.get, why) or _of_grains(state, left)
+    return denial or _of_charge(state)
 
 
 def _of_grains(state: State, left: Left) -> Denial | None:

@@ -139,13 +139,21 @@ def test_neighbours_that_are_explained_deny_nothing() -> None:
 def test_a_law_that_no_correlation_shows_by_itself_denies_a_bend(
     kind: str, left: tuple[str, ...]
 ) -> None:
-    """Charge that is shared as it grows, of which one direction stands out at most."""
-    for share, denied in ((1e-5, True), (0.0, False)):
+    """Charge that is shared as it grows, of which one direction stands out at most.
+
+    That one, place by place, is too noisy to say what variances lack.
+    """
+    rng = np.random.default_rng(0)
+    for share, denied in ((8e-6, True), (0.0, False)):
         made = {name: _shared(f, share * SIGNALS[name]) for name, f in _frames(1).items()}
         variances = {name: float(f.var()) for name, f in made.items()}
         if not denied:  # as much less, with no covariance
-            variances = {name: v * (1 - 2e-5 * SIGNALS[name]) for name, v in variances.items()}
-        values = {(s, name): r for name, f in made.items() for s, r in _correlations(f).items()}
+            variances = {name: v * (1 - 1.6e-5 * SIGNALS[name]) for name, v in variances.items()}
+        values = {
+            (s, name): r + rng.normal(0, ERROR)
+            for name, f in made.items()
+            for s, r in _correlations(f).items()
+        }
         state = _state(variances, values, left=left)
         assert (displaced(state, kind, _none(state)) is not None) == denied
 

@@ -104,9 +104,6 @@ def _full(clues: Clues, top: Place) -> list[Proposal]:
     by that how far the mean is from it (a censored normal law). Nothing where much is left, or
     where light is known, which levels tell by more.
     """
-    lights = {e.name: e.light for e in clues.layout.exposures if e.kind == "flat"}
-    if lights.get(top[0], 0.0) is not None:
-        return []
     level, own = clues.signal(top), clues.seen.levels[top]
     dark, bright = (float(v) for v in clues.fit.line_dn2(np.array([0.0, level])))
     if bright <= dark:

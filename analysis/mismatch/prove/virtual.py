@@ -22,6 +22,7 @@ from dsis.simulate.shot import tiled
 Array = NDArray[np.float64]
 Signals = Mapping[str, NDArray[np.float64]]
 LEAST_DN2 = 0.01  # codes are whole: less noise cannot be seen
+_ABOVE = 8.0  # standard deviations of light: no noise of it is farther off
 _SAMPLES = 400_000  # of an exposure, in frames that nothing was learned from
 
 
@@ -123,10 +124,23 @@ def virtual_sensor(camera: Camera, held: Held, signals: Signals, seed: int) -> d
             )
             for number in range(exposure.trained + fresh)
         ]
-        # What is far above white would move means as no code can.
-        whole = np.minimum(np.stack(frames), np.float32(held.white_code - held.black_dn))
+        # What is far above white would move means as no code can; light that is above it has noise.
+        whole = np.minimum(np.stack(frames), _top(camera, held, clean))
         stacks[exposure.name] = Stack(whole[: exposure.trained], whole[exposure.trained :])
     return stacks
+
+
+def _top(camera: Camera, held: Held, clean: Image) -> np.float32:
+    """Return the highest value that is kept, DN above black: white, or above all of the light.
+
+    A full well keeps light that would be above white below it: beside it the base model's noise is
+    asked for.
+    """
+    white, brightest = np.float32(held.white_code - held.black_dn), clean.max(keepdims=True)
+    if brightest <= white:
+        return white
+    variance = base_of(camera).segments.variance_dn2(brightest)
+    return np.float32((brightest + _ABOVE * np.sqrt(variance)).item())
 
 
 def sensor_draw(seed: int) -> Draw:

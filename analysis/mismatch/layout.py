@@ -14,6 +14,7 @@ from analysis.mismatch.scenes import SCENE, Local, Scene
 from dsis.cfa import Cfa, pattern
 
 _LARGE = 2.5e7  # samples
+_OF_FULL = 1e-9  # of the weight of a flat whose pixels are full: it says nothing of gains
 Place = tuple[str, str]
 """Exposure and channel; of a scene also channel and bin of signal."""
 
@@ -61,6 +62,9 @@ class Layout:
         Exposures of kind scene that are left out, for the picture moves between frames.
     still
         Where codes move too seldom for noise to be judged: only levels are.
+    full
+        Where noise is far less than in flats of less light: pixels are full, and their gains do
+        not show.
     """
 
     exposures: tuple[Taken, ...]
@@ -74,6 +78,7 @@ class Layout:
     scenes: Mapping[str, Scene] = field(default_factory=dict)
     moving: tuple[str, ...] = ()
     still: frozenset[Place] = frozenset()
+    full: frozenset[Place] = frozenset()
 
     @property
     def samples(self) -> int:
@@ -146,11 +151,16 @@ class Layout:
 
     def _regressors_of(self, channel: str) -> Regressors:
         names = [e.name for e in self.uniform if (e.name, channel) not in self.still]
+        worth = {name: _OF_FULL if (name, channel) in self.full else 1.0 for name in names}
         return Regressors.of(
             names,
             {name: self.signal_dn[name, channel] for name in names},
             {e.name: e.exposure_time_s for e in self.uniform},
-            {e.name: len(e.numbers) / self.variance_dn2[e.name, channel] for e in self.uniform},
+            {
+                e.name: worth[e.name] * len(e.numbers) / self.variance_dn2[e.name, channel]
+                for e in self.uniform
+                if e.name in worth
+            },
         )
 
 

@@ -14,6 +14,7 @@ from dsis.errors import InputError
 from dsis.recording import Recording
 
 _LEAST_FRAMES = 2
+_CUT = 0.25  # of the largest variance at less light: what is less, a full well has cut
 # Pairs of neighbours that both moved, below which sums of their products are not near normal.
 _LEAST_PAIRS = 30.0
 
@@ -39,6 +40,7 @@ def layout_of(
     means: dict[Place, float] = {}
     still: set[Place] = set()
     variances: dict[Place, float] = {}
+    plain: dict[Place, float] = {}
     step = 1 if sensor.cfa is Cfa.MONO else 2
     for recorded in recording.exposures:
         own = tuple(numbers.get(recorded.name, ()))
@@ -59,6 +61,7 @@ def layout_of(
             spread = np.percentile(two - one, [15.865, 84.135])
             robust = float(spread[1] - spread[0]) ** 2 / 8
             variances[e.name, channel] = max(robust, 0.05)
+            plain[e.name, channel] = float(np.square(two - one).mean()) / 2
             moved = float((one != two).mean()) / 2
             if e.kind != SCENE and moved**2 * one.size * len(own) < _LEAST_PAIRS:
                 still.add((e.name, channel))
@@ -83,5 +86,25 @@ def layout_of(
         signal,
         variances,
         still=frozenset(still),
+        full=_full(taken, signal, plain),
     )
     return with_scenes(layout, means, first)
+
+
+def _full(
+    taken: Iterable[Taken], signal_dn: Mapping[Place, float], variance_dn2: Mapping[Place, float]
+) -> frozenset[Place]:
+    """Return the flats whose noise is far less than that of flats of less light.
+
+    Noise of light grows with light, until pixels are full.
+    """
+    flats = [e.name for e in taken if e.kind == "flat"]
+    found = set()
+    for channel in {channel for _, channel in signal_dn}:
+        places = sorted(((name, channel) for name in flats), key=lambda at: signal_dn[at])
+        most = 0.0
+        for place in places:
+            if variance_dn2[place] < _CUT * most:
+                found.add(place)
+            most = max(most, variance_dn2[place])
+    return frozenset(found)

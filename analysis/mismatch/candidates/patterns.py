@@ -47,7 +47,8 @@ def _constant(kind: str, statistic: str) -> Candidate:
 
 
 def _squared(clues: Clues) -> Callable[[Place], float]:
-    return lambda place: clues.signal(place) ** 2
+    """Return by what variances of gains grow: pixels that are full show none."""
+    return lambda place: 0.0 if place in clues.layout.full else clues.signal(place) ** 2
 
 
 def _gains(kind: str, statistic: str) -> Candidate:

@@ -7,7 +7,7 @@ from analysis.mismatch import find_mismatch
 from analysis.mismatch.bank.key import Key
 from analysis.mismatch.null import _by_name, _unlike
 from dsis.effects import registry
-from mismatch_recordings import camera, recorded
+from mismatch_recordings import FEW_LEVELS, camera, recorded, state_of
 
 DOF = 15
 
@@ -64,3 +64,38 @@ def test_photons_are_named_beside_few_pixels_that_jump() -> None:
     levels = (30.0, 60.0, 120.0, 250.0, 500.0, 900.0)
     found = find_mismatch(camera(), recorded(counted, 5, levels=levels), seed=1)
     assert {one.effect for one in found.omitted_physics} == {"rts", "poisson_shot_noise"}
+
+
+@pytest.mark.parametrize(
+    ("kind", "size", "statistic"),
+    [
+        ("flicker", {"sigma_percent": 1.0}, "level"),
+        ("flicker", {"sigma_percent": 1.0}, "frame_variance"),
+        ("row_noise", {"sigma_dn": 4.0}, "row_variance"),
+    ],
+)
+def test_errors_are_those_of_their_own_exposure(
+    kind: str, size: dict[str, float], statistic: str
+) -> None:
+    """What a model's light or rows do in one exposure makes others no less sure."""
+    model = camera(registry()[kind](**size))
+    states = [state_of(recorded(model, seed, levels=FEW_LEVELS), model) for seed in (1, 2)]
+    which = [
+        i
+        for i, key in enumerate(states[0].vector.keys)
+        if (key.statistic, key.scope) == (statistic, "exposure")
+    ]
+    spread = np.concatenate([state.simulated[:, which] for state in states]).std(0, ddof=1)
+    for state in states:
+        ratio = state.null.sd[which] / spread
+        assert (ratio < 2.5).all()
+        assert (ratio > 0.5).all()
+
+
+def test_a_current_is_named_beside_light_that_flickers() -> None:
+    """A level of 0.05 DN in the dark, beside flats that move by 26 DN from frame to frame."""
+    flicker, current = (registry()[kind] for kind in ("flicker", "dark_current"))
+    true = camera(flicker(sigma_percent=1.0), current(dn_per_s=4.0))
+    words = frozenset({"flicker", "dark_current", "black_level_drift", "line_flicker"})
+    finding = find_mismatch(camera(), recorded(true, 3), vocabulary=words)
+    assert {one.effect for one in finding.omitted_physics} == {"flicker", "dark_current"}

@@ -46,7 +46,7 @@ _FLOORS = {
 
 def floor(key: Key) -> float:
     """Return the least departure that matters, in the unit of the transformed number."""
-    if key.statistic.endswith("variance") and key.statistic != "pixel_variance":
+    if key.is_cube_root:
         return _ROOTS
     if "correlation" in key.statistic:
         return 1e-3

@@ -10,7 +10,6 @@ import scipy.special
 import scipy.stats
 from numpy.typing import NDArray
 
-from analysis.mismatch.bank.framenoise import NAME as FRAME_NOISE
 from analysis.mismatch.bank.key import Key
 from analysis.mismatch.contrasts import Contrasts, contrasts
 from analysis.mismatch.fewpairs import widening
@@ -23,11 +22,6 @@ _OWN = 40.0  # degrees of freedom that the closed form, scaled by name, is worth
 _POOLED = 160.0  # and for the tails: a scale is shared by all numbers of a name
 _LEAST_SCALE = 0.8
 _SEVERAL = 5  # numbers of a name that tell whether they are alike
-# Of single pixels, which channels do not share: what lines and frames move by, they do. And what
-# light that flickers spreads where there is some.
-_OF_PIXELS = frozenset(
-    {"skewness", "kurtosis", "kurtosis_within_pixels", "variance_spread", FRAME_NOISE}
-)
 _RARE = 1e-5  # chance of a departure that counts, among some hundred numbers
 _UNLIKE = 1e-4  # chance of spreads that differ so
 _ODD = 1e-3  # chance of simulations so far off that a score is not normal under the model
@@ -97,6 +91,7 @@ def null_of(
     known = np.isfinite(values).all(0) & np.isfinite(seen.values) & np.isfinite(errors).all(0)
     mean = np.where(known, np.nan_to_num(values).mean(0), 0.0)
     error = np.where(known, np.sqrt(np.mean(np.where(np.isfinite(errors), errors, 1.0) ** 2, 0)), 1)
+    error = error * _grown(seen.keys, mean)
     own = np.where(known, ((np.nan_to_num(values) - mean) ** 2).sum(0) / (count - 1), 1) / error**2
     scale, worth, tails = _by_name(seen.keys, own, known, count - 1)
     blended = tails**2 * (worth * scale + (count - 1) * own) / (worth + count - 1)
@@ -148,6 +143,28 @@ def _spread(sums: Contrasts, shared: Sequence[Array], sd: Array) -> Array:
     return np.asarray(1 + alike)
 
 
+def _grown(keys: Sequence[Key], mean: Array) -> Array:
+    """Return by how much closed-form errors grow where a model has more than white noise.
+
+    The cube root of a mean square scatters in proportion to itself. A level moves as the means of
+    its frames do, whose variance has a number of its own.
+    """
+    frames = {
+        key.place: max(float(value), 1.0) ** 1.5
+        for key, value in zip(keys, mean, strict=True)
+        if key.statistic == "frame_variance" and key.scope == "exposure"
+    }
+    grown = [
+        frames.get(key.place, 1.0)
+        if key.statistic == "level"
+        else max(float(value), 1.0)
+        if key.is_cube_root
+        else 1.0
+        for key, value in zip(keys, mean, strict=True)
+    ]
+    return np.array(grown)
+
+
 def _normal(keys: Sequence[Key], values: Array) -> NDArray[np.bool_]:
     """Return which numbers are scores that simulations, (recording, number), show as normal."""
     scores = np.array([key.is_peak for key in keys], bool)
@@ -173,9 +190,7 @@ def _by_name(
     for which in groups.values():
         # Few numbers leave the closed form its say.
         scale[which] = (own[which].sum() + 4.0) / (len(which) + 4.0)
-        single = keys[which[0]].statistic in _OF_PIXELS
-        unlike = _unlike(own[which], dof) if single else None
-        if unlike:
+        if unlike := _unlike(own[which], dof):
             scale[which], worth[which] = unlike
             tails[which] = _farther(unlike[1] + dof) / _farther(_OWN + dof)
     return scale, worth, tails

@@ -122,10 +122,7 @@ class Predictor:
         before = null.mean
         change = np.where(known, mean - before, 0.0)
         # The cube root of a mean square scatters in proportion to itself.
-        grown = np.array(
-            [k.statistic.endswith("variance") and k.statistic != "pixel_variance"
-             for k in self.reference.vector.keys]
-        )  # fmt: skip
+        grown = np.array([key.is_cube_root for key in self.reference.vector.keys])
         ratio = np.where(
             grown & known,
             np.maximum(np.abs(mean), _FLOOR) / np.maximum(np.abs(before), _FLOOR),

@@ -36,6 +36,11 @@ class Key:
         return self.statistic.endswith(("spectrum_peak", "spectral_peak", "outlying_patch"))
 
     @property
+    def is_cube_root(self) -> bool:
+        """Whether it is the cube root of a mean square, 1 where there is white noise alone."""
+        return self.statistic.endswith("variance") and self.statistic != "pixel_variance"
+
+    @property
     def place(self) -> tuple[str, str]:
         """Exposure and channel; of a range of signal in a scene: exposure, channel and range."""
         return self.exposure, f"{self.channel} {self.detail}".strip()

@@ -12,7 +12,7 @@ from analysis.mismatch.ties import by_numbers
 from dsis.camera import BaseNoise, Segment
 
 GIVEN = BaseNoise(segment=(Segment(slope=0.40, intercept=5.0),))
-BESIDE = {"spatial_filtering": 0.4002, "readout_memory": 0.3923}
+BESIDE = {"spatial_filtering": 0.4002, "crosstalk": 0.3923, "readout_memory": 0.3923}
 ERROR = 0.0005
 
 
@@ -35,13 +35,18 @@ def told(monkeypatch: pytest.MonkeyPatch) -> Any:
     monkeypatch.setattr(basenumbers, "joined", lambda _camera, effects, _given: effects[0])
 
     def order(
-        alone: float, *, given: BaseNoise = GIVEN, twin: bool = False, there: tuple[Any, ...] = ()
+        alone: float,
+        *,
+        given: BaseNoise = GIVEN,
+        twin: bool = False,
+        there: tuple[Any, ...] = (),
+        other: str = "crosstalk",
     ) -> list[str] | None:
         setting = SimpleNamespace(given=0, calibrated=lambda kind, _near: _calibrated(BESIDE[kind]))
         state: Any = SimpleNamespace(
             camera=SimpleNamespace(effect=there), setting=setting, calibrated=_calibrated(alone)
         )
-        best, rival = _ranked("readout_memory", 40.0), _ranked("spatial_filtering", 39.5)
+        best, rival = _ranked(other, 40.0), _ranked("spatial_filtering", 39.5)
         found = by_numbers(state, given, [best] if twin else [best, rival], rival)
         assert found is None or found[0].gain == 40.0
         return None if found is None else [one.kind for one in found]
@@ -50,7 +55,17 @@ def told(monkeypatch: pytest.MonkeyPatch) -> Any:
 
 
 def test_that_with_which_numbers_hold_goes_first(told: Any) -> None:
-    assert told(0.3923) == ["spatial_filtering", "readout_memory"]
+    assert told(0.3923) == ["spatial_filtering", "crosstalk"]
+
+
+def test_a_memory_may_lessen_variances_as_a_filter_does(told: Any) -> None:
+    """Numbers that hold beside a filter do so beside a sample that gives what the next one gets."""
+    assert told(0.3923, other="readout_memory") is None
+    kept = BaseNoise(segment=(Segment(slope=0.3923, intercept=5.0),))
+    assert told(0.4002, given=kept, other="readout_memory") == [
+        "readout_memory",
+        "spatial_filtering",
+    ]
 
 
 def test_numbers_that_hold_anyway_may_have_been_measured_with_either(told: Any) -> None:

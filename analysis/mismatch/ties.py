@@ -17,6 +17,7 @@ from dsis.camera import BaseNoise
 # Memory of a sample is that of a residue whose steps lie beyond the noise.
 _SAYS_LESS = {"channel_imbalance": "tap_mismatch", "readout_memory": "adc_memory"}
 _BY_CODES = "quantisation"
+_KEEPS_VARIANCE = ("spatial_filtering", {"spatial_filtering", "readout_memory"})
 _TWINS = {
     "tap_mismatch": ("channel_imbalance",),
     "readout_memory": ("crosstalk", "spatial_filtering"),
@@ -97,13 +98,16 @@ def by_numbers(
 ) -> list[Ranked] | None:
     """Return effects, first that of two that tie with which the user's numbers hold; None: none.
 
-    Nothing is said of a rival that is named already.
+    Nothing is said of a rival that is named already. Nor for a filter beside a memory: one that
+    takes from its own sample what it keeps of the last has less variance, as a filter has.
     """
     named = {own.kind for own in state.camera.effect}
     if not isinstance(rival, Ranked) or rival.kind in named:
         return None
     best, *others = fitted
     first = preferred(state, users, best, rival)
+    if first is not None and (first.kind, {best.kind, rival.kind}) == _KEEPS_VARIANCE:
+        return None
     if first is best:
         return list(fitted)
     behind = [one for one in others if one is not rival]

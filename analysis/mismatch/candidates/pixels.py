@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import reduce
-from math import log, sqrt
+from math import exp, log, sqrt
 
 import numpy as np
 
@@ -32,11 +32,20 @@ def _tails(clues: Clues) -> Sequence[Proposal]:
 
 
 def _spread(clues: Clues) -> Sequence[Proposal]:
-    k, _ = clues.amplitude("kurtosis", lambda place: clues.read_share(place) ** 2)
-    if k <= 0:
+    """Start from how far variances of pixels scatter: by exp(4 s^2) - 1 of the mean, squared.
+
+    Where frames are too few for that, from the kurtosis, which is three times as much.
+    """
+    scatter, _ = clues.amplitude("variance_spread", lambda place: clues.read_share(place) ** 2)
+    white = 2 / (max(clues.frames(e.name) for e in clues.layout.uniform) - 1)
+    square = (exp(min(scatter, 10.0)) - 1) * white / (1 + white)
+    if square <= 0:
+        k, _ = clues.amplitude("kurtosis", lambda place: clues.read_share(place) ** 2)
+        square = k / 3
+    if square <= 0:
         return []
     return proposals(
-        "read_noise_spread", ["log_sigma"], log_sigma=min(sqrt(log(1 + k / 3) / 4), 1.5)
+        "read_noise_spread", ["log_sigma"], log_sigma=min(sqrt(log(1 + square) / 4), 1.5)
     )
 
 

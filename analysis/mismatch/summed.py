@@ -111,8 +111,7 @@ class ChannelSums:
         """
         pixel = channel.estimates["pixel_variance"].value
         self.patterns.add(exposure, channel.mean_frame, pixel, frames)
-        if frames > 2:
-            self.variances.add(channel.variance_map, (frames - 1) / variance_dn2)
+        self.variances.add(channel.variance_map, (frames - 1) / variance_dn2)
         self.spectra.add(channel, frames, variance_dn2, signal_dn, fine)
 
 

@@ -32,7 +32,7 @@ from analysis.mismatch.rank import (
     replicates_for,
 )
 from analysis.mismatch.resolved import calls_alone, differ, explains, gained, opened
-from analysis.mismatch.rowtold import as_shown, unlike_frames
+from analysis.mismatch.rowtold import AS_WELL, as_shown, unlike_frames
 from analysis.mismatch.segments import Path, second_path, spiky
 from analysis.mismatch.state import State
 from analysis.mismatch.ties import bends_as_well, by_numbers, plainest, ties, twin
@@ -53,6 +53,7 @@ class Search(Fitted):
     refused: dict[str, str] = field(default_factory=dict)
     tied: dict[str, Ranked | Path] = field(default_factory=dict)
     doubted: dict[str, str] = field(default_factory=dict)
+    apart: list[Array] = field(default_factory=list)  # what one of two makes that frames show
     settled: list[tuple[str, Frequency]] = field(default_factory=list)
     absent: set[Frequency] = field(default_factory=set)  # peaks that were no line
     lines: WholeFrames | None = None  # of all frames of a small recording
@@ -279,10 +280,9 @@ class Search(Fitted):
         Neither of two that tie over the same numbers is claimed, nor what explains the same, and
         worse. What is taken in besides may decide: they are tried again in the next round.
         """
-        self.ties = []
-        self.doubted = {}
+        self.ties, self.doubted, self.apart = [], {}, []
         while True:
-            apart = [one.mean for pair in self.ties for one in pair]
+            apart = [*self.apart, *(one.mean for pair in self.ties for one in pair)]
             settled = tuple(self.settled)
             left = self._left() - self.doubted.keys()
             fitted = ranked(
@@ -321,8 +321,7 @@ class Search(Fitted):
     def _undoubted(self, state: State, fitted: list[Ranked]) -> list[Ranked]:
         """Leave out the best as long as a statistic which calls for it denies it, for this round.
 
-        That of which nothing is left is doubted. What is named besides may show another of it:
-        then it is tried again.
+        That of which nothing is left is doubted, until what is named besides shows another of it.
         """
         while fitted and fitted[0].gain >= LEAST_GAIN and fitted[0].kind not in LINES:
             best, *others = fitted
@@ -334,6 +333,7 @@ class Search(Fitted):
             fitted = others
             if all(one.name != best.name for one in others):
                 self.doubted[best.name] = denial.why
+                self.apart += [best.mean] if denial.why.startswith(AS_WELL) else []
                 break
         return fitted
 

@@ -18,6 +18,7 @@ from dsis.effects import Effect
 from dsis.effects.pink_noise import PinkNoise
 
 _OTHER = {"pink_noise": "row_banding", "row_banding": "pink_noise"}
+AS_WELL = "whole frames may as well show"
 _WORDS = {"pink_noise": "1/f noise", "row_banding": "bands of rows"}
 
 
@@ -65,8 +66,7 @@ def unlike_frames(
     odds = _odds(state, frames, best)
     if odds is None or odds > TOLD_APART or _any(others, _OTHER[best.kind]):
         return None
-    why = f"whole frames may as well show {_WORDS[_OTHER[best.kind]]}"
-    return rival(-odds, why)
+    return rival(-odds, f"{AS_WELL} {_WORDS[_OTHER[best.kind]]}")
 
 
 def _explained(state: State, effect: Effect) -> float:

@@ -232,6 +232,20 @@ def test_what_neighbours_have_in_common_is_no_pattern_of_single_pixels(
     assert coloured(state, "prnu") is None
 
 
+def test_a_map_that_is_noise_but_for_few_pixels_denies_nothing_by_chance() -> None:
+    """Its variance beyond noise is a hundredth: the median bin is known no better than that."""
+    rng, denied = np.random.default_rng(6), 0
+    for _ in range(100):
+        image = rng.normal(0, 1, (48, 64))
+        image.flat[rng.integers(0, image.size, 3)] += 5.0
+        state: Any = SimpleNamespace(
+            setting=SimpleNamespace(seen=SimpleNamespace(images={("MONO", "time"): (image, 1.0)})),
+            mismatches=[SimpleNamespace(statistic="fixed_correlation_0_1")],
+        )
+        denied += coloured(state, "hot_pixels") is not None
+    assert denied == 0
+
+
 @pytest.mark.parametrize(("scope", "denied"), [("time", True), ("offset", False)])
 def test_hot_pixels_are_denied_by_those_that_grow_with_time(scope: str, denied: bool) -> None:
     """Few pixels that jump stand out of offsets and gains, too: they are no hot ones."""

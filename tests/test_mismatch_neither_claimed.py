@@ -1,4 +1,4 @@
-"""Of two effects that frames do not tell apart neither is claimed, nor what makes the same, worse."""
+"""Of two effects that frames show alike neither is claimed, nor what makes the same, and worse."""
 
 from types import SimpleNamespace
 from typing import Any

@@ -70,7 +70,7 @@ def _state(
         for name, v in variances.items()
     }
     uniform = [SimpleNamespace(name=name, numbers=tuple(range(FRAMES))) for name in variances]
-    segment = SimpleNamespace(bits=12)
+    segment = SimpleNamespace(bits=12, segment=())
     clues = SimpleNamespace(
         signal=lambda place: at[place],
         shot_share=lambda place: max(1 - READ / levels[place].variance_dn2, 0.0),

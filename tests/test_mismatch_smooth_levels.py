@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from analysis.mismatch.bank.key import Key
 from analysis.mismatch.displaced import displaced
-from analysis.mismatch.smooth import at_no_switch, behind_smooth, smooth_as_well
+from analysis.mismatch.smooth import behind_smooth, behind_switch, by_levels, smooth_as_well
 
 Array = NDArray[np.float64]
 MANY = np.array([150.0, 2100, 4000, 5200, 6500, 7200, 7400, 8300, 9900])
@@ -33,7 +33,9 @@ def _state(bend: Array, signals: Array, seed: int, colours: int = 1) -> Any:
             sds.append(sd)
             at[f"flat-{i}", channel] = float(s)
     uniform = [SimpleNamespace(name=f"flat-{i}", kind="flat") for i in range(signals.size)]
+    paths = (SimpleNamespace(upper_dn=SWITCH), SimpleNamespace(upper_dn=None))
     return SimpleNamespace(
+        camera=SimpleNamespace(noise=SimpleNamespace(segment=paths)),
         setting=SimpleNamespace(layout=SimpleNamespace(uniform=uniform, channels=channels)),
         calibrated=SimpleNamespace(fit=SimpleNamespace(signal_dn=at)),
         vector=SimpleNamespace(keys=tuple(keys), values=np.array(values)),
@@ -50,6 +52,10 @@ def _kink(signals: Array, percent: float) -> Array:
 
 def _step(signals: Array, percent: float) -> Array:
     return percent / 100 * np.where(signals >= SWITCH, signals, 0.0)
+
+
+def _parabola(signals: Array, percent: float) -> Array:
+    return percent / 100 * signals * (1 - signals / TOP)
 
 
 def _bends(signals: Array, size_dn: float) -> dict[str, Array]:
@@ -80,7 +86,19 @@ def test_levels_that_bend_smoothly_deny_paths_that_disagree(law: str, colours: i
         state = _state(_bends(MANY, 12.0)[law], MANY, seed, colours)
         mean = _predicted(state, _kink)
         assert displaced(state, "dual_gain_mismatch", mean) is not None
-        assert displaced(state, "nonlinearity", mean) is None
+        assert displaced(state, "nonlinearity", _predicted(state, _parabola)) is None
+
+
+@pytest.mark.parametrize("law", [_kink, _step])
+@pytest.mark.parametrize("colours", [1, 3])
+def test_levels_that_change_where_a_path_begins_deny_a_bend(law: Any, colours: int) -> None:
+    for seed in range(5):
+        state = _state(law(MANY, 0.25), MANY, seed, colours)
+        denial = displaced(state, "nonlinearity", _predicted(state, _parabola))
+        assert denial is not None
+        assert "read-out path" in denial.why
+        state.camera.noise.segment = state.camera.noise.segment[1:]  # one path, and no switch
+        assert behind_switch(state, _predicted(state, _parabola)) == -np.inf
 
 
 @pytest.mark.parametrize("law", [_kink, _step])
@@ -102,7 +120,8 @@ def test_a_smooth_law_that_is_only_a_little_likelier_is_a_tie() -> None:
         behind = behind_smooth(state, mean)
         tie = smooth_as_well(state, mean, "dual_gain_mismatch", "nonlinearity")
         assert tie == (0 <= behind < 3)
-        assert not (tie and at_no_switch(state, "dual_gain_mismatch", mean))
+        denial = by_levels(state, "dual_gain_mismatch", state.null.mean, mean)[1]
+        assert not (tie and denial)
         seen.add(tie)
     assert seen == {True, False}
 

@@ -28,7 +28,7 @@ from analysis.mismatch.otherlags import other_lags
 from analysis.mismatch.recalibrate import code_step
 from analysis.mismatch.resolved import FAR_OFF
 from analysis.mismatch.sharing import of_charge, shared_otherwise
-from analysis.mismatch.smooth import at_no_switch
+from analysis.mismatch.smooth import by_levels
 from analysis.mismatch.state import State
 from analysis.mismatch.straight import curves, misfit, misfits, upwards
 from analysis.mismatch.wholeframes import of_moving_parts
@@ -56,7 +56,7 @@ def displaced(state: State, kind: str, mean: Array, without: Array | None = None
     what they would be without: by covariances that neighbours have instead, or by what is cut off
     of noise that leans. Where that leaves half of the misfit or less, there may be no bend; nor
     where variances scatter no more than codes that are not equally wide make them. Of a bend that
-    levels show is asked, where gains of read-out paths would disagree, whether it is smooth. Of
+    levels show is asked whether it is smooth, or begins where a read-out path does. Of
     filters, crosstalk and charge that repels charge, how alike neighbours are at each level; of
     counted photons and amplifiers of greens, by how much levels show them; of noise of whole lines,
     how alike samples along them are; of greens that differ, what other colours share with them; of
@@ -75,10 +75,10 @@ def displaced(state: State, kind: str, mean: Array, without: Array | None = None
     """
     without = state.null.mean if without is None else without
     if kind in _BENDS:
-        if _seen_in_levels(state, without, mean):
-            why = "levels bend smoothly, not where a read-out path begins"
-            return Denial(0.0, why) if at_no_switch(state, kind, mean) else None
-        return _of_neighbours(state) or _of_limits(state) or _of_codes(state)
+        seen, denial = by_levels(state, kind, without, mean)
+        if denial is None and not seen:
+            denial = _of_neighbours(state) or _of_limits(state) or _of_codes(state)
+        return denial
     if kind in LINES:
         denial = of_few_lines(state, kind, without) or of_parts(state, kind)
         return denial or moving_lines(state, kind, without)
@@ -98,15 +98,6 @@ def displaced(state: State, kind: str, mean: Array, without: Array | None = None
     denial = denial or shared_otherwise(state, kind, without)
     denial = denial or alike_without_light(state, kind, without)
     return denial or no_brighter_alike(state, kind, without)
-
-
-def _seen_in_levels(state: State, without: Array, mean: Array) -> bool:
-    """Return whether means of exposures are off without an effect, and half as far with it."""
-    levels = np.array([key.statistic == "level" for key in state.vector.keys]) & state.null.known
-    levels &= np.isfinite(without) & np.isfinite(mean)
-    values, sd = state.vector.values[levels], state.null.sd[levels]
-    before, after = np.abs(values - without[levels]), np.abs(values - mean[levels])
-    return bool(((before > FAR_OFF * sd) & (after < _MOST * before)).any())
 
 
 def _of_neighbours(state: State) -> Denial | None:

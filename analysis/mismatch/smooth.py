@@ -1,59 +1,135 @@
 """Whether levels bend smoothly, by whatever law, rather than where a read-out path begins."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from math import log
 
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.mismatch.contradicted import Denial
+from analysis.mismatch.resolved import FAR_OFF
 from analysis.mismatch.state import State
 
 Array = NDArray[np.float64]
 _DEGREES = (2, 3)  # of a response: bent one way, or by more in one half than in the other
 _TOLD_APART = 3.0  # of log-likelihood: odds of 20
+_MOST = 0.5  # of what levels are off, that is left where they show an effect
 
 
 def behind_smooth(state: State, mean: Array) -> float:
     """Return by how much log-likelihood a smooth bend explains the levels better than an effect.
 
     `mean` are the numbers predicted with the effect, whose size is free; the smooth bend is a
-    polynomial in the signal S. Beside both each channel's scale is free. A free number costs half
-    the logarithm of the number of levels (Schwarz, Annals of Statistics 6, 1978); where even the
-    better law misfits, all errors are larger by as much (Birge, Physical Review 40, 1932). Minus
-    infinity: levels do not say.
+    polynomial in the signal S. Minus infinity: levels do not say.
     """
-    flats = {e.name for e in state.setting.layout.uniform if e.kind == "flat"}
-    signals = state.calibrated.fit.signal_dn
-    which = [
-        i
-        for i, key in enumerate(state.vector.keys)
-        if key.statistic == "level" and key.scope == "exposure" and key.exposure in flats
-        if state.null.known[i] and np.isfinite(mean[i])
-    ]
-    places = [state.vector.keys[i].place for i in which]
-    sd = state.null.sd[which]
-    value = (state.vector.values[which] - state.null.mean[which]) / sd
-    signal = np.array([max(signals[at], 0.0) for at in places])
-    change = (mean[which] - state.null.mean[which]) / sd
-    if not change.any():
+    seen = _Levels.of(state, mean)
+    if seen is None:
         return -np.inf
-    s = signal / signal.max()
-    channels = sorted({channel for _, channel in places})
-    scales = [np.where([own == channel for _, own in places], s, 0.0) / sd for channel in channels]
-    price = log(len(which))
-    laws = [[*scales, *(s**power / sd for power in range(2, most + 1))] for most in _DEGREES]
-    fits = [(_misfit(value, law), len(law)) for law in (*laws, [*scales, change])]
-    if any(free >= len(which) for _, free in fits):
-        return -np.inf
-    *smooth, own = (misfit + free * price for misfit, free in fits)
-    wider = min(misfit / (len(which) - free) for misfit, free in fits)
-    best = min(smooth)
-    return (own - best) / 2 / max(wider, 1.0)
+    s = seen.signal / seen.signal.max()
+    smooth = [[s**power for power in range(2, most + 1)] for most in _DEGREES]
+    return seen.behind([[seen.change]], smooth)
 
 
-def at_no_switch(state: State, kind: str, mean: Array) -> bool:
-    """Return whether levels deny that gains of read-out paths disagree: they bend smoothly."""
-    return kind == "dual_gain_mismatch" and behind_smooth(state, mean) >= _TOLD_APART
+def behind_switch(state: State, mean: Array) -> float:
+    """Return by how much a switch of the read-out explains the levels better than a bend.
+
+    Where a path of the camera ends, gains are others above, or have another slope; the bend is as
+    predicted with it, or any that is smooth. As `behind_smooth` else.
+    """
+    ends = [own.upper_dn for own in state.camera.noise.segment if own.upper_dn is not None]
+    seen = _Levels.of(state, mean) if ends else None
+    if seen is None:
+        return -np.inf
+    s = seen.signal / seen.signal.max()
+    smooth = [[s**power for power in range(2, most + 1)] for most in _DEGREES]
+    above = [s * (seen.signal >= end) for end in ends]
+    beyond = [np.maximum(seen.signal - end, 0.0) / seen.signal.max() for end in ends]
+    return seen.behind([[seen.change], *smooth], [[one] for one in (*above, *beyond)])
+
+
+@dataclass(frozen=True)
+class _Levels:
+    """Levels of flats that differ from a model's, and what an effect changes of them: (level,).
+
+    Attributes
+    ----------
+    value, change
+        What is left without the effect, and what it makes, DN.
+    sd
+        Standard deviations, DN.
+    signal
+        DN above black.
+    scales
+        Of each channel: its signal.
+    """
+
+    value: Array
+    change: Array
+    sd: Array
+    signal: Array
+    scales: tuple[Array, ...]
+
+    @classmethod
+    def of(cls, state: State, mean: Array) -> "_Levels | None":
+        """Return the levels; None: there are none that an effect changes."""
+        flats = {e.name for e in state.setting.layout.uniform if e.kind == "flat"}
+        signals = state.calibrated.fit.signal_dn
+        which = [
+            i
+            for i, key in enumerate(state.vector.keys)
+            if key.statistic == "level" and key.scope == "exposure" and key.exposure in flats
+            if state.null.known[i] and np.isfinite(mean[i])
+        ]
+        places = [state.vector.keys[i].place for i in which]
+        value, change = (own[which] - state.null.mean[which] for own in (state.vector.values, mean))
+        if not change.any():
+            return None
+        signal = np.array([max(signals[at], 0.0) for at in places])
+        channels = sorted({channel for _, channel in places})
+        masks = [np.array([own == channel for _, own in places]) for channel in channels]
+        scales = tuple(np.where(own, signal / signal.max(), 0.0) for own in masks)
+        return cls(value, change, state.null.sd[which], signal, scales)
+
+    def behind(self, some: Sequence[Sequence[Array]], others: Sequence[Sequence[Array]]) -> float:
+        """Return by how much log-likelihood the best of other laws is better than that of some.
+
+        Beside each, every channel's scale is free. A free number costs half the logarithm of the
+        number of levels (Schwarz, Annals of Statistics 6, 1978); where even the better law misfits,
+        all errors are larger by as much (Birge, Physical Review 40, 1932). Minus infinity: levels
+        are too few.
+        """
+        count, laws = len(self.value), [[*self.scales, *law] for law in (*some, *others)]
+        if any(len(law) >= count for law in laws):
+            return -np.inf
+        misfits = [self._misfit(law) for law in laws]
+        cost = [misfit + len(law) * log(count) for misfit, law in zip(misfits, laws, strict=True)]
+        wider = min(misfit / (count - len(law)) for misfit, law in zip(misfits, laws, strict=True))
+        return (min(cost[: len(some)]) - min(cost[len(some) :])) / 2 / max(wider, 1.0)
+
+    def _misfit(self, columns: Sequence[Array]) -> float:
+        """Return the sum of squares that columns leave of values, in standard deviations."""
+        design, value = np.stack(columns, 1) / self.sd[:, np.newaxis], self.value / self.sd
+        rest = value - design @ np.linalg.lstsq(design, value, rcond=None)[0]
+        return float((rest**2).sum())
+
+
+def by_levels(state: State, kind: str, without: Array, mean: Array) -> tuple[bool, Denial | None]:
+    """Return whether levels show a bend, and how they deny it: it is smooth, or it is not.
+
+    That they show it says that means of exposures are off without it, and half as far with it.
+    """
+    levels = np.array([key.statistic == "level" for key in state.vector.keys]) & state.null.known
+    levels &= np.isfinite(without) & np.isfinite(mean)
+    values, sd = state.vector.values[levels], state.null.sd[levels]
+    before, after = np.abs(values - without[levels]), np.abs(values - mean[levels])
+    seen = bool(((before > FAR_OFF * sd) & (after < _MOST * before)).any())
+    if seen and kind == "dual_gain_mismatch" and behind_smooth(state, mean) >= _TOLD_APART:
+        return seen, Denial(0.0, "levels bend smoothly, not where a read-out path begins")
+    if kind == "nonlinearity" and behind_switch(state, mean) >= _TOLD_APART:
+        why = "levels change where a read-out path begins, and do not bend smoothly"
+        return seen, Denial(0.0, why)
+    return seen, None
 
 
 def smooth_as_well(state: State, mean: Array, kind: str, other: str) -> bool:
@@ -64,9 +140,3 @@ def smooth_as_well(state: State, mean: Array, kind: str, other: str) -> bool:
     if (kind, other) != ("dual_gain_mismatch", "nonlinearity"):
         return False
     return 0 <= behind_smooth(state, mean) < _TOLD_APART
-
-
-def _misfit(value: Array, columns: Sequence[Array]) -> float:
-    """Return the sum of squares that columns leave of values."""
-    design = np.stack(columns, 1)
-    return float(((value - design @ np.linalg.lstsq(design, value, rcond=None)[0]) ** 2).sum())

@@ -85,4 +85,22 @@ def test_middle_of_a_histogram() -> None:
     assert own is not None
     assert own.step == 3
     assert own.absent.size == 0
-    assert Codes.of(50, np.full(300, 100)).middle is None  # absent by chance, it could be
+    assert Codes.of(50, np.full(300, 40)).middle is None  # absent by chance, it could be
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_inner_half_of_a_broad_histogram_tells_absent_codes(seed: int) -> None:
+    """Noise of 240 DN in 42 000 samples: at 5 % of them are eight a code."""
+    rng = np.random.default_rng(seed)
+    noise = rng.normal(30_000.0, 240.0, 42_000)
+    codes = np.floor(np.rint(noise / 1.5) * 1.5 + 0.5).astype(np.int64)
+    lowest = int(codes.min())
+    own = Codes.of(lowest, np.bincount(codes - lowest)).middle
+    assert own is not None
+    assert own.first == pytest.approx(30_000 - 0.6745 * 240, abs=6)
+    assert own.absent.tolist() == [c for c in range(own.first, own.last + 1) if c % 3 == 1]
+    plain = np.rint(noise).astype(np.int64)
+    lowest = int(plain.min())
+    own = Codes.of(lowest, np.bincount(plain - lowest)).middle
+    assert own is not None
+    assert own.absent.size == 0

@@ -13,10 +13,11 @@ from analysis.mismatch.contradicted import refuted
 from analysis.mismatch.credited import joined, kept_up
 from analysis.mismatch.displaced import displaced
 from analysis.mismatch.fitted import WEAK, Fitted
+from analysis.mismatch.forgiving import to_forgive
 from analysis.mismatch.forms import in_form
 from analysis.mismatch.instance import LINES, Frequency, frequency_of, instance
 from analysis.mismatch.instep import in_step
-from analysis.mismatch.judge import INSTEAD, LITTLE, NEEDLESS, NOTHING, Judge
+from analysis.mismatch.judge import INSTEAD, NEEDLESS, NOTHING, Judge
 from analysis.mismatch.memory import Memory
 from analysis.mismatch.named import Named
 from analysis.mismatch.phase import ABSENT, WholeFrames
@@ -44,6 +45,7 @@ _MOST_EFFECTS = 20  # some may have to go again
 _CHOSEN = frozenset({"adc_memory", "dual_gain"})  # a period, a gap between levels
 _MOST_LINES = 5  # further ones stay unexplained, located
 _ROUNDS, _FEW_ROUNDS = 6, 3  # of a search that goes on; of a large recording
+_FORGIVING = 2  # rounds after which what was dropped may come back
 
 
 @dataclass
@@ -90,11 +92,12 @@ class Search(Fitted):
         """Return the final state of a search that goes on from one.
 
         What was dropped had hidden something: it is looked for once more. An effect that explained
-        some of what it changes, while others were missing, may come back, once. What differs only
-        since all was fitted together, or in all frames, is looked for as well. `again`: what is
-        named is judged even where nothing is added.
+        some of what it changes, beside others or without them, may come back, once. What differs
+        only since all was fitted together, or in all frames, is looked for as well. `again`: what
+        is named is judged even where nothing is added.
         """
         forgiven: dict[str, str] = {}
+        dropped: list[Named] = []
         for number in range(_FEW_ROUNDS if self.setting.large else _ROUNDS):
             known = len(self.named)
             state = self._sought(state)
@@ -106,12 +109,14 @@ class Search(Fitted):
             taken = list(self.named)
             state = self._asked_of_all(self._pruned(state))
             kept = {one.name for one in self.named}
-            dropped = [one for one in taken if one.name not in kept]
-            if not (dropped or differ(sought, state.mismatches)) or not state.mismatches:
+            dropped += [one for one in taken if one.name not in kept]
+            gone = any(one.name not in kept for one in taken)
+            if not (gone or differ(sought, state.mismatches)) or not state.mismatches:
                 break
-            forgiven |= self._forgiven(dropped) if number == 0 else {}
-        left = forgiven.keys() - {one.name for one in self.named}
-        self.refused |= self.doubted | {name: forgiven[name] for name in sorted(left)}
+            left = [one for one in dropped if one.name not in forgiven]
+            forgiven |= self._forgiven(left) if number < _FORGIVING else {}
+        gone_on = sorted(forgiven.keys() - {one.name for one in self.named})
+        self.refused |= self.doubted | {name: forgiven[name] for name in gone_on}
         return state
 
     def _asked_of_all(self, state: State) -> State:
@@ -130,18 +135,12 @@ class Search(Fitted):
         return seen
 
     def _forgiven(self, dropped: Sequence[Named]) -> dict[str, str]:
-        """Let effects be proposed again that explained too little of what they change, and why.
-
-        Or that went for another which went as well.
-        """
+        """Let effects be proposed again, see `to_forgive`, and return why they went."""
         found = {}
-        for one in dropped:
-            why = self.refused.get(one.name, "")
-            stays = any(other.name in why for other in self.named)
-            if why.startswith(LITTLE) or (why.startswith(INSTEAD) and not stays):
-                found[one.name] = self.refused.pop(one.name)
-                line = frequency_of(one.effect)
-                self.settled = [own for own in self.settled if own != (one.kind, line)]
+        for one in to_forgive(self.refused, dropped, self.named):
+            found[one.name] = self.refused.pop(one.name)
+            line = frequency_of(one.effect)
+            self.settled = [own for own in self.settled if own != (one.kind, line)]
         return found
 
     def _sought(self, state: State, *, strong: bool = False) -> State:

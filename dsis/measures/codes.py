@@ -31,6 +31,8 @@ _RATIO = 1.03  # of the sizes of bands, and of where they begin
 _LEAST_DOF, _NODES = 4.0, 20
 _MIDDLE = (0.05, 0.95)  # of the samples: there no density is less than a tenth of its mean
 _EXPECTED = 300.0  # samples a code there on average: at a tenth of it none is missed by chance
+_INNER = (0.25, 0.75)  # of the samples: there no density is less than two thirds of its mean
+_EXPECTED_INNER = 45.0  # samples a code there on average
 _FEW = 20.0  # samples a code there: of fewer many are missed by chance
 
 
@@ -65,7 +67,7 @@ class Middle:
     Attributes
     ----------
     first, last
-        Codes at 5 and 95 % of the samples, DN.
+        Codes at 5 and 95 % of the samples, DN; of fewer samples a code at 25 and 75 %.
     step
         Between codes that a converter gives, DN.
     absent
@@ -207,12 +209,14 @@ class Codes:
         step = self.lattice.step
         skipped = (self.lattice.code - self.lowest) % step
         counts, start = self.counts[skipped::step], self.lowest + skipped
-        first, last = np.searchsorted(np.cumsum(counts), np.array(_MIDDLE) * counts.sum())
-        inside = counts[first : last + 1]
-        if inside.size < _LEAST_CODES or inside.mean() < _EXPECTED:
-            return None
-        absent = start + step * (first + np.flatnonzero(inside == 0))
-        return Middle(int(start + step * first), int(start + step * last), step, absent)
+        below = np.cumsum(counts)
+        for ends, expected in ((_MIDDLE, _EXPECTED), (_INNER, _EXPECTED_INNER)):
+            first, last = np.searchsorted(below, np.array(ends) * below[-1])
+            inside = counts[first : last + 1]
+            if inside.size >= _LEAST_CODES and inside.mean() >= expected:
+                absent = start + step * (first + np.flatnonzero(inside == 0))
+                return Middle(int(start + step * first), int(start + step * last), step, absent)
+        return None
 
     @property
     def gap(self) -> float:

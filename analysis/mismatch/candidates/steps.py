@@ -20,7 +20,7 @@ _AT_ONCE = 1 << 18  # steps times codes
 _MOST = 20_000  # steps tried: where more are left the codes tell none
 _PLAIN = 64  # the largest divisor of a step that is a ratio
 _BETWEEN = 11  # steps of a range, its ends among them
-_EDGE = 1e-6  # of a code
+_EDGE, _DIGITS = 1e-6, 6  # of a code
 
 
 @dataclass(frozen=True)
@@ -173,7 +173,7 @@ def _plainest(seen: Seen, runs: Sequence[tuple[float, float]]) -> tuple[float, f
         plain = [(int(high * divisor) / divisor, divisor)] if divisor else []
         others = np.linspace(low, high, _BETWEEN)[1:-1].tolist()
         for own, rank in (*plain, *((other, _PLAIN + 1) for other in others)):
-            phase = float(seen.wrong(np.array([own]))[1][0])
+            phase = round(float(seen.wrong(np.array([own]))[1][0]), _DIGITS)
             tried.append((seen.missed(own, 0.0), 2 * rank, own, 0.0))
             tried.append((seen.missed(own, phase), 2 * rank + 1, own, phase))
     wrong, _, step, phase = min(tried)

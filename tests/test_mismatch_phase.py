@@ -15,13 +15,17 @@ from dsis.effects.dsnu import Dsnu
 from dsis.effects.periodic_noise import PeriodicNoise
 
 ROWS, COLUMNS, FRAMES, SD = 48, 64, 12, 2.0
+CHANNELS = ("R", "Gr", "Gb", "B")
 FramesOf = Callable[[str], Iterator[NDArray[np.float64]]]
 LAYOUT: Any = SimpleNamespace(
     rows=ROWS,
     columns=COLUMNS,
-    channels=("R", "Gr", "Gb", "B"),
+    channels=CHANNELS,
     uniform=(SimpleNamespace(name="dark"), SimpleNamespace(name="flat")),
-    variance_dn2={(e, c): SD**2 for e in ("dark", "flat") for c in ("R", "Gr", "Gb", "B")},
+    variance_dn2={(e, c): SD**2 for e in ("dark", "flat") for c in CHANNELS},
+    signal_dn={
+        (e, c): 400.0 * (e == "flat") for e in ("dark", "flat") for c in ("R", "Gr", "Gb", "B")
+    },
 )
 
 
@@ -131,6 +135,7 @@ def test_the_slowest_wave_of_noise_that_rises_is_no_line(seed: int, wave: float)
     rows = 96
     layout: Any = SimpleNamespace(**{**vars(LAYOUT), "rows": rows, "channels": ("MONO",)})
     layout.variance_dn2 = {(e, "MONO"): SD**2 for e in ("dark", "flat")}
+    layout.signal_dn = {("dark", "MONO"): 0.0, ("flat", "MONO"): 400.0}
     at = (0.0, 1.1 / rows)
 
     def of(name: str) -> Iterator[NDArray[np.float64]]:
@@ -233,3 +238,28 @@ def test_a_weak_line_of_eight_pixels_is_not_named_where_few_frames_know_no_phase
     whole = WholeFrames(LAYOUT, _frames(at, free=True, frames=3))
     line: Any = {"kind": "bistable_pattern", "amplitude_dn": 1.0, "frequency": at}
     assert whole.denial(BistablePattern(**line)) == "frames do not tell whether its phase is kept"
+
+
+@pytest.mark.parametrize(("of_light", "sizes"), [(True, (0.0, 1.0)), (False, (1.0, 1.0))])
+@pytest.mark.parametrize("at", [(0.0, 0.5), (0.21, 0.13)])
+def test_a_pattern_that_grows_with_the_light_is_none_of_the_read_out(
+    at: tuple[float, float], of_light: bool, sizes: tuple[float, float]
+) -> None:
+    """Two fields of rows that flicker each by itself, say, and interference on light."""
+    for seed in range(5):
+
+        def of(name: str, seed: int = seed) -> Iterator[NDArray[np.float64]]:
+            rng = np.random.default_rng([seed, len(name)])
+            y, x = np.arange(ROWS)[:, np.newaxis], np.arange(COLUMNS)
+            for _ in range(FRAMES):
+                phase = 0.5 * rng.integers(2) if at[1] == 0.5 else rng.uniform()
+                wave = np.cos(2 * np.pi * (at[0] * x + at[1] * y + phase))
+                size = 0.3 * SD * sizes[name == "flat"]
+                yield 100 + size * wave + rng.normal(0, SD, (ROWS, COLUMNS))
+
+        seen = look(LAYOUT, of, at)
+        assert not seen.absent
+        assert seen.grows == of_light
+        kind = BistablePattern if at[1] == 0.5 else PeriodicNoise
+        denial = WholeFrames(LAYOUT, of).denial(kind(amplitude_dn=0.5, frequency=at))
+        assert ("light" in (denial or "")) == of_light

@@ -46,6 +46,7 @@ _PHASE_WORDS = {
 ABSENT = "the frames show nothing there that noise does not show at some frequency"
 _BY_CHANCE = "it would be at a frequency of single pixels by chance only"
 _UNTOLD = "frames do not tell whether its phase is kept"
+_OF_LIGHT = "it grows with the light, as no pattern of the read-out does"
 _BROAD = "frequencies beside it are raised as well: it is no line"
 
 
@@ -95,6 +96,8 @@ class WholeFrames:
         seen = self._looks[frequency]
         if seen.absent or seen.broad:
             return ABSENT if seen.absent else _BROAD
+        if seen.grows:
+            return _OF_LIGHT
         return self._other_phase(seen, frequency, kept=effect.kind == "bistable_pattern")
 
     def _other_phase(self, seen: "Look", frequency: Frequency, *, kept: bool) -> str | None:
@@ -256,6 +259,8 @@ class Look:
         Whether frequencies beside it are raised as well.
     kept
         Whether the phase is kept but for its sign; None where the frames cannot tell.
+    grows
+        Whether it is in proportion to the signal.
     line
         Projections at the frequency looked at that shows most; None: of too few frames.
     crest
@@ -269,6 +274,7 @@ class Look:
     absent: bool
     broad: bool
     kept: bool | None
+    grows: bool = False
     line: "Power | None" = None
     crest: float = 1.0
     frequency: Frequency | None = None
@@ -323,19 +329,19 @@ def look(
             continue
         broad |= around.crowded(some, float(among.excess[0]))
     absent = own.chance(real=real) * bins > _CHANCE
-    kept = own.keeps_phase(real=real)
+    kept, grows = own.keeps_phase(real=real), own.grows(layout, real=real)
     if exact:
         found = float(own.excess[0])
         error = own.bins(found) if found > 0 else np.inf
         single = _of_pixels(frequency, 4)  # one or two pixels: interference is hardly there
         if not single and float(np.linalg.norm(off)) > _BESIDE * error:
             return look(layout, frames_of, frequency, anywhere=True)
-        return Look(absent, broad, kept, own, exact=True)
+        return Look(absent, broad, kept, grows, own, exact=True)
     there = (fx + off[0] / columns, fy + off[1] / rows)
     # What lies along an axis of the frequencies, as stripes do, stays there.
     asked = zip(frequency, there, strict=True)
     x, y = (f if (2 * f) % 1 == 0 else (at + 0.5) % 1 - 0.5 for f, at in asked)
-    return Look(absent, broad, kept, own, crest, (x, y))
+    return Look(absent, broad, kept, grows, own, crest, (x, y))
 
 
 def _wandering(layout: Layout, frames_of: FramesOf, at: Frequency) -> float:

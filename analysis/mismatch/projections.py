@@ -17,6 +17,7 @@ _RAISED, _SHARE = 4.0, 0.3  # standard errors, and of the power, from which neig
 _ONE_LINE, _CIRCLE = 0.75, 0.45
 _CLEAR = 8.0  # standard errors of the noise's power from which a line's phase is seen
 SURE = 3.0  # of log-likelihood, to prefer one kind of phase
+_ASKED = 4.0  # amplitude of one frame, in noise, of which likelihoods are asked as they are
 
 
 @dataclass(frozen=True)
@@ -62,6 +63,15 @@ class Power:
             tuple(own / np.sqrt(m) for own, m in zip(self.found, noise, strict=True)),
             tuple(w / m for w, m in zip(self.weights, noise, strict=True)),
         )
+
+    def lit(self, layout: Layout) -> "Power":
+        """Return the same of what is in proportion to the signal."""
+        signals = [
+            float(np.mean([max(layout.signal_dn[e.name, c], 0.0) for c in layout.channels]))
+            for e in layout.uniform
+        ]
+        squares = zip(self.weights, signals, strict=True)
+        return replace(self, weights=tuple(weight * signal**2 for weight, signal in squares))
 
     @property
     def frames(self) -> int:
@@ -131,6 +141,25 @@ class Power:
         """
         own = [float(np.sqrt(max(power, 0.0) * w)) for w in self.weights]
         return there([one[:, 0] for one in self.found], own, kept=kept, real=real)
+
+    def grows(self, layout: Layout, *, real: bool) -> bool:
+        """Return whether the first pattern is in proportion to the signal, and not constant."""
+        lit = self.lit(layout)
+        if not any(lit.weights):
+            return False
+        powers = [max(float(own.excess[0]), 0.0) for own in (lit, self)]
+        asked = list(zip((lit, self), powers, strict=True))
+        most = max(power * weight for own, power in asked for weight in own.weights) ** 0.5
+        scale = _ASKED / max(most, _ASKED)  # of strong lines: both beside the same noise
+        grown, constant = (
+            own.scaled(scale).there(power, kept=False, real=real) for own, power in asked
+        )
+        return powers[0] > 0 and grown - constant > SURE
+
+    def scaled(self, scale: float) -> "Power":
+        """Return the same where patterns and what was found of them are so much smaller."""
+        weights = tuple(weight * scale**2 for weight in self.weights)
+        return Power(tuple(own * scale for own in self.found), weights)
 
     def bins(self, power: float) -> float:
         """Return the standard error of a line's frequency along an axis, in bins."""

@@ -218,7 +218,7 @@ def test_what_resembles_it_is_not_it(kind: str, values: dict[str, float]) -> Non
     assert [one.effect for one in found.omitted_physics] == [kind]
 
 
-def _wander(length: float, drift_dn: float, *, located: bool = True) -> Any:
+def _wander(length: float, drift_dn: float, located: str = "row_correlation") -> Any:
     """Return a state with a drift, and slow waves of rows that no effect of it explains.
 
     Row means of variance 1 / 4 DN^2 whose neighbours are alike, beside white pixels of 20 DN^2:
@@ -230,7 +230,7 @@ def _wander(length: float, drift_dn: float, *, located: bool = True) -> Any:
     ratio = 1 + (waves / cycles).sum() / (1 / cycles).sum() / (20 / columns)
     key = Stub(statistic="slow_row_variance", scope="all")
     state = Stub(
-        mismatches=[Stub(statistic="row_correlation")] if located else [],
+        mismatches=[Stub(statistic=located)],
         setting=Stub(
             layout=Stub(rows=rows, columns=columns),
             seen=Stub(levels={"dark": Stub(variance_dn2=20.0), "flat": Stub(variance_dn2=90.0)}),
@@ -247,6 +247,7 @@ def test_frames_do_not_wander_by_what_their_rows_share(length: float) -> None:
     own = float(np.sqrt(toeplitz(np.exp(-np.arange(96) / length)).mean() / 4))
     assert wandering(*_wander(length, own)) is not None
     assert wandering(*_wander(length, 4 * own)) is None
-    assert wandering(*_wander(length, own, located=False)) is None
+    assert wandering(*_wander(length, own, "slow_row_variance")) is not None
+    assert wandering(*_wander(length, own, "frame_variance")) is None
     state, _ = _wander(length, own)
     assert wandering(state, effect("flicker", sigma_percent=0.1)) is None

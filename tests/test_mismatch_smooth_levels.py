@@ -9,7 +9,13 @@ from numpy.typing import NDArray
 
 from analysis.mismatch.bank.key import Key
 from analysis.mismatch.displaced import displaced
-from analysis.mismatch.smooth import behind_smooth, behind_switch, by_levels, smooth_as_well
+from analysis.mismatch.smooth import (
+    at_a_switch,
+    behind_smooth,
+    behind_switch,
+    by_levels,
+    smooth_as_well,
+)
 
 Array = NDArray[np.float64]
 MANY = np.array([150.0, 2100, 4000, 5200, 6500, 7200, 7400, 8300, 9900])
@@ -97,6 +103,10 @@ def test_levels_that_change_where_a_path_begins_deny_a_bend(law: Any, colours: i
         denial = displaced(state, "nonlinearity", _predicted(state, _parabola))
         assert denial is not None
         assert "read-out path" in denial.why
+        stated = _predicted(state, _parabola)
+        assert at_a_switch(state, "adc_memory", stated) is not None
+        state.mismatches.append(SimpleNamespace(statistic="carry_over"))
+        assert at_a_switch(state, "adc_memory", stated) is None
         state.camera.noise.segment = state.camera.noise.segment[1:]  # one path, and no switch
         assert behind_switch(state, _predicted(state, _parabola)) == -np.inf
 

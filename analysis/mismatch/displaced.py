@@ -28,7 +28,7 @@ from analysis.mismatch.otherlags import other_lags
 from analysis.mismatch.recalibrate import code_step
 from analysis.mismatch.resolved import FAR_OFF
 from analysis.mismatch.sharing import of_charge, shared_otherwise
-from analysis.mismatch.smooth import by_levels
+from analysis.mismatch.smooth import at_a_switch, by_levels
 from analysis.mismatch.state import State
 from analysis.mismatch.straight import curves, misfit, misfits, upwards
 from analysis.mismatch.wholeframes import of_moving_parts
@@ -95,7 +95,7 @@ def displaced(state: State, kind: str, mean: Array, without: Array | None = None
         or otherwise_by_level(state, kind, without, mean)
     )
     denial = denial or of_few_lines(state, kind, without, mean) or of_late_light(state, kind)
-    denial = denial or shared_otherwise(state, kind, without)
+    denial = denial or shared_otherwise(state, kind, without) or at_a_switch(state, kind, mean)
     denial = denial or alike_without_light(state, kind, without)
     return denial or no_brighter_alike(state, kind, without)
 

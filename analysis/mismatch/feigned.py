@@ -47,6 +47,7 @@ _AXES = {"row_fpn": "rows", "column_fpn": "columns", "row_prnu": "rows", "column
 _GROWING = frozenset({"row_prnu", "column_prnu"})
 _CLEAR = 5.0  # standard errors of what stands out
 _SURE = 4.0  # of what few frequencies make
+_ALIKE_ROWS = frozenset({"row_correlation", "slow_row_variance"})
 _SHAPED = frozenset({"half_seam", "parity", STATISTIC})
 _NEIGHBOURS = frozenset({"fixed_correlation_0_1", "fixed_correlation_1_0", "fixed_patch_variance"})
 _LIKE, _RARE = 0.3, 1e-6  # a share of a height; the chance of as many neighbours
@@ -182,7 +183,7 @@ def wandering(state: State, effect: Effect) -> Denial | None:
     these are left unexplained, and would do so, no frame may wander by itself.
     """
     called = {m.statistic for m in state.mismatches}
-    if not isinstance(effect, BlackLevelDrift) or "row_correlation" not in called:
+    if not isinstance(effect, BlackLevelDrift) or called.isdisjoint(_ALIKE_ROWS):
         return None
     seen, layout = state.setting.seen, state.setting.layout
     waves = [

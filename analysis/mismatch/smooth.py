@@ -7,6 +7,7 @@ from math import log
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.mismatch.candidates import CANDIDATES
 from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.resolved import FAR_OFF
 from analysis.mismatch.state import State
@@ -14,6 +15,7 @@ from analysis.mismatch.state import State
 Array = NDArray[np.float64]
 _DEGREES = (2, 3)  # of a response: bent one way, or by more in one half than in the other
 _TOLD_APART = 3.0  # of log-likelihood: odds of 20
+_AT_SWITCH = "levels change where a read-out path begins"
 _MOST = 0.5  # of what levels are off, that is left where they show an effect
 
 
@@ -127,9 +129,19 @@ def by_levels(state: State, kind: str, without: Array, mean: Array) -> tuple[boo
     if seen and kind == "dual_gain_mismatch" and behind_smooth(state, mean) >= _TOLD_APART:
         return seen, Denial(0.0, "levels bend smoothly, not where a read-out path begins")
     if kind == "nonlinearity" and behind_switch(state, mean) >= _TOLD_APART:
-        why = "levels change where a read-out path begins, and do not bend smoothly"
-        return seen, Denial(0.0, why)
+        return seen, Denial(0.0, f"{_AT_SWITCH}, and do not bend smoothly")
     return seen, None
+
+
+def at_a_switch(state: State, kind: str, mean: Array) -> Denial | None:
+    """Return how a residue of the converter is denied by levels that change at a switch; None: not.
+
+    Where nothing but levels leads to it.
+    """
+    called = {m.statistic for m in state.mismatches}
+    if kind != "adc_memory" or not called.isdisjoint(CANDIDATES[kind].calls):
+        return None
+    return Denial(0.0, _AT_SWITCH) if behind_switch(state, mean) >= _TOLD_APART else None
 
 
 def smooth_as_well(state: State, mean: Array, kind: str, other: str) -> bool:

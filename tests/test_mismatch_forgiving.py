@@ -20,6 +20,7 @@ SOME: dict[str, Any] = {name: SimpleNamespace(name=name) for name in ("bend", "r
         ({"bend": LITTLE, "residue": LITTLE, "glow": NEEDLESS}, [], ["bend", "residue"]),
         ({"bend": f"{INSTEAD} glow explains better"}, [], ["bend"]),
         ({"bend": f"{INSTEAD} glow explains better"}, ["glow"], []),
+        ({"bend": f"{INSTEAD} afterglow explains better"}, ["glow"], ["bend"]),
         ({"bend": NEEDLESS}, [], []),
         ({}, ["glow"], []),
     ],

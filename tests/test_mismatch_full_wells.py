@@ -10,7 +10,8 @@ from analysis.mismatch.prove.virtual import virtual_sensor
 from analysis.mismatch.source import Source
 from analysis.mismatch.split import Split
 from analysis.mismatch.taking import layout_of
-from dsis.effects import Effect
+from dsis.camera import Camera
+from dsis.effects import Effect, registry
 from dsis.effects.saturation import Saturation
 from mismatch_recordings import InMemory, camera, held_of, recorded
 
@@ -40,10 +41,33 @@ def test_which_flats_are_full(full: float, names: set[str]) -> None:
     assert layout.full == {(name, "MONO") for name in names}
 
 
-def test_noise_that_grows_fills_no_pixel() -> None:
-    recording = recorded(camera(), 2, rows=SIDE, columns=SIDE)
-    layout = layout_of(recording, Split.of(recording).development, Source(recording).frames)
-    assert layout.full == frozenset()
+@pytest.mark.parametrize(
+    "true",
+    [
+        camera(),
+        camera(registry()["flicker"](sigma_percent=5.0)),
+        camera(registry()["black_level_drift"](sigma_dn=20.0)),
+        camera(segments=((2.0, 20.0, 1200.0), (0.3, 10.0, None))),
+    ],
+    ids=["plain", "flicker", "drift", "quieter path"],
+)
+def test_flats_that_are_not_full_keep_their_say(true: Camera) -> None:
+    """The last one: noise falls where another read-out path begins, and grows from there on."""
+    for seed in range(6):
+        recording = recorded(true, seed, rows=SIDE, columns=SIDE)
+        layout = layout_of(recording, Split.of(recording).development, Source(recording).frames)
+        assert layout.full == frozenset()
+
+
+@pytest.mark.parametrize("softness", [30.0, 100.0])
+def test_a_soft_limit_below_known_light_is_found_as_soft(softness: float) -> None:
+    true = camera(Saturation(full_well_dn=FULL, softness_dn=softness))
+    levels = (100.0, 300.0, 600.0, 1000.0, 1500.0, 2000.0, 3000.0)
+    recording = recorded(true, 3, rows=SIDE, columns=SIDE, levels=levels)
+    words = frozenset({"saturation", "nonlinearity", "row_prnu"})
+    (found,) = find_mismatch(camera(), recording, vocabulary=words).omitted_physics
+    assert found.parameters["softness_dn"].value == pytest.approx(softness, rel=0.05)
+    assert found.parameters["full_well_dn"].value == pytest.approx(FULL, abs=1.5)
 
 
 def test_a_full_well_hides_no_gains_and_is_proven() -> None:

@@ -25,6 +25,7 @@ LAYOUT: Any = SimpleNamespace(
     channels=("MONO",),
     uniform=tuple(SimpleNamespace(name=name) for name in EXPOSURES),
     variance_dn2={(e, "MONO"): (3 * SD) ** 2 if e == "flat" else SD**2 for e in EXPOSURES},
+    still=frozenset(),
     signal_dn={(e, "MONO"): 400.0 * (e == "flat") for e in EXPOSURES},
 )
 

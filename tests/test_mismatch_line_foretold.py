@@ -25,6 +25,7 @@ def _layout() -> Any:
         channels=("MONO",),
         uniform=tuple(SimpleNamespace(name=n, numbers=tuple(range(FRAMES))) for n in SD),
         variance_dn2={(name, "MONO"): sd**2 for name, sd in SD.items()},
+        still=frozenset(),
         signal_dn={(name, "MONO"): sd**2 for name, sd in SD.items()},
     )
 

@@ -23,6 +23,7 @@ LAYOUT: Any = SimpleNamespace(
     channels=CHANNELS,
     uniform=(SimpleNamespace(name="dark"), SimpleNamespace(name="flat")),
     variance_dn2={(e, c): SD**2 for e in ("dark", "flat") for c in CHANNELS},
+    still=frozenset(),
     signal_dn={
         (e, c): 400.0 * (e == "flat") for e in ("dark", "flat") for c in ("R", "Gr", "Gb", "B")
     },
@@ -263,3 +264,14 @@ def test_a_pattern_that_grows_with_the_light_is_none_of_the_read_out(
         kind = BistablePattern if at[1] == 0.5 else PeriodicNoise
         denial = WholeFrames(LAYOUT, of).denial(kind(amplitude_dn=0.5, frequency=at))
         assert ("light" in (denial or "")) == of_light
+
+
+def test_darks_whose_codes_hardly_move_deny_no_pattern() -> None:
+    """They show nothing, whatever there is: it may be the same at all signals."""
+    for still, grows in ((frozenset(), True), (frozenset(("dark", c) for c in CHANNELS), False)):
+        layout: Any = SimpleNamespace(**{**vars(LAYOUT), "still": still})
+
+        def of(name: str) -> Iterator[NDArray[np.float64]]:
+            return _frames((0.21, 0.13), free=True, amplitude=0.3 * (name == "flat"))(name)
+
+        assert look(layout, of, (0.21, 0.13)).grows == grows

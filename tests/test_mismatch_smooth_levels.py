@@ -121,6 +121,14 @@ def test_paths_that_disagree_are_not_denied(law: Any, colours: int) -> None:
         assert not smooth_as_well(state, mean, "dual_gain_mismatch", "nonlinearity")
 
 
+def test_levels_on_one_side_of_a_switch_say_nothing_of_it() -> None:
+    """A toe below the first flat is an offset to all of them, and no path's."""
+    signals = np.linspace(1500.0, TOP, 9)
+    state = _state(12.0 * (1 - np.exp(-signals / 300.0)), signals, 1)
+    state.camera.noise.segment = (SimpleNamespace(upper_dn=280.0), SimpleNamespace(upper_dn=None))
+    assert behind_switch(state, _predicted(state, _parabola)) == -np.inf
+
+
 def test_a_smooth_law_that_is_only_a_little_likelier_is_a_tie() -> None:
     """Whatever the size of the bend, one of: a kink, either, or smooth; never a jump between."""
     seen = set()

@@ -26,6 +26,7 @@ LAYOUT: Any = SimpleNamespace(
     channels=("MONO",),
     uniform=(SimpleNamespace(name="dark"), SimpleNamespace(name="flat")),
     variance_dn2={(name, "MONO"): SD**2 for name in ("dark", "flat")},
+    still=frozenset(),
     signal_dn={("dark", "MONO"): 0.0, ("flat", "MONO"): 400.0},
 )
 

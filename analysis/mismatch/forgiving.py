@@ -30,5 +30,5 @@ def to_forgive(
 
 
 def _worth(why: str, named: Sequence[Named]) -> bool:
-    stays = any(other.name in why for other in named)
+    stays = any(why == f"{INSTEAD} {other.name} explains better" for other in named)
     return why.startswith(LITTLE) or (why.startswith(INSTEAD) and not stays)

@@ -64,14 +64,20 @@ class Power:
             tuple(w / m for w, m in zip(self.weights, noise, strict=True)),
         )
 
-    def lit(self, layout: Layout) -> "Power":
-        """Return the same of what is in proportion to the signal."""
-        signals = [
-            float(np.mean([max(layout.signal_dn[e.name, c], 0.0) for c in layout.channels]))
-            for e in layout.uniform
+    def _of_light(self, layout: Layout) -> list["Power"]:
+        """Return the same of what is constant, and in proportion to the signal: where codes move.
+
+        Frames whose codes hardly ever move show no pattern, whatever there is.
+        """
+        asked = [
+            (found, weight, np.mean([max(layout.signal_dn[e.name, c], 0.0) for c in own]))
+            for found, weight, e in zip(self.found, self.weights, layout.uniform, strict=True)
+            if (own := [c for c in layout.channels if (e.name, c) not in layout.still])
         ]
-        squares = zip(self.weights, signals, strict=True)
-        return replace(self, weights=tuple(weight * signal**2 for weight, signal in squares))
+        found, weights, signals = zip(*asked, strict=True) if asked else ((), (), ())
+        squares = zip(weights, signals, strict=True)
+        grown = tuple(float(weight * signal**2) for weight, signal in squares)
+        return [Power(found, weights), Power(found, grown)]
 
     @property
     def frames(self) -> int:
@@ -143,18 +149,21 @@ class Power:
         return there([one[:, 0] for one in self.found], own, kept=kept, real=real)
 
     def grows(self, layout: Layout, *, real: bool) -> bool:
-        """Return whether the first pattern is in proportion to the signal, and not constant."""
-        lit = self.lit(layout)
-        if not any(lit.weights):
+        """Return whether the first pattern is in proportion to the signal, and not constant.
+
+        Darks tell, beside flats.
+        """
+        constant, lit = self._of_light(layout)
+        if not any(lit.weights) or all(lit.weights):
             return False
-        powers = [max(float(own.excess[0]), 0.0) for own in (lit, self)]
-        asked = list(zip((lit, self), powers, strict=True))
+        powers = [max(float(own.excess[0]), 0.0) for own in (lit, constant)]
+        asked = list(zip((lit, constant), powers, strict=True))
         most = max(power * weight for own, power in asked for weight in own.weights) ** 0.5
         scale = _ASKED / max(most, _ASKED)  # of strong lines: both beside the same noise
-        grown, constant = (
+        grown, same = (
             own.scaled(scale).there(power, kept=False, real=real) for own, power in asked
         )
-        return powers[0] > 0 and grown - constant > SURE
+        return powers[0] > 0 and grown - same > SURE
 
     def scaled(self, scale: float) -> "Power":
         """Return the same where patterns and what was found of them are so much smaller."""

@@ -14,6 +14,7 @@ from analysis.mismatch.state import State
 
 Array = NDArray[np.float64]
 _DEGREES = (2, 3)  # of a response: bent one way, or by more in one half than in the other
+_LEAST_FLATS = 2  # levels on each side of a switch
 _TOLD_APART = 3.0  # of log-likelihood: odds of 20
 _AT_SWITCH = "levels change where a read-out path begins"
 _MOST = 0.5  # of what levels are off, that is left where they show an effect
@@ -28,26 +29,27 @@ def behind_smooth(state: State, mean: Array) -> float:
     seen = _Levels.of(state, mean)
     if seen is None:
         return -np.inf
-    s = seen.signal / seen.signal.max()
-    smooth = [[s**power for power in range(2, most + 1)] for most in _DEGREES]
-    return seen.behind([[seen.change]], smooth)
+    return seen.behind([[seen.change]], seen.smooth)
 
 
 def behind_switch(state: State, mean: Array) -> float:
     """Return by how much a switch of the read-out explains the levels better than a bend.
 
     Where a path of the camera ends, gains are others above, or have another slope; the bend is as
-    predicted with it, or any that is smooth. As `behind_smooth` else.
+    predicted with it, or any that is smooth. Levels below and above tell. As `behind_smooth` else.
     """
     ends = [own.upper_dn for own in state.camera.noise.segment if own.upper_dn is not None]
     seen = _Levels.of(state, mean) if ends else None
     if seen is None:
         return -np.inf
-    s = seen.signal / seen.signal.max()
-    smooth = [[s**power for power in range(2, most + 1)] for most in _DEGREES]
-    above = [s * (seen.signal >= end) for end in ends]
-    beyond = [np.maximum(seen.signal - end, 0.0) / seen.signal.max() for end in ends]
-    return seen.behind([[seen.change], *smooth], [[one] for one in (*above, *beyond)])
+    lit = np.unique(seen.signal)
+    ends = [e for e in ends if min((lit < e).sum(), (lit >= e).sum()) >= _LEAST_FLATS]
+    if not ends:
+        return -np.inf
+    top = seen.signal.max()
+    above = [seen.signal / top * (seen.signal >= end) for end in ends]
+    beyond = [np.maximum(seen.signal - end, 0.0) / top for end in ends]
+    return seen.behind([[seen.change], *seen.smooth], [[one] for one in (*above, *beyond)])
 
 
 @dataclass(frozen=True)
@@ -92,6 +94,12 @@ class _Levels:
         masks = [np.array([own == channel for _, own in places]) for channel in channels]
         scales = tuple(np.where(own, signal / signal.max(), 0.0) for own in masks)
         return cls(value, change, state.null.sd[which], signal, scales)
+
+    @property
+    def smooth(self) -> list[list[Array]]:
+        """Polynomials in the signal, one that bends one way, and one that bends by more."""
+        s = self.signal / self.signal.max()
+        return [[s**power for power in range(2, most + 1)] for most in _DEGREES]
 
     def behind(self, some: Sequence[Sequence[Array]], others: Sequence[Sequence[Array]]) -> float:
         """Return by how much log-likelihood the best of other laws is better than that of some.

@@ -61,7 +61,7 @@ def layout_of(
             spread = np.percentile(two - one, [15.865, 84.135])
             robust = float(spread[1] - spread[0]) ** 2 / 8
             variances[e.name, channel] = max(robust, 0.05)
-            plain[e.name, channel] = float(np.square(two - one).mean()) / 2
+            plain[e.name, channel] = float((two - one).var()) / 2
             moved = float((one != two).mean()) / 2
             if e.kind != SCENE and moved**2 * one.size * len(own) < _LEAST_PAIRS:
                 still.add((e.name, channel))
@@ -94,17 +94,18 @@ def layout_of(
 def _full(
     taken: Iterable[Taken], signal_dn: Mapping[Place, float], variance_dn2: Mapping[Place, float]
 ) -> frozenset[Place]:
-    """Return the flats whose noise is far less than that of flats of less light.
+    """Return the brightest flats, if their noise is far less than that of flats of less light.
 
-    Noise of light grows with light, until pixels are full.
+    Noise of light grows with light, until pixels are full; that of another read-out path, which may
+    be less where it begins, grows from there on.
     """
     flats = [e.name for e in taken if e.kind == "flat"]
     found = set()
     for channel in {channel for _, channel in signal_dn}:
         places = sorted(((name, channel) for name in flats), key=lambda at: signal_dn[at])
-        most = 0.0
-        for place in places:
-            if variance_dn2[place] < _CUT * most:
-                found.add(place)
-            most = max(most, variance_dn2[place])
+        while len(places) > 1:
+            brightest = places.pop()
+            if variance_dn2[brightest] >= _CUT * max(variance_dn2[at] for at in places):
+                break
+            found.add(brightest)
     return frozenset(found)

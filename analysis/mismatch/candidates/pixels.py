@@ -36,9 +36,14 @@ def _spread(clues: Clues) -> Sequence[Proposal]:
 
     Where frames are too few for that, from the kurtosis, which is three times as much.
     """
-    scatter, _ = clues.amplitude("variance_spread", lambda place: clues.read_share(place) ** 2)
-    white = 2 / (max(clues.frames(e.name) for e in clues.layout.uniform) - 1)
-    square = (exp(min(scatter, 10.0)) - 1) * white / (1 + white)
+    top = bottom = 0.0
+    for place, (value, sd) in clues.excess("variance_spread").items():
+        white = 2 / (clues.frames(place[0]) - 1)  # of the mean, squared: what chance scatters
+        unit = exp(min(value, 10.0)) * white / (1 + white)
+        own, error = unit - white / (1 + white), unit * sd
+        share = clues.read_share(place) ** 2
+        top, bottom = top + own * share / error**2, bottom + (share / error) ** 2
+    square = top / bottom if bottom > 0 else 0.0
     if square <= 0:
         k, _ = clues.amplitude("kurtosis", lambda place: clues.read_share(place) ** 2)
         square = k / 3

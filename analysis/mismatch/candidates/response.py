@@ -16,6 +16,7 @@ _LEAST_LEVELS = 3  # two of them are told by the light's scale and a parabola
 _EXPONENTS = np.geomspace(0.2, 16.0, 20) - 1  # of a bend: from a power law to a knee
 _LEAST_FLATS = 2  # on each side of a switch
 _SOFTNESS = np.geomspace(0.2, 8.0, 9)  # standard deviations of noise: a harder limit is hard
+_HARD, _TOLD_APART = 0.02, 3.0  # of noise: as good as hard; of log-likelihood: odds of 20
 _BEYOND = np.linspace(-1.0, 6.0, 22)
 _LEFT = 0.05  # of shot noise, at a full well that is far below the light
 _BELOW = np.linspace(1.0, 8.0, 71)  # standard deviations of a full well below the light
@@ -89,7 +90,9 @@ def _saturation(clues: Clues) -> Sequence[Proposal]:
         nearest = 1.5
     told = _full(clues, top)
     if told:
-        return told
+        lights = {e.name: e.light for e in clues.layout.exposures}
+        hard = float(told[0].effect.model_dump()["full_well_dn"])
+        return told if lights[top[0]] is None else [*told, *_soft_limits(clues, top, hard)]
     found: list[Proposal] = []
     for z in (nearest, nearest + 0.5, nearest - 0.5, 0.3):
         found += proposals("saturation", ["full_well_dn"], full_well_dn=level + float(z) * sd)
@@ -98,11 +101,10 @@ def _saturation(clues: Clues) -> Sequence[Proposal]:
 
 
 def _full(clues: Clues, top: Place) -> list[Proposal]:
-    """Return the full well that a flat of unknown light has reached: its level is that.
+    """Return the full well that the brightest flat has reached: its level is that.
 
     By the share of shot noise that is left, which says how far below the light the limit lies, and
-    by that how far the mean is from it (a censored normal law). Nothing where much is left, or
-    where light is known, which levels tell by more.
+    by that how far the mean is from it (a censored normal law). Nothing where much is left.
     """
     level, own = clues.signal(top), clues.seen.levels[top]
     dark, bright = (float(v) for v in clues.fit.line_dn2(np.array([0.0, level])))
@@ -121,11 +123,12 @@ def _full(clues: Clues, top: Place) -> list[Proposal]:
             for one in made]  # fmt: skip
 
 
-def _soft_limits(clues: Clues, top: Place) -> list[Proposal]:
+def _soft_limits(clues: Clues, top: Place, hard: float | None = None) -> list[Proposal]:
     """Start where levels, variances and skewness put a soft limit, by a grid of well and softness.
 
     What the limit makes of normal noise is found by Gauss-Hermite quadrature; beside it the scale
-    of the light and the slope of the variances are free, which were fitted without it.
+    of the light and the slope of the variances are free, which were fitted without it. Nothing
+    where a limit at `hard`, DN, is as likely as the best, at odds of 20.
     """
     off = {name: clues.excess(name) for name in ("level", "pixel_variance", "skewness")}
     rows = [
@@ -143,15 +146,21 @@ def _soft_limits(clues: Clues, top: Place) -> list[Proposal]:
     free = np.stack([np.where(number == 0, signal / signal.max(), 0.0), number == 1], 1)
     free = free / error[:, np.newaxis]
     level, unit = clues.signal(top), clues.seen.levels[top].variance_dn2 ** 0.5
-    best, found = np.inf, (0.0, 0.0)
-    for softness in unit * _SOFTNESS:
-        for full in level + np.sqrt(unit * max(softness, unit)) * _BEYOND:
-            made = soft_moments(signal, sd, float(full), float(softness))
-            own = (value - np.choose(number.astype(int), made)) / error
-            rest = own - free @ np.linalg.lstsq(free, own, rcond=None)[0]
-            misfit = float(np.log1p(rest**2 / _NU).sum())
-            if misfit < best:
-                best, found = misfit, (float(full), float(softness))
+
+    def misfit(full: float, softness: float) -> float:
+        made = soft_moments(signal, sd, full, softness)
+        own = (value - np.choose(number.astype(int), made)) / error
+        rest = own - free @ np.linalg.lstsq(free, own, rcond=None)[0]
+        return (_NU + 1) / 2 * float(np.log1p(rest**2 / _NU).sum())
+
+    tried = [
+        (float(full), float(softness))
+        for softness in unit * _SOFTNESS
+        for full in level + np.sqrt(unit * max(softness, unit)) * _BEYOND
+    ]
+    found = min(tried, key=lambda one: misfit(*one))
+    if hard is not None and misfit(hard, unit * _HARD) < misfit(*found) + _TOLD_APART:
+        return []
     names = ["full_well_dn", "softness_dn"]
     return proposals("saturation", names, full_well_dn=found[0], softness_dn=found[1])
 

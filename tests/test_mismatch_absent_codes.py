@@ -104,3 +104,17 @@ def test_the_inner_half_of_a_broad_histogram_tells_absent_codes(seed: int) -> No
     own = Codes.of(lowest, np.bincount(plain - lowest)).middle
     assert own is not None
     assert own.absent.size == 0
+
+
+@pytest.mark.parametrize("apart", [8.0, 12.0])
+def test_between_two_levels_no_code_is_absent(apart: float) -> None:
+    """Halves whose levels differ by many standard deviations of noise."""
+    rng = np.random.default_rng(1)
+    level = np.where(np.arange(160_000) % 2 == 0, 20_000.0, 20_000.0 + apart * 100.0)
+    codes = np.rint(rng.normal(level, 100.0)).astype(np.int64)
+    lowest = int(codes.min())
+    own = Codes.of(lowest, np.bincount(codes - lowest)).middle
+    assert own is None or own.absent.size < 8
+    stepped = np.rint(codes / 12.0).astype(np.int64) * 12  # wide gaps between codes that are common
+    own = Codes.of(int(stepped.min()) - 1, np.bincount(stepped - stepped.min() + 1)).middle
+    assert own is None or own.step == 12

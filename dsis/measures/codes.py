@@ -14,6 +14,7 @@ import numpy as np
 import scipy.fft
 import scipy.special
 from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
 
 from dsis.kept import Kept
 from dsis.measures.estimate import Estimate, estimate, unknown
@@ -33,6 +34,7 @@ _MIDDLE = (0.05, 0.95)  # of the samples: there no density is less than a tenth 
 _EXPECTED = 300.0  # samples a code there on average: at a tenth of it none is missed by chance
 _INNER = (0.25, 0.75)  # of the samples: there no density is less than two thirds of its mean
 _EXPECTED_INNER = 45.0  # samples a code there on average
+_AROUND, _NEVER_MISSED = 65, 12.0  # codes; samples a code of which none is missed by chance
 _FEW = 20.0  # samples a code there: of fewer many are missed by chance
 
 
@@ -84,6 +86,16 @@ class Middle:
     def codes(self) -> int:
         """How many there are, absent or not."""
         return (self.last - self.first) // self.step + 1
+
+
+def _left_out(counts: NDArray[np.int64]) -> NDArray[np.intp]:
+    """Return which codes of a histogram never occur where those around have many samples.
+
+    Between two levels that lie far apart, as halves of a sensor may have, codes are missed by
+    chance.
+    """
+    around = uniform_filter1d(counts.astype(np.float64), _AROUND, mode="nearest")
+    return np.flatnonzero((counts == 0) & (around >= _NEVER_MISSED))
 
 
 class CodeCounts:
@@ -214,7 +226,7 @@ class Codes:
             first, last = np.searchsorted(below, np.array(ends) * below[-1])
             inside = counts[first : last + 1]
             if inside.size >= _LEAST_CODES and inside.mean() >= expected:
-                absent = start + step * (first + np.flatnonzero(inside == 0))
+                absent = start + step * (first + _left_out(inside))
                 return Middle(int(start + step * first), int(start + step * last), step, absent)
         return None
 

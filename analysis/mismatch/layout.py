@@ -151,17 +151,18 @@ class Layout:
 
     def _regressors_of(self, channel: str) -> Regressors:
         names = [e.name for e in self.uniform if (e.name, channel) not in self.still]
-        worth = {name: _OF_FULL if (name, channel) in self.full else 1.0 for name in names}
         return Regressors.of(
             names,
             {name: self.signal_dn[name, channel] for name in names},
             {e.name: e.exposure_time_s for e in self.uniform},
-            {
-                e.name: worth[e.name] * len(e.numbers) / self.variance_dn2[e.name, channel]
-                for e in self.uniform
-                if e.name in worth
-            },
+            {e.name: self._weight(e, channel) for e in self.uniform},
         )
+
+    def _weight(self, exposure: Taken, channel: str) -> float:
+        """Return the inverse variance of a pixel of a mean frame, DN^-2."""
+        place = exposure.name, channel
+        worth = _OF_FULL if place in self.full else 1.0
+        return worth * len(exposure.numbers) / self.variance_dn2[place]
 
 
 def sites(cfa: Cfa) -> dict[str, tuple[int, int]]:

@@ -38,12 +38,17 @@ class Key:
     @property
     def is_cube_root(self) -> bool:
         """Whether it is the cube root of a mean square, 1 where there is white noise alone."""
-        return self.statistic.endswith("variance") and self.statistic != "pixel_variance"
+        return is_cube_root(self.statistic)
 
     @property
     def place(self) -> tuple[str, str]:
         """Exposure and channel; of a range of signal in a scene: exposure, channel and range."""
         return self.exposure, f"{self.channel} {self.detail}".strip()
+
+
+def is_cube_root(statistic: str) -> bool:
+    """Return whether a statistic's numbers are cube roots of mean squares."""
+    return statistic.endswith("variance") and statistic != "pixel_variance"
 
 
 def split_name(name: str) -> tuple[str, str]:

@@ -83,7 +83,7 @@ class Waves:
 
         `power`: (half a bin down, half a bin right, row, column // 2 + 1). Needs two frames.
         """
-        per_bin = weight / (self.pixels * (self.frames - 1))
+        per_bin = self._per_bin(weight)
         if self.power is None:
             add_power(self.total, per_bin / 2, power)
         else:
@@ -92,12 +92,15 @@ class Waves:
 
     def add_bins_to(self, power: Array, weight: float) -> None:
         """Add the power of the bins alone, (row, column // 2 + 1), in the same units."""
-        per_bin = weight / (self.pixels * (self.frames - 1))
+        per_bin = self._per_bin(weight)
         whole = self.total.real**2 + self.total.imag**2
         if self.power is None:
             power += per_bin / 2 * whole
         else:
             power += per_bin * (self.power[0, 0] - whole / self.frames)
+
+    def _per_bin(self, weight: float) -> float:
+        return weight / (self.pixels * (self.frames - 1))
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import exp, expm1, isfinite
 
+from analysis.mismatch.bank.key import is_cube_root
 from analysis.mismatch.layout import Place
 from analysis.mismatch.state import State
 from analysis.mismatch.vector import expected_dn2
@@ -69,7 +70,7 @@ def back(statistic: str, scale: Scale, numbers: Numbers) -> Back:
 
     `numbers` are all transformed numbers of the place: mean squares are ratios to finer ones.
     """
-    if statistic in UNITS and statistic.endswith("variance") and statistic != "pixel_variance":
+    if statistic in UNITS and is_cube_root(statistic):
         unit = _finer_dn2(statistic, scale, numbers)
         return lambda x: (x**3 - 1) * unit
     if statistic == "variance_spread":

@@ -14,7 +14,7 @@ from scipy.linalg import toeplitz
 
 from analysis.mismatch.bank.bands import Bands
 from analysis.mismatch.bank.coherent import SpectrumSums
-from analysis.mismatch.bank.rowlags import ROW_LAGS, row_lags
+from analysis.mismatch.bank.linelags import LINE_LAGS, line_lags
 from analysis.mismatch.candidates.rows import CANDIDATES
 from analysis.mismatch.feigned import wandering
 from analysis.mismatch.finding import OmittedEffect
@@ -125,7 +125,7 @@ def test_correlations_are_those_of_the_row_means(cfa: Cfa) -> None:
     )
     means -= means.mean(0)
     square = np.mean([m * m for m in means])
-    for lag in ROW_LAGS:
+    for lag in LINE_LAGS:
         pairs = [m[y] * m[y + lag] for m in means for y in range(ROWS - lag)]
         value, _ = found[f"row_correlation of lag {lag}"]
         assert value == pytest.approx(np.mean(pairs) / square, rel=1e-4, abs=1e-6)
@@ -139,7 +139,7 @@ def test_white_rows_are_alike_by_chance_as_far_as_is_said(cfa: Cfa, row_dn: floa
         _numbers(_recorded(rng, rng.normal(0, row_dn, (FRAMES, ROWS)), 2.0), cfa, 4.0)
         for _ in range(repeats)
     ]
-    for lag in ROW_LAGS:
+    for lag in LINE_LAGS:
         own = np.array([one[f"row_correlation of lag {lag}"] for one in made])
         error = own[:, 1].mean()
         assert own[:, 0].std(ddof=1) == pytest.approx(error, rel=SURE / np.sqrt(2 * repeats))
@@ -148,10 +148,10 @@ def test_white_rows_are_alike_by_chance_as_far_as_is_said(cfa: Cfa, row_dn: floa
 
 
 def test_of_few_rows_far_lags_are_unknown() -> None:
-    found = row_lags(np.ones(11), 20.0)
+    found = line_lags(np.ones(11), 20.0, "row")
     assert np.isfinite(found["row_correlation of lag 4"][0])
     assert not np.isfinite(found["row_correlation of lag 8"][0])
-    assert not np.isfinite(row_lags(np.zeros(65), 20.0)["row_correlation of lag 1"][0])
+    assert not np.isfinite(line_lags(np.zeros(65), 20.0, "row")["row_correlation of lag 1"][0])
 
 
 def test_a_band_is_no_row_noise_and_no_drift() -> None:

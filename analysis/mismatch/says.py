@@ -34,6 +34,8 @@ _WORDS = {
     "row_spectrum_peak": "row means have a periodic component",
     "slow_row_variance": "row means have slow waves",
     "row_correlation": "the means of rows that lie near each other are alike",
+    "slow_column_variance": "column means have slow waves",
+    "column_correlation": "the means of columns that lie near each other are alike",
     "column_spectrum_peak": "column means have a periodic component",
     "frame_correlation": "the noise of a frame is correlated with that of the next",
     "scene_motion": "the scene moves between frames by less than a pixel",

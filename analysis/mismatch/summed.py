@@ -124,6 +124,7 @@ class SensorSums:
         self.shape = (layout.rows, layout.columns)
         self.common: dict[str, Mapping[str, Number]] = {}
         self.bands = Bands(layout.rows, layout.sites)
+        self.columns = Bands(layout.columns, layout.sites, "column")
         self.numbers_of = {e.name: e.numbers for e in layout.uniform}
         last = max((max(own, default=0) for own in self.numbers_of.values()), default=0)
         self.moving = MovingBands(layout.rows, layout.sites, last)
@@ -157,6 +158,7 @@ class SensorSums:
         signals = {name: self.layout.signal_dn[place] for name, place in places.items()}
         self.moving.add(found, expected, signals, self.numbers_of[one.exposure])
         self.codes.add(found)
+        self.columns.add(found, expected, signals, one.frames)
         if self.mosaic:
             sites = self.layout.sites
             self.common[one.exposure] = common(found, signals, one.frames, sites)
@@ -168,7 +170,7 @@ class SensorSums:
 
     def numbers(self) -> dict[str, Number]:
         """Return spectra and memories of the whole sensor."""
-        own = self.bands.numbers() if self.mosaic else {}
+        own = {**(self.bands.numbers() if self.mosaic else {}), **self.columns.numbers()}
         waves = {"spectral_peak": self.waves.number(), **self.waves.odd_lags()}
         waves |= {NUMBER: self.periods.number(), MOVING: self.moving.number()}
         waves[CODE_PHASE] = self.codes.number()
@@ -176,7 +178,7 @@ class SensorSums:
 
     def peaks(self) -> dict[str, Peak]:
         """Return where its spectra are largest, by kind."""
-        own = self.bands.peaks() if self.mosaic else {}
+        own = {**(self.bands.peaks() if self.mosaic else {}), **self.columns.peaks()}
         whole = {"spectrum": self.waves.peak(), PLACE: self.periods.peak()}
         whole |= {MOVING_PLACE: self.moving.peak(), CODE_PLACE: self.codes.peak()}
         return {**own, **{kind: peak for kind, peak in whole.items() if peak is not None}}

@@ -43,6 +43,8 @@ _FOLLOWS = {
     "row_spectrum_peak": frozenset({"row_spectrum_peak", "row_variance"}),
     "slow_row_variance": frozenset({"row_spectrum_peak", "row_variance"}),
     "row_correlation": frozenset({"row_spectrum_peak", "row_variance"}) | _CORRELATIONS,
+    "slow_column_variance": frozenset({"column_variance"}),
+    "column_correlation": frozenset({"column_variance"}) | _CORRELATIONS,
     "scene_motion": _CORRELATIONS | _LINES | {"row_spectrum_peak", "spectral_peak"},
     "half_seam": _FIXED | _LINES,
     "fixed_edge": _FIXED | _LINES,

@@ -31,6 +31,8 @@ STATISTICS = {
     "row_spectrum_peak": "strongest line of the spectrum of row means",
     "slow_row_variance": "slow waves of row means",
     "row_correlation": "correlation of row means",
+    "slow_column_variance": "slow waves of column means",
+    "column_correlation": "correlation of column means",
     "column_spectrum_peak": "strongest line of the spectrum of column means",
     "phase": "phase of the pattern from frame to frame",
     "frame_correlation": "correlation with the next frame",

@@ -7,6 +7,7 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.mismatch.bank.linelags import line_lags
 from analysis.mismatch.bank.lines import (
     clearest_bin,
     log_chance,
@@ -25,7 +26,6 @@ from analysis.mismatch.bank.peaks import (
     white_level,
     within_bin,
 )
-from analysis.mismatch.bank.rowlags import row_lags
 from analysis.mismatch.bank.scalars import (
     UNKNOWN,
     Number,
@@ -198,17 +198,15 @@ class SpectrumSums:
         if not total:
             return {}
         power, degrees = self.fine[""] / total, self.degrees("")
-        return {"slow_row_variance": slow_lines(power, degrees), **row_lags(power, degrees)}
+        return {"slow_row_variance": slow_lines(power, degrees), **line_lags(power, degrees, "row")}
 
     def column_peak(self) -> Peak | None:
         """Return where the spectrum of column means is largest, between bins."""
         total, m = self.weight[""][0], self.shape[1]
         if not total or m < 4:
             return None
-        inner = _line(self.columns, m)[0] / total
-        place = clearest_bin(inner, self.degrees(""))
-        across = place + 1 + within_bin(inner, place)
-        return Peak(frequency(across, m), 0.0, float(inner[place]))
+        across, power = clearest_line(_line(self.columns, m)[0] / total, self.degrees(""))
+        return Peak(frequency(across, m), 0.0, power)
 
     def row_peak(self, key: str) -> Peak | None:
         """Return where the spectrum of row means is largest."""
@@ -348,6 +346,15 @@ def _add_line(into: Array, weight: float, power: NDArray[np.floating], pixel: fl
     own, white = power.dtype.type(weight), power.dtype.type(pixel)
     for x in range(into.size):
         into[x] += own * power[x] / white
+
+
+def clearest_line(power: Array, degrees: float) -> tuple[float, float]:
+    """Return cycles a frame of what stands out most of a spectrum of lines, and its power.
+
+    Of the bins of one cycle on: (bin,), white noise scaled to 1.
+    """
+    place = clearest_bin(power, degrees)
+    return place + 1 + within_bin(power, place), float(power[place])
 
 
 def slow_lines(power: Array, degrees: float) -> Number:

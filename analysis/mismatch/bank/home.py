@@ -88,11 +88,12 @@ _POOLED = frozenset(
         ("column_spectrum_peak", "all", ""),
         ("slow_row_variance", "all", ""),
         ("row_correlation", "all", "lag 1"),
+        ("slow_column_variance", "all", ""),
     }
 )
 _SPECTRA = frozenset({"spectral_peak", "row_spectrum_peak", "column_spectrum_peak",
                       "patch_variance", "slow_row_variance", "row_correlation",
-                      "code_imbalance"})  # fmt: skip
+                      "slow_column_variance", "code_imbalance"})  # fmt: skip
 _SHARED = frozenset({"fixed_row_variance", "fixed_column_variance", "fixed_smooth_variance",
                      "fixed_smooth_tilt", "fixed_smooth_falloff", "fixed_edge",
                      "fixed_patch_variance", OUTLYING_PATCH, "half_seam",

@@ -6,7 +6,7 @@ from math import log, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.mismatch.bank.rowlags import ROW_LAGS
+from analysis.mismatch.bank.linelags import LINE_LAGS
 from analysis.mismatch.candidates.candidate import Candidate, Proposal, proposals
 from analysis.mismatch.clues import Clues
 from analysis.mismatch.layout import Layout
@@ -21,12 +21,12 @@ _LENGTHS = 24  # tried, in equal ratios
 
 def _row_banding(clues: Clues) -> Sequence[Proposal]:
     """Start from the length whose correlations are nearest to the recorded ones."""
-    left, sd = np.transpose([_left(clues, lag) for lag in ROW_LAGS])
+    left, sd = np.transpose([_left(clues, lag) for lag in LINE_LAGS])
     known = np.isfinite(sd)
     shortest, longest = _shortest(), _longest(clues.layout)
     if not known.any() or longest <= shortest:
         return []
-    lags, left, sd = np.array(ROW_LAGS)[known], left[known], sd[known]
+    lags, left, sd = np.array(LINE_LAGS)[known], left[known], sd[known]
     lengths = np.geomspace(shortest, longest, _LENGTHS)
     shapes = np.exp(-lags / lengths[:, np.newaxis]) / sd
     squares = (shapes**2).sum(1)

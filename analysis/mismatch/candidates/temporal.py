@@ -27,8 +27,8 @@ _BY_PLANE = {  # of a mosaic: what alternates in each of its planes
 }
 # Most of pink noise is in the slowest waves across lines: one of them may stand out.
 _SLOW = ("row_variance", "slow_row_variance", "row_correlation", "line_correlation",
-         "frame_variance", "row_spectrum_peak", "column_variance",
-         "column_spectrum_peak")  # fmt: skip
+         "frame_variance", "row_spectrum_peak", "column_variance", "column_spectrum_peak",
+         "slow_column_variance", "column_correlation")  # fmt: skip
 _CLEAR = 3.0  # standard errors of what columns vary by
 _BANDS = {
     "rows of light": "row_spectrum_peak of light",

@@ -128,6 +128,8 @@ def test_heavy_tails_lean_to_no_side(skewness: float, sd: float, denied: bool) -
     [
         (0.0, "smooth_variance_spread", False),
         (0.05, "smooth_variance_spread", True),  # five errors: pixels have tails of their own
+        (0.0, "column_variance_spread", False),
+        (0.05, "row_variance_spread", True),
         (0.0, "kurtosis", True),
     ],
 )
@@ -142,6 +144,7 @@ def test_noise_that_has_its_place_is_no_tails(within: float, left: str, *, told:
         ),
     )
     assert (placed(state, TAILS, WITHOUT) is None) == told
+    assert (placed(state, "impulse", WITHOUT) is None) == told
     assert placed(state, "read_noise_spread", WITHOUT) is None
 
 
@@ -157,3 +160,7 @@ def test_tails_that_single_pixels_cannot_show_are_not_denied() -> None:
         ),
     )
     assert placed(state, TAILS, np.zeros(1)) is None
+    assert placed(state, "impulse", np.zeros(1)) is None
+    state.mismatches = [SimpleNamespace(statistic="column_variance_spread")]
+    assert placed(state, TAILS, np.zeros(1)) is None
+    assert placed(state, "impulse", np.zeros(1)) is not None  # outliers of the noisiest lines

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.mismatch.bank.persistent import SURFACE
+from analysis.mismatch.bank.persistent import BY_LINE, SURFACE
 from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.layout import Place
 from analysis.mismatch.recalibrate import code_step
@@ -90,14 +90,16 @@ def lopsided(state: State, kind: str) -> Denial | None:
 
 
 def placed(state: State, kind: str, without: Array) -> Denial | None:
-    """Return how heavy tails are denied by noise that differs from place to place; None: not.
+    """Return how tails or spikes are denied by noise that differs from place to place; None: not.
 
     Pixels of different noise have heavy tails in all of them together, and none by themselves.
-    Where noise that varies smoothly is left unexplained, tails must show within single pixels,
-    surely and by half, if these tell.
+    Where noise that varies smoothly, or from line to line, is left unexplained, they must show
+    within single pixels, surely and by half, if these tell. Few spikes do not: beside lines that
+    differ they may be those of the noisiest.
     """
-    surface = any(m.statistic == SURFACE for m in state.mismatches)
-    if kind != "heavy_tailed_read_noise" or not surface:
+    lines = any(m.statistic in BY_LINE for m in state.mismatches)
+    uneven = lines or any(m.statistic == SURFACE for m in state.mismatches)
+    if kind not in ("heavy_tailed_read_noise", "impulse") or not uneven:
         return None
     own = np.array([key.statistic == "kurtosis_within_pixels" for key in state.vector.keys])
     own &= state.null.known & np.isfinite(without)
@@ -105,9 +107,10 @@ def placed(state: State, kind: str, without: Array) -> Denial | None:
     seen = (state.vector.values - without)[own] / state.null.sd[own]
     size = float(np.linalg.norm(change))
     if size < CLEAR:
-        return None
+        few = Denial(0.0, "lines differ in noise, and what is far out may be noise of these")
+        return few if lines and kind == "impulse" else None
     shown = float(change @ seen) / size
     if shown >= max(CLEAR, _MOST * size):
         return None
-    why = f"noise differs from place to place, and single pixels show tails by {shown:.1f} errors"
+    why = f"noise differs from place to place, and single pixels show them by {shown:.1f} errors"
     return Denial(0.0, why)

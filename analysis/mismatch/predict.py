@@ -41,6 +41,8 @@ _FORMS = {
     "kurtosis_within_pixels": 0.3,
     "variance_spread": 0.15,
     "smooth_variance_spread": 0.15,
+    "row_variance_spread": 0.15,
+    "column_variance_spread": 0.15,
     "skewness": 0.12,
 }
 

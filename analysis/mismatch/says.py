@@ -18,6 +18,8 @@ _WORDS = {
     "variance_spread": "pixels differ in how noisy they are",
     "variance_persistence": "the same pixels are noisy in every exposure",
     "smooth_variance_spread": "parts of the sensor are noisier than others, in every exposure",
+    "row_variance_spread": "some rows are noisier than others, in every exposure",
+    "column_variance_spread": "some columns are noisier than others, in every exposure",
     "noisy_pixels": "a few pixels are far noisier than the others, in every exposure",
     "one_off_outliers": "single pixels are far noisier than the others",
     "outlying_pixels": "a few pixels stand far out of the fixed pattern",

@@ -33,6 +33,8 @@ _FOLLOWS = {
     "kurtosis_within_pixels": frozenset({"kurtosis"}),
     "one_off_outliers": frozenset({"variance_spread", "kurtosis"}),
     "variance_persistence": frozenset({"variance_spread"}),
+    "row_variance_spread": frozenset({"fixed_row_variance"}),  # shot noise follows gains
+    "column_variance_spread": frozenset({"fixed_column_variance"}),
     "noisy_pixels": frozenset({"variance_spread"}),
     "smooth_variance_spread": frozenset({"fixed_smooth_variance"}),  # where light falls off
     "outlying_pixels": frozenset({"fixed_pixel_variance"}),

@@ -40,6 +40,8 @@ STATISTICS = {
     "variance_spread": "spread of the noise over pixels",
     "variance_persistence": "pixels noisy at every exposure",
     "smooth_variance_spread": "noise that varies smoothly over the sensor",
+    "row_variance_spread": "noise that differs from row to row",
+    "column_variance_spread": "noise that differs from column to column",
     "noisy_pixels": "few pixels far noisier",
     "outlying_pixels": "few pixels far out",
     "one_off_outliers": "single spikes",

@@ -16,7 +16,7 @@ from analysis.mismatch.bank.movingbands import DETAIL as MOVING_BANDS
 from analysis.mismatch.bank.parts import STANDING_OUT
 from analysis.mismatch.bank.patches import OUTLYING_PATCH, SIZES
 from analysis.mismatch.bank.periods import FEW_PIXELS
-from analysis.mismatch.bank.persistent import OUTSTANDING, SURFACE
+from analysis.mismatch.bank.persistent import BY_LINE, OUTSTANDING, SURFACE
 from analysis.mismatch.bank.seams import WHOLE
 from analysis.mismatch.bank.surfaces import LOW
 from analysis.mismatch.bank.together import TOGETHER
@@ -75,7 +75,7 @@ _POOLED = frozenset(
         *(("fixed_smooth_falloff", name, "") for name in ("gain", "time")),
         *(("outlying_pixels", "time", f"{limit:g}") for limit in STANDING_OUT),
         ("variance_persistence", "all", ""),
-        (SURFACE, "all", ""),
+        *((name, "all", "") for name in (SURFACE, *BY_LINE)),
         *(("noisy_pixels", "all", str(limit)) for limit in OUTSTANDING),
         ("spectral_peak", "all", ""),
         ("spectral_peak", "all", FEW_PIXELS),

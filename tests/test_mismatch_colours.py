@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 LEVELS = (400.0, 1200.0, 2600.0)
 COLOURS = {"R": 0.6, "G": 1.0, "B": 0.8}
 SITES = {"R": (0, 0), "Gr": (0, 1), "Gb": (1, 0), "B": (1, 1)}
-FRACTION = 0.02
+FRACTION, LITTLE = 0.02, 0.015
 SLOPE, READ, BLACK = 0.5, 20.0, 64.0
 
 
@@ -53,10 +53,10 @@ def _state(
     return state_of(recording, camera(*model, cfa="RGGB"))
 
 
-def _said(state: Any) -> Any:
-    others = tuple(e for e in state.camera.effect if e.kind != "channel_imbalance")
+def _said(state: Any, kind: str = "channel_imbalance") -> Any:
+    others = tuple(e for e in state.camera.effect if e.kind != kind)
     without = state.camera.model_copy(update={"effect": others})
-    return displaced(state, "channel_imbalance", state.null.mean, state.predictor(8).mean(without))
+    return displaced(state, kind, state.null.mean, state.predictor(8).mean(without))
 
 
 @pytest.mark.parametrize(("axis", "sign"), [(2, 1), (1, -1)])
@@ -92,6 +92,17 @@ def test_what_samples_remember_of_other_colours_makes_the_greens_differ(
     assert _said(_state([whole, greens], axis=axis, greens=percent / 100)) is None
     strong = registry()["channel_imbalance"](gain_percent=5 * percent)
     assert _said(_state([memory, strong], axis=axis, greens=percent / 20)) is None
+
+
+def test_crosstalk_too_small_to_be_seen_but_in_the_greens_may_be_memory() -> None:
+    """It makes neighbours alike, which show it by less than the greens that it makes differ."""
+    own = {"fraction": -0.03, "lag_pixels": 3, "along": "rows"}
+    memory = registry()["readout_memory"](**own)
+    little = registry()["crosstalk"](fraction=LITTLE, along="columns")
+    denial = _said(_state([memory, little], memory=-0.03), "crosstalk")
+    assert denial is not None
+    assert "remember" in denial.why
+    assert _said(_state([little], axis=1, fraction=LITTLE), "crosstalk") is None
 
 
 def test_greens_that_differ_by_themselves_are_not_denied() -> None:

@@ -43,6 +43,7 @@ _ADJACENT = ("correlation_0_1", "correlation_1_0")
 _GRAINS = np.geomspace(1.0, 8.0, 13)  # inverse correlations of neighbours in what they share
 _LEAST = 0.05  # of a variance is other noise
 _GREENS = frozenset({"channel_imbalance", "tap_mismatch"})
+_MIXES = "crosstalk"  # which makes neighbours alike, and by that the greens differ
 _BESIDE = ("R", "Gr", "Gb", "B")
 _MOST = 0.5  # of a misfit, or of what white rows explain, that something else may make
 _CHANCE = 1e-3  # that variances on a line misfit more
@@ -85,8 +86,9 @@ def displaced(state: State, kind: str, mean: Array, without: Array | None = None
     if kind in _SAID:
         denial = of_few_lines(state, kind, without) or _SAID[kind](state)
         return denial or of_alike_samples(state, kind, mean, without)
-    if kind in _GREENS:
-        denial = _of_colours(state, mean - without) or _of_memory(state, mean - without)
+    if kind in _GREENS | {_MIXES}:
+        denial = None if kind == _MIXES else _of_colours(state, mean - without)
+        denial = denial or _of_memory(state, mean - without)
         if denial is not None:
             return denial
     denial = (
@@ -291,8 +293,9 @@ def _greens(state: State, change: Array, shared: Callable[[str], float], why: st
         return None
     keys = state.vector.keys
     clear = np.where(state.null.known & np.isfinite(change), change, 0.0) / state.null.sd
-    of_halves = np.array([key.statistic in ("parity", "half_seam") for key in keys])
-    halves = float((clear[of_halves] ** 2).sum())
+    otherwise = ("parity", "half_seam", *_ADJACENT)
+    besides = np.array([key.statistic in otherwise for key in keys])
+    told = float((clear[besides] ** 2).sum())
     seen, fake, signals = 0.0, 0.0, state.calibrated.fit.signal_dn
     for i, key in enumerate(keys):
         if key.statistic != "channel_ratio" or key.scope != "exposure" or not clear[i]:
@@ -302,7 +305,7 @@ def _greens(state: State, change: Array, shared: Callable[[str], float], why: st
             made = shared(key.exposure) * (red - blue) * 2 / sum(greens)
             seen += float(clear[i]) ** 2
             fake += float(clear[i]) * made / float(state.null.sd[i])
-    if fake <= _MOST * seen or seen <= halves:  # which tell amplifiers by more
+    if fake <= _MOST * seen or seen <= told:  # halves, neighbours: which tell more of it
         return None
     return Denial(max(1 - fake / seen, 0.0), why)
 

@@ -12,6 +12,7 @@ from pydantic import ValidationError
 
 from dsis.cfa import Cfa
 from dsis.draw import Draw
+from dsis.effects.effect import OperatingPoint
 from dsis.grid import PixelGrid
 from exposing import BLACK_DN, SIDE, Z_MAX, apply, camera, effect, recorded, white
 
@@ -203,6 +204,30 @@ def test_a_memory_of_the_signal_is_a_kernel_on_one_side(
     assert abs(made.var() / image.var() - kernel) < Z_MAX * np.sqrt(2) / SIDE
     rho = fraction * (1 - fraction) / kernel
     assert abs(correlation(made, *lag) - rho) < Z_MAX * CORRELATION_ERROR
+
+
+@pytest.mark.parametrize(("along", "axis"), [("rows", 1), ("columns", 0)])
+def test_lines_that_begin_at_black_are_filtered_from_nothing(along: str, axis: int) -> None:
+    """Foreign oracle: scipy's causal filter, from its first sample on."""
+    own = {"fraction": 0.2, "lag_pixels": 3, "along": along, "remembers": "signal"}
+    image = white(mean=700.0)
+    one = effect("readout_memory", **own, before_line="black")
+    by_scipy = scipy.signal.lfilter([0.8, 0, 0, 0.2], [1], image, axis=axis)
+    np.testing.assert_allclose(apply(one, image), by_scipy, rtol=2e-6)
+    point = OperatingPoint(
+        signal_dn=700.0,
+        slope_dn=1.0,
+        read_variance_dn2=100.0,
+        segment=0,
+        full_scale_dn=4e3,
+        frames=2,
+        rows=image.shape[0],
+        columns=image.shape[1],
+    )
+    lost = one.contributions(point)["level"]
+    assert abs(by_scipy.mean() - image.mean() - lost) < 0.1 * abs(lost)
+    assert "fixed_row_variance" in one.changes
+    assert "fixed_row_variance" not in effect("readout_memory", **own).changes
 
 
 def test_a_memory_of_the_signal_mixes_colours_where_its_lag_is_odd() -> None:

@@ -60,6 +60,8 @@ STRONG: dict[str, tuple[dict[str, object], ...]] = {
         {"fraction": 0.8, "lag_pixels": 1, "along": "columns"},
         {"fraction": 0.1, "remembers": "signal"},
         {"fraction": -0.1, "lag_pixels": 1, "along": "columns", "remembers": "signal"},
+        {"fraction": 0.1, "remembers": "signal", "before_line": "black"},
+        {"fraction": 0.1, "along": "columns", "remembers": "signal", "before_line": "black"},
     ),
     "row_banding": ({"sigma_dn": 20.0}, {"sigma_dn": 20.0, "length_rows": 20.0}),
     "rts": (

@@ -20,7 +20,9 @@ SIGNAL_DN = np.array([0.0, 400.0, 2000.0])
 def _lines(series: Array, noise: float) -> LineMeans:
     """Return the lines of frames: (frame, line)."""
     frames = len(series)
-    return LineMeans(frames, series.mean(0), series.var(0, ddof=1), noise, np.zeros((frames, 1)))
+    return LineMeans(
+        frames, series.mean(0), series.mean(0), series.var(0, ddof=1), noise, np.zeros((frames, 1))
+    )
 
 
 def _recorded(seed: int, fixed: Any) -> tuple[list[LineMeans], list[LineMeans]]:
@@ -108,7 +110,9 @@ def test_where_no_frame_is_locked_nothing_is_told() -> None:
 def test_what_lines_move_by_leaves_what_they_share_as_it_is() -> None:
     """Ratios of fixed variances are net of movement: lines that move more share no less."""
     whole, _ = _recorded(4, lambda _: 0.0)
-    still = [LineMeans(o.frames, o.fixed, 0 * o.moving, o.noise_dn2, o.parts) for o in whole]
+    still = [
+        LineMeans(o.frames, o.means, o.fixed, 0 * o.moving, o.noise_dn2, o.parts) for o in whole
+    ]
     noise = np.array([own.noise_dn2 / own.frames for own in whole])
     grown = 1 + (0.09 + 1e-8 * SIGNAL_DN**2) / noise
     assert _shared(whole, grown, SIGNAL_DN) == pytest.approx((0.09, 1e-8))
@@ -119,7 +123,10 @@ def test_of_darks_alone_an_own_gain_says_nothing() -> None:
     """Signals are 0, and lines noisy: odds are numbers all the same."""
     whole, some = _recorded(7, lambda _: 0.0)
     loud = [
-        [LineMeans(o.frames, 100 * o.fixed, 1e4 * o.moving, o.noise_dn2, o.parts) for o in those]
+        [
+            LineMeans(o.frames, 100 * o.means, 100 * o.fixed, 1e4 * o.moving, o.noise_dn2, o.parts)
+            for o in those
+        ]
         for those in (whole, some)
     ]
     found = odds_of_lines(*loud, np.zeros(3), np.full(3, 0.05), (0.0, 0.0))

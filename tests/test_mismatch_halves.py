@@ -26,7 +26,7 @@ def _state(moving: Any, seed: int) -> Any:
         rows += rng.normal(0, NOISE_DN2**0.5, rows.shape)
         parts = rows.reshape(FRAMES, PARTS, -1).mean(2)
         fixed = rows.mean(0)
-        lines[name, "row"] = LineMeans(FRAMES, fixed, rows.var(0, ddof=1), NOISE_DN2, parts)
+        lines[name, "row"] = LineMeans(FRAMES, fixed, fixed, rows.var(0, ddof=1), NOISE_DN2, parts)
     return SimpleNamespace(
         setting=SimpleNamespace(
             layout=SimpleNamespace(uniform=[SimpleNamespace(name=name) for name in names]),

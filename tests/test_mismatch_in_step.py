@@ -24,7 +24,9 @@ def _setting(seed: int, moves: Any) -> Any:
     for k, (count, noise) in enumerate(zip(FRAMES, NOISE_DN, strict=True)):
         rows = moves(rng, count) + rng.normal(0, noise, (count, ROWS))
         parts = rows.reshape(count, PARTS, -1).mean(2)
-        lines[f"F{k}", "row"] = LineMeans(count, rows.mean(0), rows.var(0), noise**2, parts)
+        lines[f"F{k}", "row"] = LineMeans(
+            count, rows.mean(0), rows.mean(0), rows.var(0), noise**2, parts
+        )
     uniform = [SimpleNamespace(name=f"F{k}") for k in range(len(FRAMES))]
     return SimpleNamespace(
         layout=SimpleNamespace(uniform=uniform, rows=ROWS, columns=80),

@@ -35,7 +35,7 @@ def in_form(state: State, users: Camera, fitted: Sequence[Ranked]) -> list[Ranke
 
 def _remembered(state: State, users: BaseNoise, ranked: Ranked) -> Ranked:
     effect, *others = ranked.polished.effects
-    if not isinstance(effect, ReadoutMemory):
+    if not isinstance(effect, ReadoutMemory) or effect.before_line == "black":
         return ranked
     apart = 1 if state.setting.layout.channels == ("MONO",) else 2
     mixed, filtered = effect.lag_pixels % apart, effect.lag_pixels == apart and effect.fraction > 0

@@ -4,12 +4,14 @@ from collections.abc import Mapping
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from dsis.compiled import kernel
 from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, Stage
 
 _NOISE: Literal["noise"] = "noise"
+_SIGNAL: Literal["signal"] = "signal"
+_FIXED = frozenset({"fixed_row_variance", "fixed_column_variance", "fixed_smooth_variance"})
 
 
 class ReadoutMemory(Effect):
@@ -25,7 +27,9 @@ class ReadoutMemory(Effect):
     Or, where it `remembers` the signal, of all of it: v'(i) = v(i) + f (v(i - lag) - v(i)), as of
     an amplifier that has not settled, or of charge that stays behind. A flat of one colour keeps
     its level; colours mix where the lag is odd, edges blur. Correlation f (1 - f) / ((1 - f)^2 +
-    f^2), variance times (1 - f)^2 + f^2.
+    f^2), variance times (1 - f)^2 + f^2. The first samples of a line stay as they are; or, where
+    the read-out rests at `black` before a line (`before_line`), they are v (1 - f), darker by the
+    share that all others remember.
     """
 
     kind: Literal["readout_memory"] = "readout_memory"
@@ -33,6 +37,7 @@ class ReadoutMemory(Effect):
     lag_pixels: Annotated[int, Field(ge=1, examples=[2])]
     along: Literal["rows", "columns"] = "rows"
     remembers: Annotated[Literal["noise", "signal"], Field(exclude_if=_NOISE.__eq__)] = _NOISE
+    before_line: Annotated[Literal["signal", "black"], Field(exclude_if=_SIGNAL.__eq__)] = _SIGNAL
 
     stage: ClassVar[Stage] = Stage.READ_OUT
     rank: ClassVar[int] = 50
@@ -56,6 +61,7 @@ class ReadoutMemory(Effect):
             "spectral_peak",
             "row_spectrum_peak",
             "variance_spread",
+            *_FIXED,  # where lines begin at black
         }
     )
     confounders: ClassVar[str] = (
@@ -63,10 +69,22 @@ class ReadoutMemory(Effect):
         "whole row."
     )
 
+    @model_validator(mode="after")
+    def _of_signal(self) -> "ReadoutMemory":
+        if self.before_line == "black" and self.remembers != "signal":
+            message = 'before_line = "black" needs remembers = "signal": black is no noise'
+            raise ValueError(message)
+        return self
+
+    @property
+    def changes(self) -> frozenset[str]:
+        """What it may change: fixed patterns where lines begin at black."""
+        return self.measures if self.before_line == "black" else self.measures - _FIXED
+
     def apply(self, image: Image, exposure: Exposure) -> Image:
         """Add what is remembered."""
         if self.exchanges:
-            return self.exchanged(image)
+            return self._begun(self.exchanged(image), exposure)
         along_rows, rows = self.along == "rows", len(image)
         lag = self.lag_pixels * (image[0, 0].size if along_rows else 1)
         return _remembering(
@@ -91,6 +109,16 @@ class ReadoutMemory(Effect):
         into[k:] += np.float32(self.fraction) * (own[:-k] - own[k:])
         return made
 
+    def _begun(self, image: Image, exposure: Exposure) -> Image:
+        """Take from the first samples of lines what they would remember, if it is black."""
+        if self.before_line == "black":
+            grid = exposure.grid
+            along_rows = self.along == "rows"
+            places = grid.column_numbers() if along_rows else grid.row_numbers()
+            first = places.reshape(-1) < self.lag_pixels
+            np.moveaxis(image, int(along_rows), 0)[first] *= np.float32(1 - self.fraction)
+        return image
+
     def reach_pixels(self) -> int:
         """Return how far away a pixel may matter."""
         return self.lag_pixels
@@ -105,7 +133,9 @@ class ReadoutMemory(Effect):
         across = point.columns if self.along == "rows" else point.rows
         lag = (0, k) if self.along == "rows" else (k, 0)
         if self.exchanges:
-            return point.filtered(v, {(0, 0): 1 - f, lag: f}) | {"level": 0.0}
+            black = f * min(k / across, 1.0) if self.before_line == "black" else 0.0
+            kernel = point.filtered(v, {(0, 0): 1 - f, lag: f})
+            return kernel | {"level": -black * point.signal_dn}
         noise = point.coupled({(0, 0): v * f**2 * max(across - k, 0) / across, lag: v * f})
         return noise | {"level": 0.0}  # of the effect alone
 

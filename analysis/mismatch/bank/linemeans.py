@@ -24,8 +24,10 @@ class LineMeans:
     ----------
     frames
         How many.
+    means
+        Mean of each line over all frames, about that of all lines of its colours: (line,), DN.
     fixed
-        Mean of each line over all frames beyond what is smooth across them: (line,), DN.
+        The same beyond what is smooth across lines.
     moving
         Variance of each line's mean from frame to frame, what all lines have in common taken off:
         (line,), DN^2, of `frames` - 1 degrees of freedom.
@@ -36,6 +38,7 @@ class LineMeans:
     """
 
     frames: int
+    means: Array
     fixed: Array
     moving: Array
     noise_dn2: float
@@ -55,7 +58,8 @@ def line_means(
     """
     along = AXES.index(axis)
     step = 1 if len(sites) == 1 else 2
-    fixed, moving, noise = np.zeros(shape[along]), np.zeros(shape[along]), []
+    means, fixed, moving = np.zeros((3, shape[along]))
+    noise = []
     lines = np.zeros((frames, shape[along]))
     for first in range(step):
         own = [channels[c] for c, site in sites.items() if site[along] == first or step == 1]
@@ -67,6 +71,7 @@ def line_means(
         lines[:, first::step] = series
         series = series - series.mean(1, keepdims=True)
         mean = series.mean(0)
+        means[first::step] = mean
         fixed[first::step] = beyond_smooth(mean)
         moving[first::step] = ((series - mean) ** 2).sum(0) / (frames - 1)
         variances = [one.estimates["pixel_variance"].value for one in own]
@@ -74,4 +79,4 @@ def line_means(
     ends = np.arange(PARTS + 1) * shape[along] // PARTS
     each = zip(ends[:-1], np.maximum(ends[1:], ends[:-1] + 1), strict=True)  # of few lines one
     parts = np.stack([lines[:, first:last].mean(1) for first, last in each], 1)
-    return LineMeans(frames, fixed, moving, float(np.mean(noise)), parts)
+    return LineMeans(frames, means, fixed, moving, float(np.mean(noise)), parts)

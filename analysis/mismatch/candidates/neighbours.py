@@ -7,6 +7,7 @@ import numpy as np
 
 from analysis.mismatch.bank.sawtooth import PLACES, Sawtooth, sawteeth
 from analysis.mismatch.candidates.candidate import Candidate, Proposal, proposals
+from analysis.mismatch.candidates.linestart import lines_begin_darker
 from analysis.mismatch.clues import Clues, alike
 
 _ALONG_ROWS, _ALONG_COLUMNS = "correlation_0_1", "correlation_1_0"
@@ -18,6 +19,7 @@ _CLEAR = 3.0  # and from which there are diagonals
 _MOST = 0.1  # of a pixel's charge, that it gives a neighbour
 _ASKEW = 0.5  # anisotropy from which a fit starts where greens alone tell it
 _LEAST_FLATS = 2  # of one, colours may be the light's
+_AS_MUCH = (0.5, 2.0)  # times what lines begin darker by, that they remember
 _BESIDE = {"R": ("Gr", "Gb"), "Gr": ("R", "B"), "Gb": ("B", "R"), "B": ("Gb", "Gr")}
 _NEAR = (_ALONG_ROWS, _ALONG_COLUMNS, "line_correlation", "pixel_variance")
 
@@ -192,7 +194,25 @@ def _memory(clues: Clues) -> Sequence[Proposal]:
             )
             # Its size, and which of so many lags it is.
             found += [replace(one, best_of=len(means), errors={"lag_pixels": 0.0}) for one in start]
+        share = lines_begin_darker(clues, axis, lag)
+        if share and _AS_MUCH[0] < means[axis, lag] / share < _AS_MUCH[1]:
+            found += _from_black(axis, lag, share, len(means))
     return found
+
+
+def _from_black(axis: str, lag: int, share: float, lags: int) -> list[Proposal]:
+    """Propose the memory of the signal of lines that begin at black."""
+    start = proposals(
+        "readout_memory",
+        ["fraction"],
+        ["fraction"],
+        fraction=float(np.clip(share, -0.6, 0.6)),
+        lag_pixels=lag,
+        along=axis,
+        remembers="signal",
+        before_line="black",
+    )
+    return [replace(one, best_of=lags, errors={"lag_pixels": 0.0}) for one in start]
 
 
 def _converter(clues: Clues) -> Sequence[Proposal]:

@@ -16,6 +16,7 @@ Array = NDArray[np.float64]
 SURFACE = "smooth_variance_spread"
 BY_LINE = tuple(f"{axis}_variance_spread" for axis in AXES)
 _BOWED = 2  # degree of surfaces that lean or bow
+_OF_MANY = 1.5  # standard deviations that many pixels are off by
 OUTSTANDING = (4, 7, 12)  # standard deviations of a pixel's summed variance
 
 
@@ -41,9 +42,10 @@ class VarianceSums:
 
         Counts enter as twice their root (Anscombe 1948), of standard deviation 1.
         """
-        apart = drawn_in(self.total)
-        found = {"variance_persistence": self._persistence(), SURFACE: _surface(apart)}
-        found |= {name: _lines(apart, along) for along, name in enumerate(BY_LINE)}
+        found = {"variance_persistence": self._persistence()}
+        found[SURFACE] = _surface(drawn_in(self.total))
+        many = drawn_in(self.total, _OF_MANY)
+        found |= {name: _lines(many, along) for along, name in enumerate(BY_LINE)}
         sd = sqrt(self.squares)
         for limit in OUTSTANDING:
             count = int((self.total > limit * sd).sum()) if sd > 0 else 0
@@ -81,7 +83,8 @@ def _surface(apart: Array) -> Number:
 def _lines(apart: Array, along: int) -> Number:
     """Return the mean square of rows' (0) or columns' (1) summed variances, 1 if all is white.
 
-    Beyond what is smooth across them, in the square of single pixels, few of which count no more.
+    Beyond what is smooth across them, in the square of single pixels. Those that are noisier than
+    most are so by as much wherever they lie: the track of a particle makes no line noisy.
     """
     lines, across = apart.shape[along], apart.shape[1 - along]
     degrees, free = lines - 1 - SMOOTH_DEGREE, lines * (across - 1)

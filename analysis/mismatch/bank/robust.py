@@ -16,10 +16,13 @@ def typical_square(values: Array) -> float:
     return median(values**2) / _MEDIAN
 
 
-def drawn_in(values: Array) -> Array:
-    """Return values about their mean; those far out count as so far out as the many ever are."""
+def drawn_in(values: Array, farthest: float = _FAR_OUT) -> Array:
+    """Return values about their mean; those far out count as so far out as the many ever are.
+
+    So many standard deviations of the many are the `farthest`.
+    """
     apart = values - values.mean()
-    limit = _FAR_OUT * typical_square(apart) ** 0.5
+    limit = farthest * typical_square(apart) ** 0.5
     return np.asarray(np.clip(apart, -limit, limit))
 
 

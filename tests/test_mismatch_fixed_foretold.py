@@ -1,5 +1,6 @@
 """Fixed deviations of lines: what frames that others foretell gain by them, and all frames."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,7 @@ from scipy.stats import multivariate_normal
 
 from analysis.mismatch.bank.linemeans import LineMeans
 from analysis.mismatch.fixedforetold import _shared, _with_own, odds_of_lines
+from analysis.mismatch.rank import SURE_GAIN, TOLD_APART
 
 Array = NDArray[np.float64]
 LINES = 120
@@ -41,7 +43,7 @@ def test_odds_are_those_of_normal_laws() -> None:
     pattern = np.random.default_rng(1).normal(0, 0.05, LINES)
     whole, some = _recorded(2, lambda _: pattern)
     size = np.full(3, 0.05)
-    gained, of_all = odds_of_lines(whole, some, SIGNAL_DN, size, (1e-3, 1e-9))
+    odds = odds_of_lines(whole, some, SIGNAL_DN, size, (1e-3, 1e-9))
     moving = np.array([own.moving.mean() for own in whole])
     counts = np.array([*(f - k for f, k in zip(FRAMES, LOCKED, strict=True)), *LOCKED])
     signal = np.tile(SIGNAL_DN, 2)
@@ -52,11 +54,15 @@ def test_odds_are_those_of_normal_laws() -> None:
               for w, s in zip(whole, some, strict=True)]  # fmt: skip
     seen = np.stack([*(own.fixed for own in some), *locked]).T
     own = np.stack([same, same * np.outer(signal, signal)])
-    without, beside = (_with_own(seen.T, one, own) for one in (without, beside))
-    for which, expected in ((slice(None), of_all), (slice(3), of_all - gained)):
+    by_itself = [_with_own(seen.T, one, own) for one in (beside, without)]
+    every, first = slice(None), slice(3)
+    for covariances, which, expected in (
+        ((beside, without), every, odds.all),
+        ((beside, without), first, odds.all - odds.added),
+        (by_itself, every, odds.own),
+    ):
         laws = [
-            multivariate_normal(cov=c[which, which]).logpdf(seen[:, which])
-            for c in (beside, without)
+            multivariate_normal(cov=c[which, which]).logpdf(seen[:, which]) for c in covariances
         ]
         np.testing.assert_allclose(laws[0] - laws[1], expected, atol=1e-9)
 
@@ -83,7 +89,7 @@ def test_a_pattern_that_each_exposure_draws_anew_is_not_fixed(deviation: Array) 
         lines = _recorded(
             seed, lambda signal, draw=rng: draw.normal(0, by_signal[float(signal)], LINES)
         )
-        assert odds_of_lines(*lines, SIGNAL_DN, deviation, (0.0, 0.0))[1].sum() < 4  # SURE_GAIN + 1
+        assert odds_of_lines(*lines, SIGNAL_DN, deviation, (0.0, 0.0)).own.sum() < TOLD_APART
 
 
 @pytest.mark.parametrize("deviation", [np.full(3, 0.1), 2e-4 * SIGNAL_DN])
@@ -94,25 +100,43 @@ def test_what_is_there_gains_and_what_is_not_loses(deviation: Array) -> None:
     for seed in range(30):
         lines = np.random.default_rng([seed, 1]).normal(0, 1, LINES)
         there = _recorded(seed, lambda signal, own=lines: own * by_signal[float(signal)])
-        gains.append(odds_of_lines(*there, SIGNAL_DN, deviation, (0.0, 0.0))[1].sum())
+        odds = odds_of_lines(*there, SIGNAL_DN, deviation, (0.0, 0.0))
+        gains.append([odds.all.sum(), odds.own.sum()])
         none = _recorded(1000 + seed, lambda _: 0.0)
-        losses.append(odds_of_lines(*none, SIGNAL_DN, deviation, (0.0, 0.0))[1].sum())
-    assert min(gains) > 7
+        losses.append(odds_of_lines(*none, SIGNAL_DN, deviation, (0.0, 0.0)).all.sum())
+    assert np.min(gains) > 7
     assert max(losses) < 0
+
+
+def test_gains_that_the_brightest_flat_shows_best_are_foretold() -> None:
+    """Of 7 standard errors, 3 of 4: what its own gain explains as well is asked for odds of 20."""
+    signal, noise = np.array([0.0, 3500.0, 10_000.0]), (0.05, 0.22, 0.55)
+    deviation = 2e-5 * signal
+    found = []
+    for seed in range(50):
+        rng = np.random.default_rng([seed, 3])
+        lines, whole, some = rng.normal(0, 1, LINES), [], []
+        for count, locked, own, size in zip(FRAMES, LOCKED, noise, deviation, strict=True):
+            series = rng.normal(0, own**0.5, (count, LINES)) + lines * size
+            whole.append(_lines(series, own))
+            some.append(_lines(series[locked:], own))
+        odds = odds_of_lines(whole, some, signal, deviation, (0.0, 0.0))
+        found.append((odds.all.sum(), odds.own.sum()))
+    everything, alone = np.array(found).T
+    assert ((everything > SURE_GAIN + 1) & (alone >= TOLD_APART)).sum() >= 36
+    assert (alone > SURE_GAIN + 1).sum() <= 30  # asked of that alone
 
 
 def test_where_no_frame_is_locked_nothing_is_told() -> None:
     whole, _ = _recorded(3, lambda _: 0.0)
-    gained, of_all = odds_of_lines(whole, whole, SIGNAL_DN, np.full(3, 0.05), (0.0, 0.0))
-    assert gained.size == of_all.size == 0
+    odds = odds_of_lines(whole, whole, SIGNAL_DN, np.full(3, 0.05), (0.0, 0.0))
+    assert odds.added.size == odds.all.size == odds.own.size == 0
 
 
 def test_what_lines_move_by_leaves_what_they_share_as_it_is() -> None:
     """Ratios of fixed variances are net of movement: lines that move more share no less."""
     whole, _ = _recorded(4, lambda _: 0.0)
-    still = [
-        LineMeans(o.frames, o.means, o.fixed, 0 * o.moving, o.noise_dn2, o.parts) for o in whole
-    ]
+    still = [replace(own, moving=0 * own.moving) for own in whole]
     noise = np.array([own.noise_dn2 / own.frames for own in whole])
     grown = 1 + (0.09 + 1e-8 * SIGNAL_DN**2) / noise
     assert _shared(whole, grown, SIGNAL_DN) == pytest.approx((0.09, 1e-8))
@@ -123,11 +147,8 @@ def test_of_darks_alone_an_own_gain_says_nothing() -> None:
     """Signals are 0, and lines noisy: odds are numbers all the same."""
     whole, some = _recorded(7, lambda _: 0.0)
     loud = [
-        [
-            LineMeans(o.frames, 100 * o.means, 100 * o.fixed, 1e4 * o.moving, o.noise_dn2, o.parts)
-            for o in those
-        ]
+        [replace(own, fixed=100 * own.fixed, moving=1e4 * own.moving) for own in those]
         for those in (whole, some)
     ]
     found = odds_of_lines(*loud, np.zeros(3), np.full(3, 0.05), (0.0, 0.0))
-    assert all(np.isfinite(one).all() for one in found)
+    assert all(np.isfinite(one).all() for one in (found.added, found.all, found.own))

@@ -3,11 +3,13 @@
 from types import SimpleNamespace as Stub
 from typing import Any
 
+import numpy as np
 import pytest
 
 from analysis.mismatch.jumptold import as_pixels_show, unlike_pixels
 from analysis.mismatch.phase import WholeFrames
 from analysis.mismatch.rank import Ranked
+from analysis.mismatch.telegraph import _PARTS, _SWITCHING, _told
 from dsis.effects import Effect
 from dsis.effects.rts import Rts
 
@@ -52,9 +54,11 @@ def test_frames_break_the_tie_that_numbers_leave(
     assert other.gain == second
 
 
-def test_what_numbers_tell_apart_is_not_asked() -> None:
+def test_what_numbers_tell_apart_by_more_than_frames_stays() -> None:
+    """Sums over pixels know the law of a spread no better than frames of each of them."""
     fitted = _ranked(rts=40.0, read_noise_spread=30.0)
-    assert as_pixels_show(_frames(-1.0, 80.0), fitted) == fitted
+    assert as_pixels_show(_frames(-1.0, 12.0), fitted) == fitted
+    assert as_pixels_show(_frames(-1.0, 80.0), fitted)[0].kind == "read_noise_spread"
     assert as_pixels_show(None, fitted) == fitted
     assert as_pixels_show(_frames(-1.0, 80.0), []) == []
     others = _ranked(impulse=5.0, rts=4.0)
@@ -111,3 +115,19 @@ def test_pixels_deny_nothing_beside_the_other() -> None:
     assert unlike_pixels(bare, frames, rts, [spread], _nothing) is None  # it was fitted as well
     assert unlike_pixels(there, frames, rts, [], _nothing) is None
     assert unlike_pixels(bare, None, rts, [], _nothing) is None
+    still = unlike_pixels(there, _frames(-80.0, 80.0), rts, [], _nothing)
+    assert still is not None
+    assert still.why.endswith("do not jump")
+    assert unlike_pixels(there, _frames(-80.0, 80.0), spread, [], _nothing) is None
+
+
+def test_sizes_at_the_end_of_what_was_tried_are_no_larger() -> None:
+    """One place's logarithm, rounded, has an exponential 2e-13 beyond a half: no probability."""
+    amplitudes = np.geomspace(1.0, 40.0, 32)
+    for place in range(_SWITCHING.size):
+        likely = np.full((_SWITCHING.size, amplitudes.size, _PARTS.size), -1e3)
+        likely[place, 3, 5] = 0.0
+        told = _told(likely, amplitudes, (10.0, 0.0, 0.0))
+        assert told is not None
+        assert told.switching == pytest.approx(_SWITCHING[place])
+        Rts.model_validate({"kind": "rts", **told.values})

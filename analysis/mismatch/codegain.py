@@ -3,10 +3,13 @@
 from math import inf, isfinite
 
 from analysis.mismatch.bank.codephase import LABEL
+from analysis.mismatch.bank.sawtooth import PERIODS, explained
 from analysis.mismatch.state import Setting
 from dsis.effects import Effect
 from dsis.effects.adc_dnl import AdcDnl
+from dsis.effects.adc_memory import AdcMemory
 
+_OF_DIFFERENCES = 2 / 3  # of many frames: successive ones share a frame
 _PAID = 2.0  # nats: for the size, and for the period that is the best of six
 
 
@@ -22,3 +25,17 @@ def gain_of_codes(setting: Setting, effect: Effect) -> float:
     scores = [float(own[LABEL][0]) for own in setting.seen.pooled.values() if LABEL in own]
     most = max((score for score in scores if isfinite(score)), default=0.0)
     return most**2 / 2 - _PAID if most > 0 else -inf
+
+
+def gain_of_residue(setting: Setting, effect: Effect) -> float:
+    """Return the log-likelihood that samples gain by what they have of the residue before, nats.
+
+    Beyond what goes in proportion to the sample before, so that it says nothing for other memories.
+    A sawtooth has more than the first wave of its period, and than numbers whose likelihood has
+    heavy tails allow one of them. Minus infinity of any other effect.
+    """
+    if not isinstance(effect, AdcMemory) or effect.period_codes not in PERIODS:
+        return -inf
+    samples = setting.seen.carried.get(effect.along, ())
+    chi2 = explained(samples, effect.period_codes, effect.at_code, effect.step_dn)
+    return _OF_DIFFERENCES * chi2 / 2 if samples else -inf

@@ -14,7 +14,7 @@ from analysis.mismatch.model import side_by_side
 from analysis.mismatch.name import Search
 from analysis.mismatch.named import Named, unclear
 from analysis.mismatch.state import State
-from analysis.mismatch.trial import Gained, Trial, denied, exceeds
+from analysis.mismatch.trial import Gained, Trial, denied
 from dsis.camera import Camera
 
 _DOUBTFUL = 30.0  # gain of log-likelihood below which locked frames may not confirm an effect
@@ -63,11 +63,18 @@ def proven(
     """
     while True:
         final = final if judged else undenied(search, final)
-        small = next(((one, why) for one in search.named if (why := unclear(one))), None)
+        gained = _gained(search, final, trial)
+        small = next(
+            (
+                (one, why)
+                for one in search.named
+                if (why := unclear(one)) and not _borne_out(gained.get(one.name))
+            ),
+            None,
+        )
         if small is not None:
             final = _without(search, final, small, judged=judged)
             continue
-        gained = _gained(search, final, trial)
         weak = [
             named
             for named in search.named
@@ -81,6 +88,11 @@ def proven(
         if _calls_left(final, worst) and gained[worst.name].gain.ci95[0] <= 0 < nats:
             why += " may where what calls for it is left"
         final = _without(search, final, (worst, why), judged=judged)
+
+
+def _borne_out(told: Gained | None) -> bool:
+    """Return whether locked frames bear an effect out, whatever the error of its size."""
+    return told is not None and told.certain and told.gain.ci95[0] > 0
 
 
 def _without(search: Search, final: State, which: tuple[Named, str], *, judged: bool) -> State:
@@ -119,10 +131,10 @@ def _gained(search: Search, final: State, trial: Trial) -> dict[str, Gained]:
             other = _foretold(search, named, cameras[named.name], trial, one)
             if other.certain:
                 told[named.name] = other
-            elif (exceeds(one.gain) or exceeds(other.gain)) and shown_by_all(
+            elif max(one.gain.nats_per_frame, other.gain.nats_per_frame) > 0 and shown_by_all(
                 search, final, named, cameras[named.name], trial
             ):
-                best = one if exceeds(one.gain) else other
+                best = max(one, other, key=lambda own: own.gain.nats_per_frame)
                 told[named.name] = replace(best, certain=True)
         found |= told
         if not all(one.certain for one in found.values()):

@@ -7,6 +7,7 @@ share, repeats within an exposure only: what is fixed is what exposures have in 
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 import scipy.optimize
@@ -26,10 +27,29 @@ FIXED_LINES: Mapping[str, Axis] = {
     "column_prnu": "column",
 }
 _MOST = 3.0  # nats that one line may count: a line that is out of order is no law of lines
-_NOTHING = np.zeros(0), np.zeros(0)
 
 
-def fixed_foretold(bare: State, before: Observation, effect: Effect) -> tuple[Array, Array]:
+@dataclass(frozen=True)
+class Odds:
+    """Odds that lines deviate by what is fixed, nats of each line; empty: nothing tells.
+
+    Attributes
+    ----------
+    added, all
+        Of all frames less those of the others, and of all: against nothing.
+    own
+        Of all: against what each exposure has alone, an offset and a gain of likeliest sizes.
+    """
+
+    added: Array = field(default_factory=lambda: np.zeros(0))
+    all: Array = field(default_factory=lambda: np.zeros(0))
+    own: Array = field(default_factory=lambda: np.zeros(0))
+
+
+_NOTHING = Odds()
+
+
+def fixed_foretold(bare: State, before: Observation, effect: Effect) -> Odds:
     """Return what locked frames gain by a fixed deviation of lines, and all: nats of each line.
 
     The first are odds of all frames less those of the others. What lines deviate by without the
@@ -66,7 +86,7 @@ def odds_of_lines(
     signal_dn: Array,
     deviation_dn: Array,
     shared: tuple[float, float],
-) -> tuple[Array, Array]:
+) -> Odds:
     """Return the odds that lines deviate: of `whole` less those of `some`, and of `whole`.
 
     Parameters
@@ -94,12 +114,14 @@ def odds_of_lines(
     same = (which[:, np.newaxis] == which).astype(np.float64)
     own = np.stack([same, same * np.outer(signal, signal)][: 1 + bool(signal.any())])
     beside = without + np.outer(deviation, deviation)
-    without, beside = (_with_own(seen, one, own) for one in (without, beside))
     first = len(whole)
     odds = _loglik(seen, beside) - _loglik(seen, without)
     known = _loglik(seen[:first], beside[:first, :first])
     known = known - _loglik(seen[:first], without[:first, :first])
-    return np.clip(odds - known, -_MOST, _MOST), np.clip(odds, -_MOST, _MOST)
+    # Whether it is the exposures' own is another question than whether there is anything.
+    one, other = (_loglik(seen, _with_own(seen, law, own)) for law in (beside, without))
+    made = odds - known, odds, one - other
+    return Odds(*(np.clip(part, -_MOST, _MOST) for part in made))
 
 
 def _with_own(seen: Array, covariance: Array, own: Array) -> Array:

@@ -20,20 +20,18 @@ def as_pixels_show(frames: WholeFrames | None, fitted: Sequence[Ranked]) -> list
     """Return ranked effects, the best first, where the frames of single pixels had their say.
 
     They are asked where the best is one of both, and numbers, which are sums over pixels, do not
-    tell it from the other.
+    tell it from the other, or by less than frames do.
     """
     first = fitted[0] if fitted else None
     if frames is None or first is None or first.kind not in _OTHER:
         return list(fitted)
-    near = [
-        one
-        for one in fitted
-        if one.kind == _OTHER[first.kind] and one.gain > first.gain - TOLD_APART
-    ]
+    near = [one for one in fitted if one.kind == _OTHER[first.kind]]
     odds = frames.spread_rather(SURE_GAIN) if near else 0.0
-    if odds == 0:
-        return list(fitted)
     preferred = "read_noise_spread" if odds > 0 else "rts"
+    behind = 0.0 if preferred == first.kind else abs(odds) - TOLD_APART
+    near = [one for one in near if one.gain > first.gain - max(TOLD_APART, behind)]
+    if odds == 0 or not near:
+        return list(fitted)
     top = next(one for one in (first, *near) if one.kind == preferred)
     limit = max(first.gain - abs(odds), LEAST_GAIN)
     placed = [
@@ -56,7 +54,8 @@ def unlike_pixels(
     They do where they are sure of another, which was not fitted or has no word: of the other of
     both, or, of hot pixels and of tails, that pixels jump. These explain some of the numbers: jumps
     as frames tell them, fitted to no number, must explain more, with what frames gain by them.
-    Beside that other, which the camera has, it is no rival.
+    Beside that other, which the camera has, it is no rival; but pixels do not jump either where
+    frames are sure that they do not.
 
     Parameters
     ----------
@@ -71,8 +70,15 @@ def unlike_pixels(
     """
     other = _RIVALS.get(best.kind)
     there = {own.kind for own in camera.effect} | {one.kind for one in others}
-    if frames is None or other is None or other in there:
+    if frames is None or other is None:
         return None
+    if other in there:
+        still = best.kind == "rts" and frames.no_jumps(SURE_GAIN)
+        return (
+            Denial(0.0, "frames of single pixels show noisy ones that do not jump")
+            if still
+            else None
+        )
     odds = frames.spread_rather(SURE_GAIN)
     against = odds if other == "read_noise_spread" else -odds
     if against > 0 and best.kind not in _OTHER and frames.jumps is not None:

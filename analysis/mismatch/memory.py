@@ -11,6 +11,7 @@ from dsis.effects import Effect
 
 Array = NDArray[np.float64]
 _ALIKE = 0.05  # relative difference of parameters up to which a proposal is an earlier one
+_UNIT, _ONE_NOISE = "pixel_variance", 0.05  # relative change, from which units are others
 _SHARED = 0.1  # share of an effect's change that may lie where the model moved since
 
 
@@ -42,7 +43,7 @@ class Memory:
                 continue
             size = np.where(null.known, np.abs(change) / null.sd, 0.0)
             moved = np.where(null.known, np.abs(null.mean - means) / null.sd, 0.0) > 1.0
-            if size[moved].sum() <= _SHARED * size.sum():
+            if size[moved].sum() <= _SHARED * size.sum() and _of_one_noise(state, means):
                 return null.mean + change
         return None
 
@@ -50,6 +51,13 @@ class Memory:
         """Remember what an effect changed."""
         means = state.null.mean
         self.changes.append((effect, means, np.nan_to_num(mean - means)))
+
+
+def _of_one_noise(state: State, means: Array) -> bool:
+    """Return whether pixels are as noisy as they were: most numbers are in units of that."""
+    own = [i for i, key in enumerate(state.vector.keys) if key.statistic == _UNIT]
+    apart = np.abs(state.null.mean[own] - means[own])
+    return not bool((apart > _ONE_NOISE).any())
 
 
 def words(effect: Effect) -> tuple[str, ...]:

@@ -11,6 +11,7 @@ import scipy.stats
 from numpy.typing import NDArray
 
 from analysis.mismatch.bank.key import Key
+from analysis.mismatch.bank.scalars import OF_MEAN_FRAMES
 from analysis.mismatch.contrasts import Contrasts, contrasts
 from analysis.mismatch.fewpairs import widening
 from analysis.mismatch.layout import Layout
@@ -21,6 +22,7 @@ Array = NDArray[np.float64]
 _OWN = 40.0  # degrees of freedom that the closed form, scaled by name, is worth for a number
 _POOLED = 160.0  # and for the tails: a scale is shared by all numbers of a name
 _LEAST_SCALE = 0.8
+_OF_PIXELS, _OF_LINES = "fixed_pixel_variance", ("fixed_row_variance", "fixed_column_variance")
 _SEVERAL = 5  # numbers of a name that tell whether they are alike
 _RARE = 1e-5  # chance of a departure that counts, among some hundred numbers
 _UNLIKE = 1e-4  # chance of spreads that differ so
@@ -112,7 +114,9 @@ def null_of(
     parts = np.where(known, (np.nan_to_num(values) - mean) / sd, 0.0)
     along = parts @ sums.matrix.T
     spread = (along**2).sum(0) / (count - 1)
-    expected = _spread(sums, [one.shared for one in simulated], sd) / (1 + 1 / count)
+    alike = _shared(sums, [one.shared for one in simulated], sd)
+    alike += _together(sums, drawn_together(seen.keys, mean, known), seen.keys)
+    expected = (1 + alike) / (1 + 1 / count)
     pooled = (_OWN * expected + (count - 1) * spread) / (_OWN + count - 1)
     # The same few recordings leave all numbers unsure, at worst to the same side.
     aside = (np.abs(sums.matrix) @ (np.sqrt(besides) / sd)) ** 2
@@ -128,19 +132,57 @@ def null_of(
     )
 
 
-def _spread(sums: Contrasts, shared: Sequence[Array], sd: Array) -> Array:
-    """Return the variance of contrasts of numbers that chance draws together, one of no others.
+def _shared(sums: Contrasts, shared: Sequence[Array], sd: Array) -> Array:
+    """Return what numbers that exposures share add to the variance of contrasts, 1 of no others.
 
     `shared` are the variances that exposures share, of each simulation: they count as far as these
     agree on it.
     """
     if any(own.size != sd.size for own in shared):
-        return np.ones(len(sums.keys))
+        return np.zeros(len(sums.keys))
     mean, noise = np.mean(shared, 0), np.var(shared, 0, ddof=1) / len(shared)
     kept = np.where(mean > 0, mean**3 / np.maximum(mean**2 + noise, 1e-300), 0.0)
-    part = np.minimum(np.sqrt(kept) / sd, 1.0)
-    alike: Array = (sums.matrix @ part) ** 2 - sums.matrix**2 @ part**2
-    return np.asarray(1 + alike)
+    return _of_parts(sums.matrix, np.minimum(np.sqrt(kept) / sd, 1.0))
+
+
+def _together(sums: Contrasts, part: Array, keys: Sequence[Key]) -> Array:
+    """Return what numbers of one fixed pattern add to the variance of contrasts over exposures."""
+    groups: dict[tuple[str, str], list[int]] = {}
+    for i in np.flatnonzero(part).tolist():
+        groups.setdefault((keys[i].statistic, keys[i].channel), []).append(i)
+    added = np.zeros(len(sums.keys))
+    for which in groups.values():
+        added += _of_parts(sums.matrix[:, which], part[which])
+    return added
+
+
+def _of_parts(matrix: Array, part: Array) -> Array:
+    """Return by how much variances of contrasts grow where numbers have a part in common."""
+    return np.asarray((matrix @ part) ** 2 - matrix**2 @ part**2)
+
+
+def drawn_together(keys: Sequence[Key], mean: Array, known: NDArray[np.bool_]) -> Array:
+    """Return the part that a sensor's fixed pattern has in the scatter of each number, 0 to 1.
+
+    Mean frames of several exposures show one pattern beside noise of their own. Its mean squares
+    correlate as the square of the share that the pattern has in the mean square, which is known by
+    those of pixels over noise, and of lines and surfaces over pixels. Lines make surfaces.
+    """
+    squares = {
+        (key.statistic, key.place): max(float(value), 1.0) ** 3
+        for key, value, told in zip(keys, mean, known, strict=True)
+        if key.scope == "exposure" and key.statistic in (_OF_PIXELS, *_OF_LINES) and told
+    }
+    part = np.zeros(len(keys))
+    for i, key in enumerate(keys):
+        if key.scope != "exposure" or key.statistic not in OF_MEAN_FRAMES or not known[i]:
+            continue
+        coarser = key.is_cube_root and key.statistic != _OF_PIXELS
+        own = max(float(mean[i]), 1.0) ** 3 if coarser else 1.0
+        if key.statistic == "fixed_smooth_variance":
+            own = max(own, *(squares.get((lines, key.place), 1.0) for lines in _OF_LINES))
+        part[i] = 1 - 1 / (squares.get((_OF_PIXELS, key.place), 1.0) * own)
+    return part
 
 
 def _grown(keys: Sequence[Key], mean: Array) -> Array:

@@ -145,6 +145,10 @@ class WholeFrames:
             return 0.0
         return seen.spread if seen.spread > sure else -seen.jumping
 
+    def no_jumps(self, sure: float) -> bool:
+        """Return whether frames are `sure` that noisy pixels do not jump, nats."""
+        return self._telegraph is not None and self._telegraph.jumping < -sure
+
     @property
     def jumps(self) -> Rts | None:
         """The pixels that jump, of the most likely numbers; None: nothing is asked."""

@@ -21,6 +21,7 @@ from analysis.mismatch.model import side_by_side
 from analysis.mismatch.polish import Polished, needed, polish, stepped, with_effects
 from analysis.mismatch.state import Setting, State
 from dsis.effects import Effect
+from dsis.effects.adc_memory import AdcMemory
 
 Array = NDArray[np.float64]
 Fit = tuple[str, Proposal, Polished]
@@ -192,6 +193,10 @@ def _gained(state: State, start: Proposal, shown: Callable[[Effect], float]) -> 
     effect = start.effect
     if any(same_place(effect, one, state.setting.layout) for one in state.camera.effect):
         return -np.inf
+    if isinstance(effect, AdcMemory) and any(
+        isinstance(one, AdcMemory) and one.along == effect.along for one in state.camera.effect
+    ):
+        return -np.inf  # samples have that residue already
     paid = 0.0 if effect.kind in _BY_JUMPS else start.price  # odds of all sizes have paid for them
     return shown(effect) - paid
 

@@ -320,7 +320,8 @@ def _told(likely: Array, amplitudes: Array, gains: tuple[float, float, float]) -
     found = []
     for axis, places in enumerate((_SWITCHING, amplitudes, _PARTS)):
         own = chance.sum(tuple(k for k in range(chance.ndim) if k != axis))
-        mean = exp(float(own @ np.log(places)))
+        # One place's own logarithm, rounded, may be beyond it: half of all frames is the most.
+        mean = float(np.clip(exp(float(own @ np.log(places))), places[0], places[-1]))
         # No better than where between two places.
         step = mean * float(np.diff(np.log(places)).mean())
         found.append((mean, sqrt(float(own @ (places - mean) ** 2) + step**2 / 12)))

@@ -24,7 +24,7 @@ from analysis.mismatch.prove.held import Held, hold
 from analysis.mismatch.prove.likelihood import Loglik
 from analysis.mismatch.prove.proof import hold_seen, loglik_of, prove_held
 from analysis.mismatch.prove.virtual import Signals
-from analysis.mismatch.rank import SURE_GAIN
+from analysis.mismatch.rank import SURE_GAIN, TOLD_APART
 from analysis.mismatch.source import Source
 from analysis.mismatch.split import Split
 from analysis.mismatch.state import Setting, State, judged
@@ -171,14 +171,14 @@ class Trial:
         gain by it, the odds of all frames count that take an effect into a search, once its size is
         paid for.
         """
-        nats, of_all = fixed_foretold(bare, self.numbers.rest[1], effect)
-        frames = self.numbers.frames
+        odds = fixed_foretold(bare, self.numbers.rest[1], effect)
+        nats, frames = odds.added, self.numbers.frames
         if not (nats.size and frames):
             return None
         told = Ratio(float(nats.sum()), float(np.sqrt(nats @ nats)), certain=False)
         found = _of_pixels(_per_frame(told, frames), frames)
-        shown = told.nats > _BARE and float(of_all.sum()) - 1 >= SURE_GAIN
-        return replace(found, certain=shown)
+        shown = told.nats > _BARE and float(odds.all.sum()) - 1 >= SURE_GAIN
+        return replace(found, certain=shown and float(odds.own.sum()) >= TOLD_APART)
 
     def gains(self, final: State, without: Mapping[str, Camera]) -> dict[str, Gained]:
         """Return what the final model gains over cameras without an effect, by effect."""

@@ -1,18 +1,22 @@
 """Memory of the converter: a conversion carries over the residue of the one before."""
 
+from math import ceil, log
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
 
-from dsis.compiled import inlined, kernel
+from dsis.compiled import kernel
 from dsis.effects.effect import Effect, Exposure, Image, Stage
+
+_MOST_KEPT = 0.7  # of a step over a period: more is no converter
+_LEAST_DN = 1e-5  # what is left of a sample is below rounding
 
 
 class AdcMemory(Effect):
     """A conversion carries over some of the residue that the one before left in the converter.
 
-    v'(i) = v(i) + d (frac((v(i - 1) + black - c) / P) - 1/2). Converters of several steps
+    v'(i) = v(i) + d (frac((v'(i - 1) + black - c) / P) - 1/2). Converters of several steps
     (pipeline, sub-ranging) take a coarse decision off the sample and amplify the residue, which
     rises over P codes and falls back by one step at c + n P; capacitors shared between samples, or
     not reset, keep a part of it. d is what the step makes of the next sample of the line, in DN:
@@ -41,7 +45,13 @@ class AdcMemory(Effect):
             "column_variance",
             "correlation_0_1",
             "correlation_1_0",
+            "correlation_0_2",
+            "correlation_2_0",
+            "skewness",
+            "kurtosis",
+            "variance_spread",
             "spectral_peak",
+            "row_spectrum_peak",
         }
     )
     confounders: ClassVar[str] = (
@@ -52,42 +62,40 @@ class AdcMemory(Effect):
     def apply(self, image: Image, exposure: Exposure) -> Image:
         """Add the residue of the sample before."""
         first = np.float32(exposure.read_out.black_level_dn - self.at_code)
-        along_rows, rows = self.along == "rows", len(image)
-        return _with_residues(
-            np.ascontiguousarray(image).reshape(rows, -1),
-            (0, image[0, 0].size) if along_rows else (1, 0),
+        along_rows = self.along == "rows"
+        lines = image if along_rows else image.swapaxes(0, 1)
+        found = np.empty((lines.shape[0], lines.shape[1], image[0, 0].size), image.dtype)
+        _carry(
+            np.ascontiguousarray(lines).reshape(found.shape),
             first,
             np.float32(self.period_codes),
             np.float32(self.step_dn),
-        ).reshape(image.shape)
+            found,
+        )
+        made = found.reshape(lines.shape)
+        return np.ascontiguousarray(made if along_rows else made.swapaxes(0, 1))
 
     def reach_pixels(self) -> int:
         """Return how far away a pixel may matter."""
-        return 1
+        share = min(abs(self.step_dn) / self.period_codes, _MOST_KEPT)
+        if not share:
+            return 1
+        return 1 + ceil(max(log(_LEAST_DN / abs(self.step_dn)) / log(share), 0.0))
 
 
 @kernel
-def _with_residues(
-    image: Image, before: tuple[int, int], first: np.float32, period: np.float32, step: np.float32
-) -> Image:
-    """Return an image (row, sample) with the residue of what is so far `before`: down, right.
-
-    The first has the last before it.
-    """
-    rows, size = image.shape
-    down, right = before
-    out = np.empty_like(image)
-    for y in range(rows):
-        line, own, into = image[y - down], image[y], out[y]
-        _add_residues(line[size - right :], own[:right], first, period, step, into[:right])
-        _add_residues(line[: size - right], own[right:], first, period, step, into[right:])
-    return out
-
-
-@inlined
-def _add_residues(
-    line: Image, own: Image, first: np.float32, period: np.float32, step: np.float32, out: Image
+def _carry(
+    lines: Image, first: np.float32, period: np.float32, step: np.float32, out: Image
 ) -> None:
-    for x in range(out.size):
-        phase = (line[x] + first) / period
-        out[x] = own[x] + (phase - np.floor(phase) - np.float32(0.5)) * step
+    """Add, sample by sample, the residue of the one before as it was converted.
+
+    Lines are (line, sample, plane). The first has the last before it, as that was without memory.
+    """
+    count, size, planes = lines.shape
+    for y in range(count):
+        for p in range(planes):
+            before = lines[y, size - 1, p]
+            for x in range(size):
+                phase = (before + first) / period
+                before = lines[y, x, p] + (phase - np.floor(phase) - np.float32(0.5)) * step
+                out[y, x, p] = before

@@ -94,14 +94,35 @@ def _best(
     return best
 
 
+def explained(samples: Sequence[Samples], period: int, at_code: float, step_dn: float) -> float:
+    """Return by how much a residue of some step lessens chi-squared of what samples have.
+
+    Beyond what goes in proportion to the sample before.
+    """
+    some = tuple(samples)
+    total = 0.0
+    for own, of_place in zip(some, _sums(some, period, (at_code % period,)), strict=True):
+        square, moved, before = of_place[:, 0].tolist()
+        bottom = (square - before**2 / own.square_dn2) / own.variance_dn2
+        total += 2 * step_dn * moved / sqrt(own.variance_dn2) - step_dn**2 * bottom
+    return total
+
+
 @lru_cache(maxsize=64)
 def _sums(
     samples: tuple[Samples, ...], period: int, places: tuple[float, ...]
 ) -> tuple[Array, ...]:
     """Return of each exposure's samples what `_against` does, of residues at some places."""
     phases = (np.arange(FOLDED)[:, np.newaxis] - np.array(places)) / period
-    residues = phases - np.floor(phases) - 0.5
+    # Of a code, whose cell a step may part: the mean over it.
+    residues = (_risen(phases + 0.5 / period) - _risen(phases - 0.5 / period)) * period - 0.5
     return tuple(_against(residues, o.one, o.other, o.moved, o.before) for o in samples)
+
+
+def _risen(phases: Array) -> Array:
+    """Return the integral of what phases have beyond whole ones, from 0 on."""
+    whole = np.floor(phases)
+    return np.asarray((whole + (phases - whole) ** 2) / 2)
 
 
 def profile(samples: Sequence[Samples], period: int, parts: int) -> tuple[Array, Array]:

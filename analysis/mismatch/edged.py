@@ -51,7 +51,7 @@ def single(state: State, effect: Effect) -> Denial | None:
 
     One line that differs, at the edge, is no decay, however short. Where a smooth surface or a step
     between halves is left unexplained, which lean towards the edges too, only what no such surface
-    has speaks for a decay.
+    has speaks for a decay; beside a step, which may be all there is, it must be seen.
     """
     if not isinstance(effect, LineSettling):
         return None
@@ -62,7 +62,8 @@ def single(state: State, effect: Effect) -> Denial | None:
         why = "surfaces or halves are left, and beside them nothing is seen of the decay"
     elif all(own.kind != "shading" for own in state.camera.effect):
         rests.append(centred)  # of few lines the smooth part of a decay is most of it
-    shares = [_shown(state, effect, rest) for rest in rests]
+    step = any(m.statistic == "half_seam" for m in state.mismatches)
+    shares = [_shown(state, effect, rest, seen=step) for rest in rests]
     if any(share is None for share in shares):
         return None
     return Denial(max(share for share in shares if share is not None), why)
@@ -144,8 +145,11 @@ def _beyond_halves(values: Array) -> Array:
     return np.asarray(rest - steps @ np.linalg.lstsq(steps, rest, rcond=None)[0])
 
 
-def _shown(state: State, effect: LineSettling, rest: Rest) -> float | None:
-    """Return the share of a decay that lines beyond the first show; None: enough of it."""
+def _shown(state: State, effect: LineSettling, rest: Rest, *, seen: bool) -> float | None:
+    """Return the share of a decay that lines beyond the first show; None: enough of it.
+
+    It may be as much as errors allow, unless it must be `seen`.
+    """
     layout, images = state.setting.layout, state.setting.seen.images
     axis = int(effect.edge in ("left", "right"))
     top = bottom = 0.0
@@ -164,6 +168,8 @@ def _shown(state: State, effect: LineSettling, rest: Rest) -> float | None:
         square = line_square_beside(means, shape, noise, image.shape[1 - axis])
         top += amplitude * scale * float(shape @ means) / square
         bottom += (amplitude * scale) ** 2 * float(shape @ shape) / square
+    if seen and top <= _SURE * bottom**0.5:
+        return max(top / bottom, 0.0) if bottom > 0 else 0.0
     if bottom > 0 and (top + _SURE * bottom**0.5) / bottom >= _MOST and bottom > _SEEN**2:
         return None
     return max(top / bottom, 0.0) if bottom > 0 else 0.0

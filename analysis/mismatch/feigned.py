@@ -16,6 +16,7 @@ from analysis.mismatch.contradicted import Denial, rival
 from analysis.mismatch.displaced import displaced
 from analysis.mismatch.edged import STATISTIC, edged, single
 from analysis.mismatch.feignedtails import coded, lopsided, placed
+from analysis.mismatch.fewfixed import of_few_that_stand_out
 from analysis.mismatch.flatcolumns import flat_columns
 from analysis.mismatch.grown import grown
 from analysis.mismatch.halves import halved
@@ -65,6 +66,7 @@ def of_another(state: State, effect: Effect, without: Array) -> Denial | None:
     return (
         feigned(state, kind, without)
         or outlying(state, kind)
+        or of_few_that_stand_out(state, effect)
         or side_by_side(state, kind)
         or in_patches(state, kind)
         or coloured(state, kind)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from analysis.mismatch import find_mismatch
 from analysis.mismatch.candidates import CANDIDATES
 from dsis.effects.nonlinearity import Nonlinearity
-from mismatch_recordings import InMemory, camera, responding, state_of
+from mismatch_recordings import InMemory, camera, recorded, responding, state_of
 
 Array = NDArray[np.float64]
 LEVELS = (150.0, 600.0, 1200.0, 1900.0, 2600.0, 3300.0)
@@ -66,6 +66,18 @@ def test_a_bend_of_another_law_starts_near_what_made_it(law: str) -> None:
     true = _beside_scale(bent(q), q)
     left = _beside_scale(_bend(other[0], q) - bent(q), q)
     assert np.abs(left).max() < 0.3 * np.abs(true).max()
+
+
+@pytest.mark.parametrize("percent", [0.6, -0.6])
+def test_variances_say_how_much_a_response_bends_where_light_is_unknown(percent: float) -> None:
+    """Of a parabola: its derivative widens noise, or narrows it."""
+    true = Nonlinearity(percent_full_scale=percent)
+    bare = camera(segments=((SLOPE, READ, None),))
+    made = recorded(bare.model_copy(update={"effect": (true,)}), 6, levels=LEVELS, lit=False)
+    state = state_of(made, bare)
+    (start,) = (one.effect for one in CANDIDATES["nonlinearity"].propose(state.clues()))
+    assert isinstance(start, Nonlinearity)
+    assert start.percent_full_scale == pytest.approx(percent, rel=0.4)
 
 
 @pytest.mark.parametrize("law", ["gamma"])

@@ -82,3 +82,16 @@ def test_of_twins_the_one_of_many_lags_is_not_behind(
 ) -> None:
     best = _ranked("spatial_filtering", 37.0, MEMORY)
     assert ties.ties(_state(), best, _ranked(kind, 31.0, MEMORY, best_of)) is tied
+
+
+def test_what_may_be_one_of_two_that_tie_is_no_third() -> None:
+    """Tails or noise that differs from pixel to pixel; pixels that jump explain less of the same."""
+    mean = (4.0, 0.0)
+    pair = (
+        _ranked("heavy_tailed_read_noise", 61.0, mean),
+        _ranked("read_noise_spread", 59.0, mean),
+    )
+    assert ties.akin([pair]) == {"rts", "heavy_tailed_read_noise", "read_noise_spread"}
+    filters = (_ranked("readout_memory", 37.0, mean), _ranked("spatial_filtering", 36.0, mean))
+    assert "crosstalk" in ties.akin([filters])
+    assert ties.akin([]) == frozenset()

@@ -36,7 +36,7 @@ from analysis.mismatch.resolved import calls_alone, differ, explains, gained, op
 from analysis.mismatch.rowtold import AS_WELL, as_shown, unlike_frames
 from analysis.mismatch.segments import Path, second_path, spiky
 from analysis.mismatch.state import State
-from analysis.mismatch.ties import bends_as_well, by_numbers, plainest, ties, twin
+from analysis.mismatch.ties import akin, bends_as_well, by_numbers, plainest, ties, twin
 from dsis.camera import Camera
 from dsis.effects import Effect
 
@@ -283,7 +283,7 @@ class Search(Fitted):
         while True:
             apart = [*self.apart, *(one.mean for pair in self.ties for one in pair)]
             settled = tuple(self.settled)
-            left = self._left() - self.doubted.keys()
+            left = self._left() - self.doubted.keys() - akin(self.ties)
             fitted = ranked(
                 state, left, self.memory, self.step, settled, apart, self._possible, self._shown
             )

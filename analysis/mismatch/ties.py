@@ -93,6 +93,16 @@ def twin(
     )
 
 
+def akin(pairs: Sequence[tuple[Ranked, Ranked | Path]]) -> frozenset[str]:
+    """Return kinds that may be what one of a pair is, of pairs that tie: none is claimed alone.
+
+    Of tails and of noise that differs from pixel to pixel neither is told; then pixels that jump,
+    which explain less of the same, are no third.
+    """
+    kinds = {one.kind for pair in pairs for one in pair}
+    return frozenset(kind for kind, own in _TWINS.items() if kinds.intersection(own))
+
+
 def by_numbers(
     state: State, users: BaseNoise, fitted: Sequence[Ranked], rival: Ranked | Path
 ) -> list[Ranked] | None:

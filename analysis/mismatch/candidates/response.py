@@ -43,7 +43,7 @@ def _nonlinearity(clues: Clues) -> Sequence[Proposal]:
     """Solve level residual = c u (1 - u^k) / k beside the light's scale, u = S / (0.85 F).
 
     Once with k = 1 and, where levels are enough, once with the k that fits best. Where light is
-    unknown only variances bend: it is tried both ways.
+    unknown only variances bend: they say how much, or it is tried both ways.
     """
     end = 0.85 * (clues.layout.white_dn - clues.layout.black_dn)
     rows = [
@@ -53,7 +53,8 @@ def _nonlinearity(clues: Clues) -> Sequence[Proposal]:
     ]
     signals = len({round(s, 1) for s, _, _ in rows})
     if signals < _LEAST_LEVELS:
-        return _bends(_UNTOLD_PERCENT) + _bends(-_UNTOLD_PERCENT)
+        told = _by_variances(clues, end)
+        return _bends(told) if told else _bends(_UNTOLD_PERCENT) + _bends(-_UNTOLD_PERCENT)
     u, value, sd = np.array(rows).T
     u, value = u / end, value / sd
     fits = []
@@ -70,6 +71,33 @@ def _nonlinearity(clues: Clues) -> Sequence[Proposal]:
     names = ["percent_full_scale", "exponent"]
     start = dict(zip(names, (float(np.clip(percent, -12, 12)), exponent), strict=True))
     return parabola + proposals("nonlinearity", names, names, **start)
+
+
+def _by_variances(clues: Clues, end: float) -> float:
+    """Return the bend by which variances depart from their line, per cent; 0: they do not say.
+
+    Of shot noise m Q and a response Q + c b(Q) the signal S has a variance that is larger by
+    c m (2 S b'(S) - b(S)), beside a line of its own.
+    """
+    rows = [
+        (clues.signal(place), value, sd)
+        for place, (value, sd) in clues.excess("pixel_variance").items()
+        if np.isfinite(sd)
+    ]
+    if len({round(s, 1) for s, _, _ in rows}) <= _LEAST_LEVELS:
+        return 0.0
+    signal, value, sd = np.array(rows).T
+    unit = end / 85 / bend_peak(1.0)
+    u, step = signal / end, 1e-3
+    bend = unit * bend_shape(u, 1.0)
+    slope = unit * (bend_shape(u + step, 1.0) - bend_shape(u - step, 1.0)) / (2 * step * end)
+    variance = np.asarray(clues.fit.line_dn2(signal))
+    dark, one = (float(v) for v in clues.fit.line_dn2(np.array([0.0, 1.0])))
+    shape = (one - dark) * (2 * signal * slope - bend)
+    design = np.stack([shape, signal, np.ones_like(signal)], 1) / (variance * sd)[:, np.newaxis]
+    percent = float(np.linalg.lstsq(design, value / sd, rcond=None)[0][0])
+    error = float(np.linalg.pinv(design.T @ design)[0, 0]) ** 0.5
+    return float(np.clip(percent, -12, 12)) if abs(percent) > 2 * error > 0 else 0.0
 
 
 def _bends(percent: float) -> list[Proposal]:

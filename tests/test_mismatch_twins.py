@@ -85,7 +85,7 @@ def test_of_twins_the_one_of_many_lags_is_not_behind(
 
 
 def test_what_may_be_one_of_two_that_tie_is_no_third() -> None:
-    """Tails or noise that differs from pixel to pixel; pixels that jump explain less of the same."""
+    """Tails, or noise that differs from pixel to pixel; jumps explain less of the same."""
     mean = (4.0, 0.0)
     pair = (
         _ranked("heavy_tailed_read_noise", 61.0, mean),

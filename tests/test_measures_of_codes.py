@@ -135,3 +135,12 @@ class TestLimits:
             Accumulator(3, 8, Cfa.RGGB)
         with pytest.raises(ValueError, match="measure_channels"):
             measure(np.zeros((2, 8, 8), np.float32), Cfa.RGGB)
+
+
+def test_spikes_beside_one_code_tell_no_step() -> None:
+    """A converter of steps of 8 whose noise has two codes, of which the lower may be clipped."""
+    counts = np.zeros(800, np.int64)
+    counts[[0, 8, 248, 760]] = [12_000, 6_500, 1, 1]
+    assert np.isnan(Codes.of(112, counts).spacing().value)
+    counts[[16, 24]] = [900, 3]
+    assert Codes.of(112, counts).spacing().value == 8

@@ -199,10 +199,15 @@ class Codes:
         """Return the greatest common step of the codes that occur, DN.
 
         Exact; its error is the chance that all codes seen lie on twice the true step. The ends may
-        be clipped off the lattice and are left out where something lies between them.
+        be clipped off the lattice and are left out where something lies between them. Unknown where
+        no two codes of several samples lie one step apart: few spikes, beside one code that all
+        others have, lie on a coarser lattice by chance.
         """
         used, step = self._shown.used, self._shown.step
         if used < 2:
+            return unknown(1.0)
+        seen = self.counts[self._shown.first :: step] > 1
+        if step > 1 and not (seen[1:] & seen[:-1]).any():
             return unknown(1.0)
         chance = (step * 2.0 ** (-min(used, 80) / 2)) ** 2
         return estimate(step, chance, 1.0, chance)

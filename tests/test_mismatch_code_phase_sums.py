@@ -71,6 +71,17 @@ def test_narrow_noise_and_clipped_codes_say_nothing() -> None:
         assert sums.peak() is None
 
 
+def test_a_full_well_where_many_codes_are_one_says_nothing() -> None:
+    """A quarter of all samples lie within three codes: no converter did that."""
+    rng = np.random.default_rng(2)
+    own, sums = Accumulator(96, 128, white_level=4095.0), CodePhases()
+    for _ in range(8):
+        charge = np.minimum(2600 + 40 * rng.standard_normal((96, 128)), 2627.0)
+        own.add(np.rint(charge + 0.9 * rng.standard_normal(charge.shape)).astype("u2"))
+    sums.add(own.result().channels)
+    assert np.isnan(sums.number()[0])
+
+
 def test_what_codes_gain_is_that_of_uneven_widths_alone() -> None:
     def seen(score: float) -> Any:
         pooled = {"": {LABEL: (score, 1.0)}, "MONO": {}}

@@ -7,15 +7,19 @@ from math import log
 from analysis.mismatch.basenumbers import preferred
 from analysis.mismatch.instance import frequency_of, same_line
 from analysis.mismatch.memory import Memory
-from analysis.mismatch.rank import TOLD_APART, Ranked, alike, ranked
+from analysis.mismatch.rank import SURE_GAIN, TOLD_APART, Ranked, alike, ranked
 from analysis.mismatch.segments import Path
 from analysis.mismatch.smooth import smooth_as_well
 from analysis.mismatch.state import State
 from dsis.camera import BaseNoise
 
-# That greens differ is seen; what amplifiers of even and odd rows make of red and blue is not.
-# Memory of a sample is that of a residue whose steps lie beyond the noise.
-_SAYS_LESS = {"channel_imbalance": "tap_mismatch", "readout_memory": "adc_memory"}
+# That greens differ is seen; what amplifiers of even and odd rows make of red and blue is not, nor
+# what charge that leaks makes of neighbours. Memory of a sample is that of a residue whose steps
+# lie beyond the noise.
+_SAYS_LESS = {
+    "channel_imbalance": ("tap_mismatch", "crosstalk"),
+    "readout_memory": ("adc_memory",),
+}
 _BY_CODES = "quantisation"
 _KEEPS_VARIANCE = ("spatial_filtering", {"spatial_filtering", "readout_memory"})
 _TWINS = {
@@ -35,11 +39,20 @@ def plainest(state: State, fitted: Sequence[Ranked]) -> list[Ranked]:
     In a mosaic whose light is of unknown colour amplifiers of even and odd rows show in nothing
     but the greens: that the greens differ holds whatever the cause; it is its alternative.
     """
-    said = next((one for one in fitted[1:] if _SAYS_LESS.get(one.kind) == fitted[0].kind), None)
-    if said is None or not ties(state, fitted[0], said):
+    said = next((o for o in fitted[1:] if fitted[0].kind in _SAYS_LESS.get(o.kind, ())), None)
+    if said is None or not (ties(state, fitted[0], said) or _of_greens(state, fitted[0], said)):
         return list(fitted)
     first = replace(said, gain=fitted[0].gain)
     return [first, *(one for one in fitted if one is not said)]
+
+
+def _of_greens(state: State, best: Ranked, said: Ranked) -> bool:
+    """Return whether charge that leaks explains the same as greens that differ, and little more.
+
+    Neighbours that are alike would say so: without them the light's colours fit by chance.
+    """
+    near = said.gain > best.gain - SURE_GAIN
+    return near and best.kind == "crosstalk" and alike(state, best.mean, said.mean)
 
 
 def ties(state: State, best: Ranked, other: Ranked) -> bool:
@@ -56,7 +69,7 @@ def ties(state: State, best: Ranked, other: Ranked) -> bool:
         gains = _unpriced(best), _unpriced(other)
     near = gains[1] > gains[0] - TOLD_APART and other.kind != best.kind
     near |= smooth_as_well(state, best.mean, best.kind, other.kind)
-    if not near or _SAYS_LESS.get(best.kind) == other.kind or _other_line(state, best, other):
+    if not near or other.kind in _SAYS_LESS.get(best.kind, ()) or _other_line(state, best, other):
         return False
     return alike(state, best.polished.mean, other.polished.mean)
 

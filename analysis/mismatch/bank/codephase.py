@@ -23,6 +23,7 @@ LABEL, DETAIL, KIND = "code_imbalance of powers of two", "powers of two", "codes
 _PERIOD = 64  # codes
 _LEAK = 11.0  # minus the logarithm of the density that is left: of 1e6 samples, a tenth of chance
 _LEAST = 1e4  # samples
+_PILED = 5.0  # standard errors by which noise leans to lower codes
 
 
 class CodePhases:
@@ -41,12 +42,18 @@ class CodePhases:
         self.samples = np.zeros(_PERIOD // 2)
 
     def add(self, channels: Mapping[str, Channel]) -> None:
-        """Take one exposure; not a channel whose codes are clipped, or coarse."""
+        """Take one exposure; not a channel whose codes are clipped, or coarse, or pile up.
+
+        At a full well noise is narrower than it is elsewhere, and leans to lower codes.
+        """
         cycles = np.arange(1, _PERIOD // 2 + 1) / _PERIOD
         for channel in channels.values():
             codes, variance = channel.codes, channel.estimates["pixel_variance"].value
             cut = channel.clipped_low + channel.clipped_high
             if codes is None or cut != 0 or codes.lattice is None or codes.lattice.step != 1:
+                continue
+            leaning = channel.estimates["skewness"]
+            if leaning.departure < -_PILED:
                 continue
             covered = 2 * pi**2 * variance * cycles**2 >= _LEAK
             folded = np.bincount(

@@ -37,8 +37,8 @@ LEVELS_DN = (0.0, 400.0, 5000.0)
 STRONG: dict[str, tuple[dict[str, object], ...]] = {
     "adc_dnl": ({"rms_lsb": 2.0},),
     "adc_memory": (
-        {"step_dn": 80.0, "period_codes": 512},
-        {"step_dn": 80.0, "period_codes": 512, "along": "columns"},
+        {"step_dn": 30.0, "period_codes": 512},
+        {"step_dn": 30.0, "period_codes": 512, "along": "columns"},
     ),
     "amp_glow": ({"dn_per_s": 2e4}, {"dn_per_s": 1e5, "place": "top", "extent": 0.05}),
     "bistable_pattern": ({"amplitude_dn": 30.0}, {"amplitude_dn": 30.0, "frequency": (0, 0.5)}),

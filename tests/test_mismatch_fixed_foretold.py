@@ -109,9 +109,9 @@ def test_what_is_there_gains_and_what_is_not_loses(deviation: Array) -> None:
 
 
 def test_gains_that_the_brightest_flat_shows_best_are_foretold() -> None:
-    """Of 7 standard errors, 3 of 4: what its own gain explains as well is asked for odds of 20."""
+    """Of 11 standard errors, 4 of 5: what its own gain explains as well is asked for odds of 20."""
     signal, noise = np.array([0.0, 3500.0, 10_000.0]), (0.05, 0.22, 0.55)
-    deviation = 2e-5 * signal
+    deviation = 2.5e-5 * signal
     found = []
     for seed in range(50):
         rng = np.random.default_rng([seed, 3])
@@ -123,8 +123,8 @@ def test_gains_that_the_brightest_flat_shows_best_are_foretold() -> None:
         odds = odds_of_lines(whole, some, signal, deviation, (0.0, 0.0))
         found.append((odds.all.sum(), odds.own.sum()))
     everything, alone = np.array(found).T
-    assert ((everything > SURE_GAIN + 1) & (alone >= TOLD_APART)).sum() >= 36
-    assert (alone > SURE_GAIN + 1).sum() <= 30  # asked of that alone
+    assert ((everything > SURE_GAIN + 1) & (alone >= TOLD_APART)).sum() >= 40
+    assert (alone > SURE_GAIN + 1).sum() <= 20  # asked of that alone
 
 
 def test_where_no_frame_is_locked_nothing_is_told() -> None:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from analysis.mismatch.bank.key import Key
 from analysis.mismatch.candidates import CANDIDATES
 from analysis.mismatch.candidates.response import soft_moments
 from analysis.mismatch.memory import Memory
@@ -60,7 +61,11 @@ def test_a_limit_that_is_not_soft_is_written_as_ever() -> None:
 
 def test_a_soft_limit_is_not_remembered_as_a_hard_one_nor_a_kink_as_a_step() -> None:
     null = SimpleNamespace(mean=np.zeros(1), sd=np.ones(1), known=np.ones(1, bool))
-    state: Any = SimpleNamespace(null=null, camera=camera(segments=((SLOPE, READ, None),)))
+    state: Any = SimpleNamespace(
+        null=null,
+        camera=camera(segments=((SLOPE, READ, None),)),
+        vector=SimpleNamespace(keys=(Key("skewness", "exposure", "flat", "MONO"),)),
+    )
     memory = Memory()
     memory.keep(Saturation(full_well_dn=FULL), state, np.ones(1))
     memory.keep(DualGainMismatch(gain_error_percent=1.0), state, np.ones(1))
@@ -69,3 +74,8 @@ def test_a_soft_limit_is_not_remembered_as_a_hard_one_nor_a_kink_as_a_step() -> 
     assert memory.recalled(Saturation(full_well_dn=FULL + 20), state) is None  # half a deviation
     assert memory.recalled(DualGainMismatch(gain_error_percent=1.01), state) is not None
     assert memory.recalled(DualGainMismatch(gain_error_percent=1.0, mean="kinks"), state) is None
+    # Most numbers are in units of pixel noise: what was seen beside other noise is forgotten.
+    state.vector.keys = (Key("pixel_variance", "exposure", "flat", "MONO"),)
+    assert memory.recalled(Saturation(full_well_dn=FULL + 1), state) is not None
+    state.null.mean = np.full(1, 0.06)
+    assert memory.recalled(Saturation(full_well_dn=FULL + 1), state) is None

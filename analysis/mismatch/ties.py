@@ -27,6 +27,7 @@ _TWINS = {
     "readout_memory": ("crosstalk", "spatial_filtering"),
     "spatial_filtering": ("readout_memory",),
     "crosstalk": ("spatial_filtering",),
+    "adc_memory": ("readout_memory", "spatial_filtering"),
     "heavy_tailed_read_noise": ("read_noise_spread",),
     "read_noise_spread": ("heavy_tailed_read_noise",),
     "rts": ("read_noise_spread", "heavy_tailed_read_noise"),

@@ -51,7 +51,6 @@ class AdcMemory(Effect):
             "kurtosis",
             "variance_spread",
             "spectral_peak",
-            "row_spectrum_peak",
         }
     )
     confounders: ClassVar[str] = (

@@ -10,6 +10,7 @@ from dsis.compiled import kernel
 from dsis.effects.effect import Effect, Exposure, Image, Stage
 
 _MOST_KEPT = 0.7  # of a step over a period: more is no converter
+_AT_ONCE = 16  # lines
 _LEAST_DN = 1e-5  # what is left of a sample is below rounding
 
 
@@ -91,10 +92,16 @@ def _carry(
     Lines are (line, sample, plane). The first has the last before it, as that was without memory.
     """
     count, size, planes = lines.shape
-    for y in range(count):
+    before = np.empty(_AT_ONCE, lines.dtype)
+    for start in range(0, count, _AT_ONCE):
+        some = min(_AT_ONCE, count - start)
         for p in range(planes):
-            before = lines[y, size - 1, p]
+            for k in range(some):
+                before[k] = lines[start + k, size - 1, p]
             for x in range(size):
-                phase = (before + first) / period
-                before = lines[y, x, p] + (phase - np.floor(phase) - np.float32(0.5)) * step
-                out[y, x, p] = before
+                for k in range(some):  # each waits for its own last sample, not for the others'
+                    phase = (before[k] + first) / period
+                    before[k] = (
+                        lines[start + k, x, p] + (phase - np.floor(phase) - np.float32(0.5)) * step
+                    )
+                    out[start + k, x, p] = before[k]

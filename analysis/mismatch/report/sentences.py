@@ -114,7 +114,7 @@ def parameters(effect: OmittedEffect) -> str:
 
     A term of size 0 that was not fitted is no part of it.
     """
-    words = (f"{name} {value.replace('_', ' ')}" for name, value in effect.choices.items())
+    words = (f"{name} {value}".replace("_", " ") for name, value in effect.choices.items())
     terms = {
         name: p for name, p in effect.parameters.items() if p.standard_error or np.any(p.value)
     }

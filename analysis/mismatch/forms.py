@@ -12,7 +12,7 @@ from dsis.effects.readout_memory import ReadoutMemory
 from dsis.effects.rts import Rts
 
 _MOST = 0.5  # of the signal; of the noise, less: beyond it there is no other form
-_LEVELS = ("above", "either")
+OTHER_LEVELS = ("above", "either")
 
 
 def in_form(state: State, users: Camera, fitted: Sequence[Ranked]) -> list[Ranked]:
@@ -86,7 +86,7 @@ def _jumping(state: State, users: Camera, ranked: Ranked) -> Ranked:
     predictor = state.predictor(replicates_for(state.setting, [effect]))
     before = predictor.gain(predictor.mean(_camera(state, ranked)))
     found: list[tuple[float, Ranked]] = []
-    for levels in _LEVELS:
+    for levels in OTHER_LEVELS:
         effects = (effect.model_copy(update={"levels": levels}), *others)
         one = replace(ranked, polished=replace(ranked.polished, effects=effects))
         mean = predictor.mean(_camera(state, one))

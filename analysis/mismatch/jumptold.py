@@ -53,7 +53,8 @@ def unlike_pixels(
 
     They do where they are sure of another, which was not fitted or has no word: of the other of
     both, or, of hot pixels and of tails, that pixels jump. These explain some of the numbers: jumps
-    as frames tell them, fitted to no number, must explain more, with what frames gain by them.
+    as frames tell them, fitted to no number, must explain more of the same numbers, with what
+    frames gain by them.
     Beside that other, which the camera has, it is no rival; but pixels do not jump either where
     frames are sure that they do not.
 
@@ -82,7 +83,10 @@ def unlike_pixels(
     odds = frames.spread_rather(SURE_GAIN)
     against = odds if other == "read_noise_spread" else -odds
     if against > 0 and best.kind not in _OTHER and frames.jumps is not None:
-        against += explained(frames.jumps) - best.gain
+        # Single pixels of maps, which say more of hot ones, were not asked about jumps.
+        of_maps = best.proposal.of_pixels is not None
+        own = explained(best.polished.effects[0]) if of_maps else best.gain
+        against += explained(frames.jumps) - own
     if against <= TOLD_APART:
         return None
     return rival(against, f"frames of single pixels rather show {_WORDS[other]}")

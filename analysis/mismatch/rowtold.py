@@ -6,6 +6,7 @@ from functools import partial
 from math import isfinite
 
 from analysis.mismatch.contradicted import Denial, rival
+from analysis.mismatch.forms import OTHER_LEVELS
 from analysis.mismatch.jumptold import PIXELS, as_pixels_show, unlike_pixels
 from analysis.mismatch.mapped import as_maps_show
 from analysis.mismatch.nofield import no_field
@@ -16,6 +17,7 @@ from analysis.mismatch.rank import LEAST_GAIN, TOLD_APART, Ranked, alike, replic
 from analysis.mismatch.state import State
 from dsis.effects import Effect
 from dsis.effects.pink_noise import PinkNoise
+from dsis.effects.rts import Rts
 
 _OTHER = {"pink_noise": "row_banding", "row_banding": "pink_noise"}
 AS_WELL = "whole frames may as well show"
@@ -70,13 +72,18 @@ def unlike_frames(
 
 
 def _explained(state: State, effect: Effect) -> float:
-    """Return what a state's numbers gain by an effect as it is, nats."""
-    camera = with_effects(state.camera, [effect])
-    if camera is None:
-        return 0.0
+    """Return what a state's numbers gain by an effect as it is, nats.
+
+    By pixels that jump, in the form that explains most.
+    """
+    levels = ("about", *OTHER_LEVELS) if isinstance(effect, Rts) else ()
+    forms = [effect.model_copy(update={"levels": own}) for own in levels] or [effect]
     predictor = state.predictor(replicates_for(state.setting, [effect]))
-    gain = predictor.loglik(predictor.mean(camera)) - predictor.loglik(state.null.mean)
-    return gain if isfinite(gain) else 0.0
+    cameras = [one for own in forms if (one := with_effects(state.camera, [own])) is not None]
+    predictor.ready(cameras)
+    before = predictor.loglik(state.null.mean)
+    gains = [predictor.loglik(predictor.mean(camera)) - before for camera in cameras]
+    return max((gain for gain in gains if isfinite(gain)), default=0.0)
 
 
 def _odds(state: State, frames: WholeFrames | None, best: Ranked) -> float | None:

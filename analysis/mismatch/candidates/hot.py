@@ -65,7 +65,7 @@ def _noisy(clues: Clues, channel: str, rate: Array) -> Mask:
     total, _ = clues.image("variance")[channel]
     per_s = np.maximum(rate - np.median(rate), 0.0)
     dark, lit = clues.fit.line_dn2(np.array([0.0, 1.0]))
-    expected, most = np.zeros(rate.shape), np.zeros(rate.shape)
+    expected, scatter, white = np.zeros(rate.shape), np.zeros(rate.shape), 0.0
     for exposure in clues.layout.uniform:
         frames = len(exposure.numbers)
         if frames <= _SEEN or (exposure.name, channel) in clues.layout.still:
@@ -73,10 +73,12 @@ def _noisy(clues: Clues, channel: str, rate: Array) -> Mask:
         variance = clues.layout.variance_dn2[exposure.name, channel]
         share = max(float(lit - dark), 0.0) * per_s * exposure.exposure_time_s / variance
         expected += (frames - 1) / variance * share
-        most = np.maximum(most, share)
+        # A chi-squared variate scatters by as much as its mean.
+        scatter += (frames - 1) / variance**2 * (1 + share) ** 2
+        white += (frames - 1) / variance**2
     excess = total - expected
     sd = float(median_abs_deviation(excess, axis=None, scale="normal"))  # spikes make none of it
-    return np.asarray(excess > _CLEAR * sd * (1 + most))
+    return np.asarray(excess > _CLEAR * sd * np.sqrt(scatter / white if white > 0 else 1.0))
 
 
 CANDIDATES = (

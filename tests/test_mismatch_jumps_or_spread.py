@@ -1,6 +1,7 @@
 """Where numbers tie pixels that jump with a read noise that spreads, frames say which it is."""
 
 from types import SimpleNamespace as Stub
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -23,8 +24,9 @@ def _nothing(effect: Effect) -> float:
 
 
 def _ranked(**gains: float) -> list[Ranked]:
-    nothing: Any = None
-    return [Ranked(gain, kind, nothing, nothing) for kind, gain in gains.items()]
+    start: Any = Stub(of_pixels=None)
+    fitted: Any = Stub(effects=("as fitted",))
+    return [Ranked(gain, kind, start, fitted) for kind, gain in gains.items()]
 
 
 def _frames(jumping: float, spread: float) -> WholeFrames:
@@ -106,6 +108,23 @@ def test_what_jumps_explain_of_the_numbers_counts(best: str) -> None:
         assert (denial is not None) == denied
     jumps = Rts(pixel_fraction=0.01, amplitude_dn=8.0, switch_probability=0.2)
     assert asked == [jumps, jumps]  # as frames tell them
+
+
+def test_pixels_of_a_map_are_no_numbers_that_jumps_were_asked_about() -> None:
+    """One pixel far out of a map gains 3000 nats by hot ones: counts of such pixels say what both do."""
+    (hot,) = _ranked(hot_pixels=3000.0)
+    bare: Any = Stub(effect=())
+    start: Any = Stub(of_pixels=2990.0)
+    hot = replace(hot, proposal=start)
+    for own, denied in ((40.0, True), (140.0, False)):
+        denial = unlike_pixels(
+            bare,
+            _frames(15.0, -9.0),
+            hot,
+            [],
+            lambda one, m=own: m if isinstance(one, str) else 100.0,
+        )
+        assert (denial is not None) == denied
 
 
 def test_pixels_deny_nothing_beside_the_other() -> None:

@@ -1,11 +1,13 @@
 """Charge that neighbours share and a second read-out path mask each other in the variances."""
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 
 from analysis.mismatch.contradicted import refuted
 from analysis.mismatch.masked import with_path
 from analysis.mismatch.polish import Polished
+from analysis.mismatch.segments import second_path
 from dsis.effects.brighter_fatter import BrighterFatter
 from mismatch_recordings import Array, InMemory, camera, recorded, state_of
 
@@ -35,8 +37,13 @@ def _grains(rng: np.random.Generator, level: float, share: float) -> Array:
     return np.sqrt(share * SLOPE) * level * field
 
 
-def _recording(seed: int, *, share: float, path_dn2: float, grains: float = 0.0) -> InMemory:
-    """Return numpy's own noise: shots, charge that is shared, noise of one path or of two."""
+def _recording(
+    seed: int, *, share: float, path_dn2: float, grains: float = 0.0, speckle: float = 0.0
+) -> InMemory:
+    """Return numpy's own noise: shots, charge that is shared, noise of one path or of two.
+
+    `speckle` is the standard deviation of light from pixel to pixel and frame to frame.
+    """
     rng = np.random.default_rng(seed)
     made = recorded(camera(), seed, rows=SIZE, columns=SIZE, frames=FRAMES, levels=LEVELS)
     stacks: dict[str, NDArray[np.uint16]] = {}
@@ -46,12 +53,26 @@ def _recording(seed: int, *, share: float, path_dn2: float, grains: float = 0.0)
         *((f"flat-{i}", own) for i, own in enumerate(LEVELS)),
     ]:
         shape = (FRAMES, SIZE, SIZE)
-        charge = level + np.sqrt(SLOPE * level) * rng.standard_normal(shape)
+        light = level * (1 + speckle * rng.standard_normal(shape))
+        charge = light + np.sqrt(SLOPE * level) * rng.standard_normal(shape)
         charge = _shared(charge, share) + _grains(rng, level, grains)
         read = READ + (path_dn2 if level > SWITCH else 0.0)
         noisy = BLACK + charge + np.sqrt(read) * rng.standard_normal(shape)
         stacks[name] = np.clip(np.rint(noisy), 0, 4095).astype(np.uint16)
     return InMemory(made.sensor, made.exposures, SIZE, SIZE, made.folder, stacks)
+
+
+def _path(recording: InMemory) -> bool:
+    """Return whether a second path is told beside nothing else."""
+    return second_path(state_of(recording, camera(segments=((SLOPE, READ, None),)))) is not None
+
+
+@pytest.mark.parametrize(("path_dn2", "speckle"), [(PATH, 0.0), (0.0, 0.01)])
+def test_noise_that_grows_with_the_square_of_the_signal_has_no_switch(
+    path_dn2: float, speckle: float
+) -> None:
+    """Two lines follow any bend; a square beside one has no gap, and one number fewer to fit."""
+    assert _path(_recording(6, share=0.0, path_dn2=path_dn2, speckle=speckle)) == (speckle == 0)
 
 
 def _asked(recording: InMemory) -> tuple[bool, bool, bool]:

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from math import log, nan, sqrt
+from math import inf, log, nan, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,7 @@ _SHAPES = frozenset({"skewness", "kurtosis", "kurtosis_within_pixels"})
 _OFF, _CLEAR = 4.0, 10.0  # standard errors of a variance that departs, and of a shape
 _SPIKY = 10.0  # standard errors from which tails bend the variances
 _TAILS = frozenset({"kurtosis", "kurtosis_within_pixels", "one_off_outliers"})
+_ROUNDS = 4  # of weights of a fit
 _PENALTY = 4.0  # two numbers, and the choice among the gaps
 
 
@@ -45,8 +46,9 @@ def second_path(state: State, beside: Array | None = None) -> Path | None:
     """Return the second segment that explains the variances best; None where levels are too few.
 
     Its switch lies anywhere in a gap between levels, and in other gaps as likely as those explain
-    the variances: its error is the root mean square distance. `beside` are the numbers predicted
-    with an effect that is there as well; None: none is.
+    the variances: its error is the root mean square distance. None as well where noise that grows
+    with the signal - a square beside a line, which has no gap - explains them better. `beside` are
+    the numbers predicted with an effect that is there as well; None: none is.
     """
     mean = state.null.mean if beside is None else beside
     calibrated, layout = state.calibrated, state.setting.layout
@@ -66,6 +68,8 @@ def second_path(state: State, beside: Array | None = None) -> Path | None:
     if not paths:
         return None
     best = max(paths, key=lambda path: path.gain)
+    if _squared(state, mean) > best.gain:
+        return None
     chances = np.exp([path.gain - best.gain for path in paths])
     squares = [path.error_dn**2 + (path.switch_dn - best.switch_dn) ** 2 for path in paths]
     return replace(best, error_dn=sqrt(float(np.average(squares, weights=chances))))
@@ -146,6 +150,28 @@ def _path(state: State, low: float, high: float, beside: Array) -> Path | None:
         if key.statistic == "pixel_variance" and key.scope == SCENE and state.null.known[i]:
             mean[i] += _grown(layout, key.place, calibrated.residual, fit)
     return Path(camera, switch, error, gain, mean)
+
+
+def _squared(state: State, beside: Array) -> float:
+    """Return what a term that goes with the square of the signal gains, less its number, nats."""
+    fit, seen = state.calibrated.fit, state.setting.seen
+    which = [i for i in _variances(state) if np.isfinite(beside[i])]
+    places = [state.vector.keys[i].place for i in which]
+    if any(place not in fit.signal_dn for place in places):
+        return -inf
+    sd, added = state.null.sd[which], np.exp(beside[which] - state.null.mean[which])
+    variance = np.array([seen.levels[place].variance_dn2 for place in places]) / added
+    signal = np.array([fit.signal_dn[place] for place in places])
+    design = np.stack([np.ones_like(signal), signal, signal**2], 1)
+    expected = variance
+    for _ in range(_ROUNDS):
+        root = 1 / (sd * expected)
+        terms = np.linalg.lstsq(design * root[:, np.newaxis], variance * root, rcond=None)[0]
+        expected = design @ terms
+        if (expected <= 0).any():
+            return -inf
+    before = _loglik((state.vector.values[which] - beside[which]) / sd)
+    return _loglik(np.log(variance / expected) / sd) - before - 1.0
 
 
 def _grown(layout: Layout, place: Place, before: BaseFit, after: BaseFit) -> float:

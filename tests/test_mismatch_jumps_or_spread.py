@@ -111,7 +111,7 @@ def test_what_jumps_explain_of_the_numbers_counts(best: str) -> None:
 
 
 def test_pixels_of_a_map_are_no_numbers_that_jumps_were_asked_about() -> None:
-    """One pixel far out of a map gains 3000 nats by hot ones: counts of such pixels say what both do."""
+    """One pixel far out of a map gains 3000 nats: both are told by how many there are."""
     (hot,) = _ranked(hot_pixels=3000.0)
     bare: Any = Stub(effect=())
     start: Any = Stub(of_pixels=2990.0)

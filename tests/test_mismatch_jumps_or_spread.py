@@ -1,7 +1,7 @@
 """Where numbers tie pixels that jump with a read noise that spreads, frames say which it is."""
 
-from types import SimpleNamespace as Stub
 from dataclasses import replace
+from types import SimpleNamespace as Stub
 from typing import Any
 
 import numpy as np

@@ -23,6 +23,7 @@ _ROUNDS = 8
 _PLAIN = 2.0  # growth of an error below which rounding hides nothing
 _MOST_ERROR = 0.5  # of a variance before rounding
 _UNTOLD = 1e3  # growth of a level's error at most: rounding has hidden it
+_CUT, _UNMOVED = 0.2, 0.05  # share of samples; standard deviations that half of it moves a mean by
 _HUBER = 4.0  # standard deviations from which a level counts less
 
 
@@ -175,12 +176,23 @@ def _sound(level: Level) -> bool:
     return not clipped and level.variance_dn2 > 0
 
 
+def _cut_off(level: Level, offsets: Offsets, place: Place) -> bool:
+    """Return whether noise is cut off where the model's is not: its mean says nothing of black."""
+    if not level.clipped_low > _CUT:
+        return False
+    return offsets.level_dn.get(place, 0.0) < _UNMOVED * sqrt(max(level.variance_dn2, 0.0))
+
+
 def _black(
     layout: Layout, levels: Mapping[Place, Level], offsets: Offsets, nominal: float
 ) -> tuple[dict[str, float], dict[str, float]]:
     black, error = {}, {}
     for channel in layout.channels:
-        places = [(e.name, channel) for e in layout.exposures if e.kind == "dark"]
+        places = [
+            place
+            for e in layout.exposures
+            if e.kind == "dark" and not _cut_off(levels[place := (e.name, channel)], offsets, place)
+        ]
         if not places:
             black[channel], error[channel] = nominal, np.nan
             continue
@@ -206,6 +218,8 @@ def _signals(
         for e in uniform:
             if e.kind == "dark":
                 place = (e.name, channel)
+                if _cut_off(levels[place], offsets, place):
+                    continue
                 own = levels[place].level_dn - offsets.level_dn.get(place, 0.0)
                 darks.setdefault(e.exposure_time_s, []).append(own)
         times = sorted(darks)

@@ -18,7 +18,7 @@ from scipy.ndimage import uniform_filter1d
 
 from dsis.kept import Kept
 from dsis.measures.estimate import Estimate, estimate, unknown
-from dsis.measures.histogram import Histogram, histogram, limits, squared
+from dsis.measures.histogram import Histogram, histogram, limits, piled_up, squared
 from dsis.measures.kernels import count_codes
 from dsis.measures.spikes import variance_of_quartiles, without_spikes
 
@@ -187,9 +187,12 @@ class Codes:
     def ends(self, lowest: float, highest: float) -> tuple[float, float]:
         """Return the first and the last code that a converter of these ends can give, DN.
 
-        Those of its steps, which need not reach either end; of few codes steps are not known.
+        Those of its steps, which need not reach either end; of few codes steps are not known. Where
+        samples are piled up at the lowest code that occurs they were cut off there.
         """
         own = self.lattice
+        if piled_up(self.counts):
+            lowest = max(lowest, self.lowest)
         if own is None or own.step <= 1 or self._shown.used < _LEAST_CODES:
             return lowest, highest
         first = lowest + (own.code - lowest) % own.step

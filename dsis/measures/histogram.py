@@ -8,6 +8,8 @@ from numpy.typing import NDArray
 from dsis.compiled import kernel
 
 Counts = NDArray[np.int64]
+_PILE, _BEYOND = 0.25, 0.1  # shares of the samples
+_STEEPLY = 1.75  # noise of 1.4 steps that is cut off at its mean; no code of a Gaussian
 
 
 class Histogram(NamedTuple):
@@ -96,3 +98,16 @@ def squared(transform: NDArray[np.complex128]) -> NDArray[np.float64]:
     for i in range(transform.size):
         power[i] = transform[i].real * transform[i].real + transform[i].imag * transform[i].imag
     return power
+
+
+def piled_up(counts: Counts) -> bool:
+    """Return whether samples are cut off at the lowest code, the first of `counts`.
+
+    There a quarter of all are, and far more than at the next code that occurs, while a tenth lies
+    beyond: no normal noise so wide has none below.
+    """
+    total, lowest = int(counts.sum()), int(counts[0])
+    if lowest < _PILE * total:
+        return False
+    next_one = int(counts[1 + int((counts[1:] > 0).argmax())]) if counts.size > 1 else 0
+    return lowest >= _STEEPLY * next_one and total - lowest - next_one >= _BEYOND * total

@@ -35,6 +35,11 @@ class Memory:
         """Return what a kind gained at most; `unknown`: it was never tried."""
         return max(self.gains.get(kind, {}).values(), default=unknown)
 
+    def gains_at_least(self, kind: str, effect: Effect, gain: float) -> None:
+        """Take what whole frames gain by an effect, where numbers gain less."""
+        of_words = self.gains.setdefault(kind, {})
+        of_words[words(effect)] = max(of_words.get(words(effect), gain), gain)
+
     def recalled(self, effect: Effect, state: State) -> Array | None:
         """Return the numbers with an effect added, as remembered; None: it must be simulated."""
         null = state.null

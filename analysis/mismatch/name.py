@@ -220,7 +220,7 @@ class Search(Fitted):
         off = {m.statistic for m in state.mismatches}
         path = second_path(state) if "dual_gain" in left and "pixel_variance" in off else None
         path = None if path and displaced(state, path.kind, path.mean) else path
-        silent = spiky(state)  # its variances say nothing yet, unless there is nothing else
+        silent = spiky(state, path)  # its variances say nothing yet, unless there is nothing else
         fitted = self._decided(state, None if silent else path)
         if (fitted and silent) or any(pair[1] is path for pair in self.ties):
             path = None

@@ -42,7 +42,8 @@ _COSINE = 0.5  # of what two predictions change, from which they change the same
 _SPARSE = 4  # times as many simulations
 _BY_FRAME = frozenset({"frame_variance"})
 _BY_JUMPS = frozenset({"rts"})
-_BY_FRAMES = _BY_JUMPS | LINES | {"adc_dnl"}  # codes in step with powers of two
+# Codes in step with powers of two; residues of codes, whose levels a step that is not fitted misses.
+_BY_FRAMES = _BY_JUMPS | LINES | {"adc_dnl", "adc_memory"}
 # A sign: half of the pairs of frames show nothing, half show it twice. A band: one bin's phase.
 # Pink noise and bands of rows: most of it in a frame's mean and in the first few bins. Gains that
 # neighbours share: in few patches. Hot pixels: the few brightest ones.
@@ -113,6 +114,8 @@ def ranked(
     tried = [  # frames tell jumps of few pixels from what has the same sums, and waves from noise
         (max(value, before + _gained(state, own, told)), kind, own) for value, kind, own in tried
     ]
+    for value, kind, own in tried:
+        memory.gains_at_least(kind, own.effect, value - before)
     tried.sort(key=lambda one: -one[0])
     best = max((value for value, _, _ in tried), default=0.0)
     far = max(_FAR, _SHARE * (best - before))

@@ -1,5 +1,6 @@
 """A second read-out path that the camera model does not have: dual gain."""
 
+from collections.abc import Container, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import inf, log, nan, sqrt
@@ -19,6 +20,7 @@ Array = NDArray[np.float64]
 _NU = 6.0
 _SHAPES = frozenset({"skewness", "kurtosis", "kurtosis_within_pixels"})
 _OFF, _CLEAR = 4.0, 10.0  # standard errors of a variance that departs, and of a shape
+_AROUND, _PLACES = 3.0, 25  # standard deviations; switches between two levels
 _SPIKY = 10.0  # standard errors from which tails bend the variances
 _TAILS = frozenset({"kurtosis", "kurtosis_within_pixels", "one_off_outliers"})
 _ROUNDS = 4  # of weights of a fit
@@ -27,7 +29,10 @@ _PENALTY = 4.0  # two numbers, and the choice among the gaps
 
 @dataclass(frozen=True)
 class Path:
-    """A second segment: the camera with it, its switch and error, what it gains and predicts."""
+    """A second segment: the camera with it, its switch and error, what it gains and predicts.
+
+    `gap` are the signals between which the switch lies.
+    """
 
     camera: Camera
     switch_dn: float
@@ -35,6 +40,7 @@ class Path:
     gain: float
     mean: Array
     kind: str = "dual_gain"
+    gap: tuple[float, float] = (0.0, 0.0)
 
     @property
     def name(self) -> str:
@@ -52,8 +58,9 @@ def second_path(state: State, beside: Array | None = None) -> Path | None:
     """
     mean = state.null.mean if beside is None else beside
     calibrated, layout = state.calibrated, state.setting.layout
-    if len(calibrated.switches) > 0 or _misshapen(state):
+    if len(calibrated.switches) > 0:
         return None
+    misshapen = _misshapen(state)
     means = sorted(
         {
             round(float(np.mean([calibrated.fit.signal_dn[e.name, c] for c in layout.channels])), 3)
@@ -63,7 +70,8 @@ def second_path(state: State, beside: Array | None = None) -> Path | None:
     paths = [
         path
         for low, high in pairwise(means[1:-1])
-        if (path := _path(state, low, high, mean)) is not None
+        if not _elsewhere(state, misshapen, (low, high))
+        and (path := _path(state, low, high, mean)) is not None
     ]
     if not paths:
         return None
@@ -90,25 +98,51 @@ def _variances(state: State) -> list[int]:
     ]
 
 
-def spiky(state: State) -> bool:
-    """Return whether the tails of the noise depart so far that its variances say nothing yet."""
-    return any(abs(m.z) > _SPIKY and m.statistic in _TAILS for m in state.mismatches)
+def spiky(state: State, path: Path | None = None) -> bool:
+    """Return whether the tails of the noise depart so far that its variances say nothing yet.
+
+    Not where a second `path` makes them: pixels select theirs by their own signal, and about the
+    switch some are of one and some of the other.
+    """
+    if not any(abs(m.z) > _SPIKY and m.statistic in _TAILS for m in state.mismatches):
+        return False
+    tails = _departing(state, _TAILS)
+    return path is None or _elsewhere(state, [at for at, z in tails.items() if z > _OFF], path.gap)
 
 
-def _misshapen(state: State) -> bool:
-    """Return whether noise has another shape where its variance departs, and more clearly so.
+def _departing(state: State, statistics: Container[str]) -> dict[Place, float]:
+    """Return by how many standard errors an exposure's numbers depart, at most, by place."""
+    found: dict[Place, float] = {}
+    for key, z in zip(state.null.keys, np.abs(state.departures), strict=True):
+        if key.scope == "exposure" and key.statistic in statistics:
+            found[key.place] = max(found.get(key.place, 0.0), float(z))
+    return found
+
+
+def _misshapen(state: State) -> list[Place]:
+    """Return where noise has another shape while its variance departs, and more clearly so.
 
     A second path scales noise. What bends or clips the distribution bends its variance, too.
     """
-    shape: dict[tuple[str, str], float] = {}
-    variance: dict[tuple[str, str], float] = {}
-    for key, z in zip(state.null.keys, np.abs(state.departures), strict=True):
-        place = (key.exposure, key.channel)
-        if key.scope == "exposure" and key.statistic in _SHAPES:
-            shape[place] = max(shape.get(place, 0.0), float(z))
-        elif key.scope == "exposure" and key.statistic == "pixel_variance":
-            variance[place] = float(z)
-    return any(z > _OFF and shape.get(at, 0.0) > max(_CLEAR, z) for at, z in variance.items())
+    shape = _departing(state, _SHAPES)
+    variance = _departing(state, frozenset({"pixel_variance"}))
+    return [at for at, z in variance.items() if z > _OFF and shape.get(at, 0.0) > max(_CLEAR, z)]
+
+
+def _elsewhere(state: State, places: Sequence[Place], gap: tuple[float, float]) -> bool:
+    """Return whether some places are not about any switch in a gap between two signals."""
+    signals, levels = state.calibrated.fit.signal_dn, state.setting.seen.levels
+    of_both = [
+        (signals.get(at, 0.0), _AROUND * sqrt(max(levels[at].variance_dn2, 0.0)))
+        for at in places
+        if at in levels
+    ]
+    if len(of_both) < len(places):
+        return True
+    return not any(
+        all(abs(signal - switch) <= reach for signal, reach in of_both)
+        for switch in np.linspace(*gap, _PLACES)
+    )
 
 
 def _path(state: State, low: float, high: float, beside: Array) -> Path | None:
@@ -149,7 +183,7 @@ def _path(state: State, low: float, high: float, beside: Array) -> Path | None:
     for i, key in enumerate(state.vector.keys):
         if key.statistic == "pixel_variance" and key.scope == SCENE and state.null.known[i]:
             mean[i] += _grown(layout, key.place, calibrated.residual, fit)
-    return Path(camera, switch, error, gain, mean)
+    return Path(camera, switch, error, gain, mean, gap=(low, high))
 
 
 def _squared(state: State, beside: Array) -> float:

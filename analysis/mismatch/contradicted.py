@@ -86,12 +86,30 @@ def refuted(
     _, sd, known = predictor.weights(mean)
     change = np.where(known, predictor.forms * (mean - state.null.mean), 0.0)
     drawn = 0.0 * sd if camera is None else np.where(known, predictor.spread(camera), 0.0)
+    drawn = _alike_spread(state, np.where(known, mean - state.null.mean, 0.0), drawn)
     scatter = np.sqrt(np.maximum(sd**2 - change**2, state.null.sd**2) + drawn**2)
     denial = _denied(state, predictor, kind, state.null.mean, mean, scatter)
     if denial is not None and "dual_gain" in left and (both := with_path(state, mean)) is not None:
         alone = state.null.mean + both - mean
         denial = _denied(state, predictor, kind, alone, both, scatter)
     return denial or _of_codes(state, kind, mean)
+
+
+def _alike_spread(state: State, change: Array, drawn: Array) -> Array:
+    """Return how far what an effect draws scatters: as far, relative to it, at all exposures alike.
+
+    Few simulations may all have a spike in an exposure where the recording has none.
+    """
+    groups: dict[tuple[str, str, str], list[int]] = {}
+    for i, key in enumerate(state.vector.keys):
+        if change[i]:
+            groups.setdefault((key.statistic, key.scope, key.detail), []).append(i)
+    found = drawn.copy()
+    for which in groups.values():
+        share = np.minimum(drawn[which] / np.abs(change[which]), 1.0)
+        alike = float(np.sqrt(np.mean(share**2)))
+        found[which] = np.maximum(drawn[which], alike * np.abs(change[which]))
+    return found
 
 
 def _of_codes(state: State, kind: str, mean: Array) -> Denial | None:

@@ -2,15 +2,23 @@
 
 from math import inf, isfinite
 
-from analysis.mismatch.bank.codephase import LABEL
+import numpy as np
+
+from analysis.mismatch.bank.codephase import DETAIL, LABEL
 from analysis.mismatch.bank.sawtooth import PERIODS, explained
-from analysis.mismatch.state import Setting
+from analysis.mismatch.state import Setting, State
 from dsis.effects import Effect
 from dsis.effects.adc_dnl import AdcDnl
 from dsis.effects.adc_memory import AdcMemory
 
 _OF_DIFFERENCES = 2 / 3  # of many frames: successive ones share a frame
+_CHANCE = 2.0  # standard deviations
 _PAID = 2.0  # nats: for the size, and for the period that is the best of six
+
+
+def gain_by_codes(setting: Setting, effect: Effect) -> float:
+    """Return what codes gain by uneven widths or a residue, nats; minus infinity: neither."""
+    return max(gain_of_codes(setting, effect), gain_of_residue(setting, effect))
 
 
 def gain_of_codes(setting: Setting, effect: Effect) -> float:
@@ -25,6 +33,20 @@ def gain_of_codes(setting: Setting, effect: Effect) -> float:
     scores = [float(own[LABEL][0]) for own in setting.seen.pooled.values() if LABEL in own]
     most = max((score for score in scores if isfinite(score)), default=0.0)
     return most**2 / 2 - _PAID if most > 0 else -inf
+
+
+def in_step_already(state: State, effect: Effect) -> bool:
+    """Return whether a state's model has codes as much in step as the recording, within chance.
+
+    Electrons of whole codes, or of as many as a power of two, are. False of any effect but widths.
+    """
+    own = [
+        i
+        for i, key in enumerate(state.vector.keys)
+        if key.detail == DETAIL and state.null.known[i] and isinstance(effect, AdcDnl)
+    ]
+    left = (state.vector.values - state.null.mean)[own] / state.null.sd[own]
+    return bool(own) and bool((left < _CHANCE).all())
 
 
 def gain_of_residue(setting: Setting, effect: Effect) -> float:

@@ -42,7 +42,7 @@ _COSINE = 0.5  # of what two predictions change, from which they change the same
 _SPARSE = 4  # times as many simulations
 _BY_FRAME = frozenset({"frame_variance"})
 _BY_JUMPS = frozenset({"rts"})
-# Codes in step with powers of two; residues of codes, whose levels a step that is not fitted misses.
+# Codes in step with powers of two; residues, whose levels a step that is not fitted misses.
 _BY_FRAMES = _BY_JUMPS | LINES | {"adc_dnl", "adc_memory"}
 # A sign: half of the pairs of frames show nothing, half show it twice. A band: one bin's phase.
 # Pink noise and bands of rows: most of it in a frame's mean and in the first few bins. Gains that

@@ -7,9 +7,10 @@ light is left. Where that is nothing, the transform of the folded histogram is c
 """
 
 from collections.abc import Mapping
-from math import pi
+from math import isfinite, log, pi
 
 import numpy as np
+import scipy.special
 import scipy.stats
 from numpy.typing import NDArray
 
@@ -82,8 +83,18 @@ class CodePhases:
             if samples.min() >= _LEAST:
                 each = np.abs(self.transform[which]) ** 2 / samples
                 twice = np.where(which < _PERIOD // 2 - 1, 2.0, 1.0)  # but the last, which is real
-                chance = float(scipy.stats.chi2.logsf(twice @ each, twice.sum()))
+                chance = _log_chance(float(twice @ each), float(twice.sum()))
                 rms = max(float(twice @ ((each - 1) / samples)), 0.0) ** 0.5
                 found.append((chance, period, rms))
             period *= 2
         return found
+
+
+def _log_chance(chi2: float, dof: float) -> float:
+    """Return the logarithm of the probability that chi-squared is larger, however small that is."""
+    chance = float(scipy.stats.chi2.logsf(chi2, dof))
+    if isfinite(chance):
+        return chance
+    # The first term of the tail's asymptotic series (DLMF 8.11.2).
+    half, shape = chi2 / 2, dof / 2
+    return (shape - 1) * log(half) - half - float(scipy.special.gammaln(shape))

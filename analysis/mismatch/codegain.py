@@ -2,8 +2,6 @@
 
 from math import inf, isfinite
 
-import numpy as np
-
 from analysis.mismatch.bank.codephase import DETAIL, LABEL
 from analysis.mismatch.bank.sawtooth import PERIODS, explained
 from analysis.mismatch.state import Setting, State
@@ -16,8 +14,13 @@ _CHANCE = 2.0  # standard deviations
 _PAID = 2.0  # nats: for the size, and for the period that is the best of six
 
 
-def gain_by_codes(setting: Setting, effect: Effect) -> float:
-    """Return what codes gain by uneven widths or a residue, nats; minus infinity: neither."""
+def gain_by_codes(setting: Setting, effect: Effect, without: State | None = None) -> float:
+    """Return what codes gain by uneven widths or a residue, nats; minus infinity: neither.
+
+    Nothing by widths whose order a state without them has already.
+    """
+    if without is not None and in_step_already(without, effect):
+        return -inf
     return max(gain_of_codes(setting, effect), gain_of_residue(setting, effect))
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.candidates import CANDIDATES, measured
-from analysis.mismatch.codegain import gain_by_codes, in_step_already
+from analysis.mismatch.codegain import gain_by_codes
 from analysis.mismatch.contradicted import refuted
 from analysis.mismatch.credited import joined, kept_up
 from analysis.mismatch.displaced import displaced
@@ -353,9 +353,9 @@ class Search(Fitted):
             self._refuse(effect.kind, effect, denial)
         return denial is None
 
-    def _shown(self, effect: Effect) -> float:
+    def _shown(self, effect: Effect, without: State | None = None) -> float:
         """Return what whole frames gain by a line, or codes; minus infinity: nothing of either."""
-        by_codes = gain_by_codes(self.setting, effect)
+        by_codes = gain_by_codes(self.setting, effect, without)
         return by_codes if self.lines is None else max(by_codes, self.lines.gain(effect))
 
     def denied(self, state: State) -> tuple[Named, str] | None:
@@ -393,9 +393,7 @@ class Search(Fitted):
         if why != NEEDLESS or (own := named.proposal) is None:
             return False
         gain = gained(state, bare, own.effect, replicates_for(self.setting, [own.effect]))
-        if not in_step_already(bare, own.effect):
-            gain = max(gain, self._shown(own.effect))
-        return gain - own.price >= self._least(bare, named.kind)
+        return max(gain, self._shown(own.effect, bare)) - own.price >= self._least(bare, named.kind)
 
     def _judge(self, state: State) -> Judge:
         return Judge(state, lambda named: self.without(state, named), self.setting.nulls)

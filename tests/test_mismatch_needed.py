@@ -28,7 +28,7 @@ def test_what_a_state_without_an_effect_would_take_in_is_needed(there: bool) -> 
     gain = gained(state, bare, ROW_NOISE, 2)
     assert gain > 50 if there else gain == 0
     search: Any = SimpleNamespace(
-        setting=state.setting, _least=lambda *_: SURE_GAIN, _shown=lambda _: -inf
+        setting=state.setting, _least=lambda *_: SURE_GAIN, _shown=lambda *_: -inf
     )
     named = Named("row_noise", Proposal(ROW_NOISE, ("sigma_dn",)), {}, gain, ())
     for why, left, needed in (
@@ -39,6 +39,17 @@ def test_what_a_state_without_an_effect_would_take_in_is_needed(there: bool) -> 
     ):
         one, other = _with(state, *left), _with(bare, "row_variance")
         assert Search._needed(search, one, other, named, why) is needed
+
+
+def test_what_is_left_for_another_cause_denies_nothing_that_the_rest_shows() -> None:
+    """Levels scatter with light that flickers; that they bend besides is another's."""
+    flicker = registry()["flicker"](sigma_percent=1.0)
+    recording = recorded(camera(flicker), 5)
+    state, bare = state_of(recording, camera(flicker)), state_of(recording, camera())
+    alone = gained(state, bare, flicker, 2)
+    beside = gained(_with(state, "level"), _with(bare, "level", "frame_variance"), flicker, 2)
+    assert 5 < beside <= alone + 1
+    assert gained(_with(state, "level"), _with(bare, "level"), flicker, 2) == 0
 
 
 def _with(state: State, *departures: str) -> State:

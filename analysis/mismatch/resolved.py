@@ -109,14 +109,18 @@ def calls_alone(kind: str, others: Iterable[str]) -> frozenset[str]:
 def gained(state: State, bare: State, effect: Effect, replicates: int) -> float:
     """Return what a state gains over one without an effect, as that one predicts it, nats.
 
-    Nothing unless what calls for the effect differs without it, and does not with it.
+    Nothing unless what calls for the effect differs without it, and does not with it. Where some of
+    it still does - levels that light which flickers scatters, and a bent response bends - by the
+    rest alone.
     """
     calls = set(CANDIDATES[effect.kind].calls)
     left, called = (calls & {m.statistic for m in own.mismatches} for own in (state, bare))
-    if left or not called:
+    if not called - left:
         return 0.0
+    which = np.array([not left or key.statistic in called - left for key in bare.vector.keys])
     predictor = bare.predictor(replicates)
-    return predictor.loglik(predictor.mean(state.camera)) - predictor.loglik(bare.null.mean)
+    mean = predictor.mean(state.camera)
+    return predictor.loglik(mean, which) - predictor.loglik(bare.null.mean, which)
 
 
 def opened(state: State, bare: State) -> bool:

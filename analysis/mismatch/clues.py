@@ -18,6 +18,8 @@ from dsis.camera import Camera
 from dsis.measures.fixed_pattern import Smooth
 
 Array = NDArray[np.float64]
+NO_LINE = ""
+"""Kind of a line that whole frames do not show."""
 
 
 def alike(_place: Place) -> float:
@@ -41,7 +43,7 @@ class Clues:
         The current model.
     settled
         Lines that an effect of a kind needs no trial for, (kind, frequency): they were named as one
-        or the other, or refused to this one.
+        or the other, or refused to this one; of `NO_LINE` no effect needs one.
     """
 
     layout: Layout

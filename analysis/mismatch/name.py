@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.candidates import CANDIDATES, measured
+from analysis.mismatch.clues import NO_LINE
 from analysis.mismatch.codegain import gain_by_codes
 from analysis.mismatch.contradicted import refuted
 from analysis.mismatch.credited import joined, kept_up
@@ -347,7 +348,7 @@ class Search(Fitted):
         denial = self.lines.denial(effect) or in_step(self.setting, effect)
         if denial == ABSENT:
             line = frequency_of(effect)
-            self.settled += [(kind, line) for kind in sorted(LINES) if line is not None]
+            self.settled += [(NO_LINE, line)] if line is not None else []
             self.absent |= {line} if line is not None else set()
         elif denial is not None:
             self._refuse(effect.kind, effect, denial)

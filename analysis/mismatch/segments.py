@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from analysis.mismatch.basefit import BaseFit, fit_base
 from analysis.mismatch.layout import Layout, Place
+from analysis.mismatch.rank import TOLD_APART
 from analysis.mismatch.recalibrate import with_numbers
 from analysis.mismatch.scenes import SCENE
 from analysis.mismatch.state import State
@@ -53,7 +54,7 @@ def second_path(state: State, beside: Array | None = None) -> Path | None:
 
     Its switch lies anywhere in a gap between levels, and in other gaps as likely as those explain
     the variances: its error is the root mean square distance. None as well where noise that grows
-    with the signal - a square beside a line, which has no gap - explains them better. `beside` are
+    with the signal - a square beside a line, which has no gap - explains them better, at odds of 20. `beside` are
     the numbers predicted with an effect that is there as well; None: none is.
     """
     mean = state.null.mean if beside is None else beside
@@ -76,7 +77,7 @@ def second_path(state: State, beside: Array | None = None) -> Path | None:
     if not paths:
         return None
     best = max(paths, key=lambda path: path.gain)
-    if _squared(state, mean) > best.gain:
+    if _squared(state, mean) > best.gain + TOLD_APART:
         return None
     chances = np.exp([path.gain - best.gain for path in paths])
     squares = [path.error_dn**2 + (path.switch_dn - best.switch_dn) ** 2 for path in paths]

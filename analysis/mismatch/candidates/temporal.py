@@ -13,7 +13,7 @@ from analysis.mismatch.bank.movingbands import LABEL as MOVING
 from analysis.mismatch.bank.peaks import Peak
 from analysis.mismatch.bank.scalars import UNKNOWN
 from analysis.mismatch.candidates.candidate import Candidate, Proposal, measured, proposals
-from analysis.mismatch.clues import Clues, alike
+from analysis.mismatch.clues import NO_LINE, Clues, alike
 from analysis.mismatch.framewalk import FrameMeans, Walk, walk_of
 from analysis.mismatch.instance import Frequency, same_line
 from dsis.effects.black_level_drift import BlackLevelDrift
@@ -39,6 +39,7 @@ _PERSISTS = 1.0  # of log-likelihood: more than a parameter gains by chance (Aka
 _TINY = 1e-300
 _WAVES = 64  # a row: means over rows have next to nothing of shorter ones
 _PARABOLA = 1.3  # scatter of a parabola's top on half bins, over the bound (Rife & Boorstyn, 1974)
+_HALVES = (0.0, 0.5)  # cycles per pixel, modulo which a plane of a mosaic sees frequencies
 _LEAST_POWER = 1.2  # of a line worth a trial, white noise at 1
 
 
@@ -211,11 +212,9 @@ def frequencies(clues: Clues, kind: str) -> list[tuple[float, float, float]]:
         if channel == "MONO":
             found.append((peak.fx, peak.fy, amplitude))
             continue
-        aliases = (0.0,) if _whole(name, channel) else (0.0, 0.5)
-        for ax in aliases:
-            for ay in aliases:
-                fx, fy = peak.fx / 2 + ax, peak.fy / 2 + ay
-                found.append(((fx + 0.5) % 1 - 0.5, (fy + 0.5) % 1 - 0.5, amplitude))
+        aliases = (0.0,) if _whole(name, channel) else _HALVES
+        lines = (_alias(peak, ax, ay) for ax in aliases for ay in aliases)
+        found += [(*at, amplitude) for at in lines if not _settled(clues, kind, at, 1)]
     if len(clues.layout.channels) > 1:  # constant in each plane: stripes and checkerboards
         frame, _ = clues.amplitude("frame_variance", alike)
         stripes = ((0.5, 0.0), (0.0, 0.5), (0.5, 0.5)) if frame > 0 else ()
@@ -229,10 +228,19 @@ def frequencies(clues: Clues, kind: str) -> list[tuple[float, float, float]]:
     return found
 
 
+def _alias(peak: Peak, ax: float, ay: float) -> Frequency:
+    """Return one of the frequencies that a plane of a mosaic sees as a peak's."""
+    return (peak.fx / 2 + ax + 0.5) % 1 - 0.5, (peak.fy / 2 + ay + 0.5) % 1 - 0.5
+
+
 def _settled(clues: Clues, kind: str, at: Frequency, step: int) -> bool:
-    """Return whether a line needs no trial; `step`: of the plane that sees it."""
+    """Return whether a line needs no trial; `step`: of the plane that sees it.
+
+    What frames do not show has no other of the frequencies that a plane takes for it.
+    """
     size = clues.layout.rows // step, clues.layout.columns // step
-    return any(one == kind and same_line(known, at, *size, step) for one, known in clues.settled)
+    kinds = {kind, NO_LINE} if step == 1 else {kind}
+    return any(one in kinds and same_line(known, at, *size, step) for one, known in clues.settled)
 
 
 def _whole(name: str, channel: str) -> bool:
@@ -249,7 +257,11 @@ def _strongest(clues: Clues, kind: str) -> Iterator[tuple[str, str, Peak]]:
     def settled(name: str, channel: str, peak: Peak) -> bool:
         step = 1 if channel == "MONO" else 2
         at = (peak.fx / step, peak.fy / step)
-        return _settled(clues, kind, at, 1 if _whole(name, channel) else step)
+        if step == 1 or _whole(name, channel):
+            return _settled(clues, kind, at, 1)
+        every = [_alias(peak, ax, ay) for ax in _HALVES for ay in _HALVES]
+        none = all(_settled(clues, kind, one, 1) for one in every)
+        return none or _settled(clues, kind, at, step)
 
     ranks = [line_name(rank) for rank in range(1, RANKS[-1] + 2)]
     cells = [periods.PLACE] if kind == "bistable_pattern" and _seen_in_cells(clues) else []

@@ -54,8 +54,8 @@ def second_path(state: State, beside: Array | None = None) -> Path | None:
 
     Its switch lies anywhere in a gap between levels, and in other gaps as likely as those explain
     the variances: its error is the root mean square distance. None as well where noise that grows
-    with the signal - a square beside a line, which has no gap - explains them better, at odds of 20. `beside` are
-    the numbers predicted with an effect that is there as well; None: none is.
+    with the signal - a square beside a line, which has no gap - explains them better, at odds of
+    20. `beside` are the numbers predicted with an effect that is there as well; None: none is.
     """
     mean = state.null.mean if beside is None else beside
     calibrated, layout = state.calibrated, state.setting.layout

@@ -213,8 +213,8 @@ def frequencies(clues: Clues, kind: str) -> list[tuple[float, float, float]]:
             found.append((peak.fx, peak.fy, amplitude))
             continue
         aliases = (0.0,) if _whole(name, channel) else _HALVES
-        lines = (_alias(peak, ax, ay) for ax in aliases for ay in aliases)
-        found += [(*at, amplitude) for at in lines if not _settled(clues, kind, at, 1)]
+        own = (_alias(peak, ax, ay) for ax in aliases for ay in aliases)
+        found += [(*at, amplitude) for at in own if not _settled(clues, kind, at, 1)]
     if len(clues.layout.channels) > 1:  # constant in each plane: stripes and checkerboards
         frame, _ = clues.amplitude("frame_variance", alike)
         stripes = ((0.5, 0.0), (0.0, 0.5), (0.5, 0.5)) if frame > 0 else ()

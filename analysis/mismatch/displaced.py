@@ -16,6 +16,7 @@ from analysis.mismatch.brighter import no_brighter_alike
 from analysis.mismatch.bylevel import otherwise_by_level
 from analysis.mismatch.candidates.response import skewness_below
 from analysis.mismatch.contradicted import Denial
+from analysis.mismatch.feignedtails import replaced
 from analysis.mismatch.fewlines import of_few_lines
 from analysis.mismatch.framelag import alike_without_light
 from analysis.mismatch.gathered import gathered
@@ -75,6 +76,8 @@ def displaced(state: State, kind: str, mean: Array, without: Array | None = None
         The numbers predicted with it, and without it; None: those of the state.
     """
     without = state.null.mean if without is None else without
+    if (denial := replaced(state, kind)) is not None:
+        return denial
     if kind in _BENDS:
         seen, denial = by_levels(state, kind, without, mean)
         if denial is None and not seen:

@@ -12,6 +12,13 @@ from analysis.mismatch.state import State
 from dsis.effects.adc_dnl import AdcDnl
 
 Array = NDArray[np.float64]
+_SHAPES = frozenset({"kurtosis", "kurtosis_within_pixels"})
+_ALIKE = frozenset(
+    {
+        "adc_dnl", "adc_memory", "brighter_fatter", "column_noise", "crosstalk", "line_flicker",
+        "pink_noise", "readout_memory", "row_banding", "row_noise", "spatial_filtering",
+    }
+)  # fmt: skip
 _MOST = 0.5  # of tails, that something else may feign
 _SCATTER = 1.84  # see `coded`
 _LIKELY = 2.0  # standard deviations that chance may well have
@@ -114,3 +121,21 @@ def placed(state: State, kind: str, without: Array) -> Denial | None:
         return None
     why = f"noise differs from place to place, and single pixels show them by {shown:.1f} errors"
     return Denial(0.0, why)
+
+
+def replaced(state: State, kind: str) -> Denial | None:
+    """Return how what makes neighbours alike is denied by samples that were replaced; None: not.
+
+    A camera that corrects defects takes what its neighbours have for a sample that is far from
+    them: tails are cut off on both sides, within pixels and over them, at whatever level, and
+    neighbours are alike. Filters, shared charge and codes of unequal width cut none. While that is
+    unexplained they are not told from it.
+    """
+    if kind not in _ALIKE:
+        return None
+    cut = {m.statistic for m in state.mismatches if m.statistic in _SHAPES and m.z < -FAR_OFF}
+    if cut != _SHAPES:
+        return None
+    return Denial(
+        0.0, "tails are cut off on both sides: samples far from their neighbours are lost"
+    )

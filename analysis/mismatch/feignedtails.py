@@ -12,6 +12,7 @@ from analysis.mismatch.state import State
 from dsis.effects.adc_dnl import AdcDnl
 
 Array = NDArray[np.float64]
+_CUT, _NEARLY_ALL = -0.1, 0.9  # of a kurtosis; of all exposures and channels
 _SHAPES = frozenset({"kurtosis", "kurtosis_within_pixels"})
 _ALIKE = frozenset(
     {
@@ -124,18 +125,19 @@ def placed(state: State, kind: str, without: Array) -> Denial | None:
 
 
 def replaced(state: State, kind: str) -> Denial | None:
-    """Return how what makes neighbours alike is denied by samples that were replaced; None: not.
+    """Return how what makes samples alike is denied by samples that were replaced; None: not.
 
     A camera that corrects defects takes what its neighbours have for a sample that is far from
-    them: tails are cut off on both sides, within pixels and over them, at whatever level, and
-    neighbours are alike. Filters, shared charge and codes of unequal width cut none. While that is
-    unexplained they are not told from it.
+    them: tails are cut off on both sides, within pixels and over them, at all levels and without
+    light, and neighbours are alike. Filters, shared charge and codes of unequal width cut none so.
+    While that is unexplained they are not told from it.
     """
-    if kind not in _ALIKE:
+    if kind not in _ALIKE or not {m.statistic for m in state.mismatches} >= _SHAPES:
         return None
-    cut = {m.statistic for m in state.mismatches if m.statistic in _SHAPES and m.z < -FAR_OFF}
-    if cut != _SHAPES:
+    own = np.array([k.statistic in _SHAPES and k.scope == "exposure" for k in state.vector.keys])
+    own &= state.null.known
+    left = (state.vector.values - state.null.mean)[own]
+    cut = (left < _CUT) & (left < -_LIKELY * state.null.sd[own])
+    if not own.any() or cut.mean() < _NEARLY_ALL:
         return None
-    return Denial(
-        0.0, "tails are cut off on both sides: samples far from their neighbours are lost"
-    )
+    return Denial(0.0, "tails are cut off on both sides: samples far from others were replaced")

@@ -224,7 +224,7 @@ def _straightened(state: State, factor: Callable[[Place, float], float], why: st
     Beyond what chance makes them misfit.
     """
     chance = sum(signal.size - 2 for signal, *_ in curves(state))
-    before, after = (max(one - chance, 0.0) for one in misfits(state, factor))
+    before, after = (max(one - chance, 0.0) for one in misfits(state, factor, beside=True))
     if before <= 0 or after > _MOST * before:
         return None
     return Denial(after / before, why)

@@ -14,14 +14,16 @@ _NONE = 2.0  # of chi-squared: 1 nat
 _BENDING = frozenset({"dual_gain", "dual_gain_mismatch", "nonlinearity", "saturation"})
 
 
-def misfits(state: State, factor: Callable[[Place, float], float]) -> tuple[float, float]:
+def misfits(
+    state: State, factor: Callable[[Place, float], float], *, beside: bool = False
+) -> tuple[float, float]:
     """Return chi-squared of variances about lines, as they are and times a factor.
 
     A line is that of a channel: variance against signal, weighted by how well variances are known.
-    `factor` gives that of a place, or the default it is handed.
+    `factor` gives that of a place, or the default it is handed; `beside`: see `curves`.
     """
     before = after = 0.0
-    for signal, variance, weight, places in curves(state):
+    for signal, variance, weight, places in curves(state, beside=beside):
         factors = np.array([factor(at, 1.0) for at in places])
         before += misfit(signal, variance, weight)
         after += misfit(signal, variance * factors, weight)
@@ -58,19 +60,42 @@ def upwards(state: State) -> bool:
     return score > 0
 
 
-def curves(state: State) -> Iterator[tuple[Array, Array, Array, list[Place]]]:
-    """Yield signals, variances, weights of their logarithms and places of each channel."""
+def curves(
+    state: State, *, beside: bool = False
+) -> Iterator[tuple[Array, Array, Array, list[Place]]]:
+    """Yield signals, variances, weights of their logarithms and places of each channel.
+
+    `beside`: variances as they would be without the effects of the model, which bend them.
+    """
     levels, signals = state.setting.seen.levels, state.calibrated.fit.signal_dn
+    bends = _bends(state) if beside and state.camera.effect else {}
     uniform = {e.name for e in state.setting.layout.uniform}
     for channel in state.setting.layout.channels:
         places = [at for at in levels if at[0] in uniform and at[1] == channel and at in signals]
         if len(places) >= _LEAST_LEVELS:
             yield (
                 np.array([signals[at] for at in places]),
-                np.array([levels[at].variance_dn2 for at in places]),
+                np.array([levels[at].variance_dn2 * bends.get(at, 1.0) for at in places]),
                 np.array([levels[at].dof / 2 for at in places]),
                 places,
             )
+
+
+def _bends(state: State) -> dict[Place, float]:
+    """Return what makes variances what they would be without the effects of a model, by place.
+
+    Its own line and segments, and what the recording has beyond all it expects.
+    """
+    fit, levels = state.calibrated.fit, state.setting.seen.levels
+    found: dict[Place, float] = {}
+    for i, key in enumerate(state.vector.keys):
+        if key.statistic != "pixel_variance" or key.place not in fit.signal_dn:
+            continue
+        line = float(fit.line_dn2(np.array([fit.signal_dn[key.place]]))[0])
+        rest = float(np.exp(state.vector.values[i] - state.null.mean[i]))
+        if state.null.known[i] and key.place in levels and levels[key.place].variance_dn2 > 0:
+            found[key.place] = max(line, 0.0) * rest / levels[key.place].variance_dn2
+    return found
 
 
 def misfit(signal: Array, variance: Array, weight: Array) -> float:

@@ -16,6 +16,7 @@ from analysis.mismatch.smooth import (
     by_levels,
     smooth_as_well,
 )
+from dsis.effects.adc_dnl import AdcDnl
 
 Array = NDArray[np.float64]
 MANY = np.array([150.0, 2100, 4000, 5200, 6500, 7200, 7400, 8300, 9900])
@@ -41,7 +42,7 @@ def _state(bend: Array, signals: Array, seed: int, colours: int = 1) -> Any:
     uniform = [SimpleNamespace(name=f"flat-{i}", kind="flat") for i in range(signals.size)]
     paths = (SimpleNamespace(upper_dn=SWITCH), SimpleNamespace(upper_dn=None))
     return SimpleNamespace(
-        camera=SimpleNamespace(noise=SimpleNamespace(segment=paths)),
+        camera=SimpleNamespace(noise=SimpleNamespace(segment=paths), effect=()),
         setting=SimpleNamespace(layout=SimpleNamespace(uniform=uniform, channels=channels)),
         calibrated=SimpleNamespace(fit=SimpleNamespace(signal_dn=at)),
         vector=SimpleNamespace(keys=tuple(keys), values=np.array(values)),
@@ -158,3 +159,17 @@ def test_what_misfits_every_law_makes_all_errors_larger() -> None:
         state = _state(_kink(MANY, 0.25) + 5.0 * rng.standard_normal(MANY.size), MANY, 2)
         behind.append(behind_smooth(state, _predicted(state, _kink)))
     assert np.mean(np.array(behind) >= 3) <= 0.1  # odds of 20
+
+
+@pytest.mark.parametrize(("size_dn", "denied"), [(2.0, True), (12.0, False)])
+def test_codes_that_are_not_equally_wide_bend_levels_by_their_sum(
+    size_dn: float, denied: bool
+) -> None:
+    """9900 codes, widths off by 0.1: 0.1 sqrt(9900) / 2 = 5 DN in the middle."""
+    bend = _bends(MANY, size_dn)["square"]
+    state = _state(bend, MANY, 3)
+    assert by_levels(state, "nonlinearity", np.zeros(MANY.size), bend) == (True, None)
+    state.camera.effect = (AdcDnl(rms_lsb=0.1),)
+    seen, denial = by_levels(state, "nonlinearity", np.zeros(MANY.size), bend)
+    assert seen
+    assert (denial is not None) == denied

@@ -2,15 +2,17 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import log
+from math import log, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.candidates import CANDIDATES
 from analysis.mismatch.contradicted import Denial
+from analysis.mismatch.recalibrate import code_step
 from analysis.mismatch.resolved import FAR_OFF
 from analysis.mismatch.state import State
+from dsis.effects.adc_dnl import AdcDnl
 
 Array = NDArray[np.float64]
 _DEGREES = (2, 3)  # of a response: bent one way, or by more in one half than in the other
@@ -138,7 +140,25 @@ def by_levels(state: State, kind: str, without: Array, mean: Array) -> tuple[boo
         return seen, Denial(0.0, "levels bend smoothly, not where a read-out path begins")
     if kind == "nonlinearity" and behind_switch(state, mean) >= _TOLD_APART:
         return seen, Denial(0.0, f"{_AT_SWITCH}, and do not bend smoothly")
+    moved = float(np.abs(mean[levels] - without[levels]).max(initial=0.0))
+    if seen and moved <= _of_widths(state):
+        return seen, Denial(0.0, "codes are not equally wide, and their sum bends as much")
     return seen, None
+
+
+def _of_widths(state: State) -> float:
+    """Return by how much a converter whose codes are named unequally wide bends levels, DN.
+
+    Of n codes whose widths scatter by d, each by itself, the sum in the middle is off by
+    d sqrt(n) / 2, one standard deviation; and a bit of the largest weight that is off by d sqrt(n),
+    which makes widths scatter by as much, puts half of that there.
+    """
+    widths = [own.rms_lsb for own in state.camera.effect if isinstance(own, AdcDnl)]
+    if not widths:
+        return 0.0
+    step = code_step(state.camera)
+    codes = max(state.calibrated.fit.signal_dn.values(), default=0.0) / step
+    return float(np.linalg.norm(widths) * step * sqrt(max(codes, 0.0)) / 2)
 
 
 def at_a_switch(state: State, kind: str, mean: Array) -> Denial | None:

@@ -161,7 +161,7 @@ def test_what_misfits_every_law_makes_all_errors_larger() -> None:
     assert np.mean(np.array(behind) >= 3) <= 0.1  # odds of 20
 
 
-@pytest.mark.parametrize(("size_dn", "denied"), [(2.0, True), (12.0, False)])
+@pytest.mark.parametrize(("size_dn", "denied"), [(4.0, True), (12.0, False)])
 def test_codes_that_are_not_equally_wide_bend_levels_by_their_sum(
     size_dn: float, denied: bool
 ) -> None:

@@ -171,11 +171,21 @@ class Judge:
             return share, NEEDLESS
         # Where others have pixels that stand out, too, counts of them say whose they are.
         alone = named.of_pixels and predictor.counts.normal(mean)
+        alone = alone or self._steps(named)
         if share < _RESOLVED and not (named.measured or alone):
             return share, f"{LITTLE} {max(share, 0):.0%} of what it changes"
         if named.kind not in LINES and not locates(self.state, mean):  # frames show lines
             return 1.0, NOTHING
         return None
+
+    def _steps(self, named: Named) -> bool:
+        """Return whether an effect is the step between codes, and none is left unexplained.
+
+        Shapes of noise that it rounds away hang on where in a step a level lies, which is hardly
+        known; which codes occur does not.
+        """
+        left = {m.statistic for m in self.state.mismatches}
+        return named.kind == "quantisation" and "code_spacing" not in left
 
 
 def _verdict(denial: Denial | None) -> Verdict | None:

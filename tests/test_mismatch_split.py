@@ -23,3 +23,4 @@ def test_the_brightest_exposure_is_looked_at(levels: int, frames: int) -> None:
     if frames == 5:
         assert split.locked["dark-0"] == (4,)
         assert ("flat-0" in split.locked) == (levels < 4)
+        assert split.locked[brightest.name] == (4,)  # what only that shows is proven too

@@ -2,9 +2,10 @@
 
 Frames are split by number in alternating blocks (train, select, train, locked), so that slow drift
 is in all parts. Exposures of fewer than six frames are given whole to one part; the brightest is
-not locked, for no other shows where a full well ends or what a long exposure gathers. Where of few
-darks, or flats, none would be locked, the last frame of each that has four or more is: read noise
-alone is proven nowhere else. One flat level is left out of the re-calibration, so that the line's
+not locked, for no other shows where a full well ends or what a long exposure gathers; of four
+frames or more its last one is, for nothing else proves that. Where of few darks, or flats, none
+would be locked, the last frame of each that has four or more is: read noise alone is proven nowhere
+else. One flat level is left out of the re-calibration, so that the line's
 interpolation is tested.
 """
 
@@ -78,9 +79,11 @@ class Split:
             given = _whole(len(few))
             locked = {e.name for e in recording.of_kind(kind)} & parts[_LOCKED].keys()
             spread = kind != "scene" and not locked and _LOCKED not in given
-            for own, exposure in zip(given, sorted(few, key=_brightness), strict=True):
+            ordered = sorted(few, key=_brightness)
+            for own, exposure in zip(given, ordered, strict=True):
                 numbers = tuple(range(len(exposure.frames)))
-                if spread and len(numbers) >= _LEAST_SPREAD:
+                brightest = kind == "flat" and exposure is ordered[-1]
+                if (spread or brightest) and len(numbers) >= _LEAST_SPREAD:
                     parts[_LOCKED][exposure.name] = numbers[-1:]
                     numbers = numbers[:-1]
                 parts[own][exposure.name] = numbers

@@ -62,8 +62,12 @@ def test_tails_as_codes_of_a_converter_feign_them_are_denied(rms: float, sd: flo
     assert drawn.std() == pytest.approx(1.84 * rms / sd**0.5, rel=0.1)
 
 
-def test_tails_far_beyond_what_codes_feign_are_believed() -> None:
-    assert coded(_state(0.6, 0.08), TAILS, WITHOUT) is None
+@pytest.mark.parametrize("kind", [TAILS, "impulse"])
+def test_tails_far_beyond_what_codes_feign_are_believed(kind: str) -> None:
+    """Of few spikes too: those of a real CCD, 0.7 per megapixel, were its converter's codes."""
+    assert coded(_state(0.1, 0.08), kind, WITHOUT) is not None
+    assert coded(_state(0.6, 0.08), kind, WITHOUT) is None
+    assert coded(_state(0.1, 0.08), "rts", WITHOUT) is None
 
 
 def test_codes_that_are_explained_feign_nothing() -> None:

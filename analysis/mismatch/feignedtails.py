@@ -27,7 +27,7 @@ _FEW_ELECTRONS = 1.0  # skewness of shot noise of one electron: read noise besid
 
 
 def coded(state: State, kind: str, without: Array) -> Denial | None:
-    """Return how heavy tails are denied by codes that are not equally wide; None: they are not.
+    """Return how tails, or few spikes, are denied by codes of unequal width; None: they are not.
 
     Codes whose widths scatter by d (of a code) change the excess kurtosis of noise of s codes by
     chance: by sum(w 4 He2(u) phi(u)) / s over codes at u, whose standard deviation is 1.84 d /
@@ -41,7 +41,7 @@ def coded(state: State, kind: str, without: Array) -> Denial | None:
     widths = [e.rms_lsb for e in state.camera.effect if isinstance(e, AdcDnl)]
     drawn = float(np.linalg.norm(widths)) if widths else 0.0
     open_ = any(m.statistic in codes for m in state.mismatches)
-    if kind != "heavy_tailed_read_noise" or not (open_ or drawn):
+    if kind not in ("heavy_tailed_read_noise", "impulse") or not (open_ or drawn):
         return None
     claimed: dict[Place, float] = {}
     left: dict[Place, float] = {}

@@ -184,8 +184,9 @@ class Judge:
         Shapes of noise that it rounds away hang on where in a step a level lies, which is hardly
         known; which codes occur does not.
         """
-        left = {m.statistic for m in self.state.mismatches}
-        return named.kind == "quantisation" and "code_spacing" not in left
+        if named.kind != "quantisation":
+            return False
+        return all(m.statistic != "code_spacing" for m in self.state.mismatches)
 
 
 def _verdict(denial: Denial | None) -> Verdict | None:

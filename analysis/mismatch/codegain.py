@@ -2,6 +2,8 @@
 
 from math import inf, isfinite
 
+import numpy as np
+
 from analysis.mismatch.bank.codephase import DETAIL, LABEL
 from analysis.mismatch.bank.sawtooth import PERIODS, explained
 from analysis.mismatch.state import Setting, State
@@ -43,13 +45,11 @@ def in_step_already(state: State, effect: Effect) -> bool:
 
     Electrons of whole codes, or of as many as a power of two, are. False of any effect but widths.
     """
-    own = [
-        i
-        for i, key in enumerate(state.vector.keys)
-        if key.detail == DETAIL and state.null.known[i] and isinstance(effect, AdcDnl)
-    ]
+    if not isinstance(effect, AdcDnl):
+        return False
+    own = np.array([key.detail == DETAIL for key in state.vector.keys]) & state.null.known
     left = (state.vector.values - state.null.mean)[own] / state.null.sd[own]
-    return bool(own) and bool((left < _CHANCE).all())
+    return bool(own.any() and (left < _CHANCE).all())
 
 
 def gain_of_residue(setting: Setting, effect: Effect) -> float:

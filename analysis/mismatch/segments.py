@@ -14,6 +14,7 @@ from analysis.mismatch.rank import TOLD_APART
 from analysis.mismatch.recalibrate import with_numbers
 from analysis.mismatch.scenes import SCENE
 from analysis.mismatch.state import State
+from analysis.mismatch.straight import polynomial
 from analysis.mismatch.vector import expected_dn2, tells_segment
 from dsis.camera import Camera
 
@@ -197,12 +198,9 @@ def _squared(state: State, beside: Array) -> float:
     sd, added = state.null.sd[which], np.exp(beside[which] - state.null.mean[which])
     variance = np.array([seen.levels[place].variance_dn2 for place in places]) / added
     signal = np.array([fit.signal_dn[place] for place in places])
-    design = np.stack([np.ones_like(signal), signal, signal**2], 1)
     expected = variance
     for _ in range(_ROUNDS):
-        root = 1 / (sd * expected)
-        terms = np.linalg.lstsq(design * root[:, np.newaxis], variance * root, rcond=None)[0]
-        expected = design @ terms
+        _, expected = polynomial(signal, variance, 1 / (sd * expected), 2)
         if (expected <= 0).any():
             return -inf
     before = _loglik((state.vector.values[which] - beside[which]) / sd)

@@ -54,8 +54,7 @@ def upwards(state: State) -> bool:
     for signal, variance, weight, _ in curves(state):
         root = np.sqrt(weight) / variance
         scaled = signal / max(float(signal.max()), 1e-300)
-        design = np.stack([np.ones_like(scaled), scaled, scaled**2], 1) * root[:, np.newaxis]
-        square = np.linalg.lstsq(design, variance * root, rcond=None)[0][2]
+        square = polynomial(scaled, variance, root, 2)[0][2]
         score += float(square) * float((root**2).sum()) ** 0.5
     return score > 0
 
@@ -101,7 +100,15 @@ def _bends(state: State) -> dict[Place, float]:
 def misfit(signal: Array, variance: Array, weight: Array) -> float:
     """Return chi-squared of variances about the line through them; `weight` of their logarithms."""
     root = np.sqrt(weight) / variance
-    design = np.stack([np.ones_like(signal), signal], 1) * root[:, np.newaxis]
-    target = variance * root
-    found = design @ np.linalg.lstsq(design, target, rcond=None)[0]
-    return float(((target - found) ** 2).sum())
+    _, found = polynomial(signal, variance, root, 1)
+    return float((((variance - found) * root) ** 2).sum())
+
+
+def polynomial(signal: Array, variance: Array, root: Array, degree: int) -> tuple[Array, Array]:
+    """Return the terms of a polynomial of variances against signal, and what it makes of these.
+
+    By least squares, `root` one over the standard deviation of each.
+    """
+    design = np.stack([signal**k for k in range(degree + 1)], 1)
+    terms = np.linalg.lstsq(design * root[:, np.newaxis], variance * root, rcond=None)[0]
+    return np.asarray(terms), np.asarray(design @ terms)

@@ -30,7 +30,7 @@ def draw(figure: Figure, histograms: Sequence[Histogram]) -> None:
         of = "" if one.channel in ("", "MONO") else f"{one.channel}: "
         axes.set_title(f"{of}codes around the median", loc="left")
     panels[0].set_ylabel("samples")
-    panels[-1].legend(loc="upper right")
+    figure.legend(*panels[-1].get_legend_handles_labels(), loc="outside lower center", ncols=3)
 
 
 def _middle(counts: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> slice:

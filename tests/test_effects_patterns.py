@@ -140,6 +140,20 @@ def test_uneven_light_tilts_about_the_centre_and_moves_it() -> None:
     np.testing.assert_allclose(part / part[150, 200], own, atol=1e-3)
 
 
+def test_light_that_falls_with_the_fourth_power_of_the_cosine_has_a_ring() -> None:
+    """Natural illumination of a corner 30 degrees off the axis, to 0.4 % of the light."""
+    y, x = np.arange(301)[:, None] - 150, np.arange(401) - 200
+    tangent_square = (y**2 + x**2) / (150.5**2 + 200.5**2) / 3
+    fall = 100 * (1 - (1 + 1 / 3) ** -2)
+    image = apply(
+        effect("shading", falloff_percent=fall, ring_percent=-0.43 * fall), np.ones((301, 401))
+    )
+    np.testing.assert_allclose(image, (1 + tangent_square) ** -2, atol=0.004)
+    one_colour = np.ones((301, 401, 3))
+    colours = apply(effect("shading", falloff_percent=fall, ring_percent=-0.43 * fall), one_colour)
+    np.testing.assert_allclose(colours[..., 1], image, atol=1e-6)
+
+
 @pytest.mark.parametrize("place", ["top", "bottom", "left", "right", "top_left", "bottom_right"])
 def test_glow_falls_off_exponentially_from_its_place(place: str) -> None:
     one = effect("amp_glow", dn_per_s=100.0, place=place, extent=0.2)

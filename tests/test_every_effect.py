@@ -74,6 +74,7 @@ STRONG: dict[str, tuple[dict[str, object], ...]] = {
         {"falloff_percent": 90.0},
         {"falloff_percent": 20.0, "tilt_down_percent": 30.0, "tilt_right_percent": -20.0},
         {"falloff_percent": 0.0, "bow_down_percent": 30.0, "bow_right_percent": -20.0},
+        {"falloff_percent": 40.0, "ring_percent": -20.0, "tilt_down_percent": 10.0},
     ),
     "smooth_prnu": ({"length_pixels": 1.5}, {"sigma_percent": 15.0, "length_pixels": 20.0}),
     "spatial_filtering": ({"fraction": 0.2}, {"fraction": 0.04}),

@@ -14,6 +14,7 @@ from analysis.mismatch.bank.home import LAG, homes, one_sided
 from analysis.mismatch.bank.key import Key
 from analysis.mismatch.bank.parts import STANDING_OUT, parts
 from analysis.mismatch.bank.seams import WHOLE
+from analysis.mismatch.bank.surfaces import RING
 from analysis.mismatch.bank.together import TOGETHER
 from dsis.cfa import Cfa
 from dsis.measures import Accumulator
@@ -118,6 +119,21 @@ def test_a_fall_to_the_corners_is_no_tilt() -> None:
     expected = -fall.std() * sqrt(fall.size)
     assert found["fixed_smooth_falloff"][0] == pytest.approx(expected, abs=SURE)
     assert max(abs(found[f"fixed_smooth_tilt of {axis}"][0]) for axis in ("rows", "columns")) < SURE
+
+
+def test_a_ring_is_seen_beside_all_that_leans_and_bows() -> None:
+    """Of unit noise its number is the norm of what s (1 - s) has beyond degree 2, and else 0."""
+    y, x = (np.linspace(-1, 1, size)[:, None] for size in (ROWS, COLUMNS))
+    s = ((y * ROWS) ** 2 + (x.T * COLUMNS) ** 2) / (ROWS**2 + COLUMNS**2)
+    ring, bowed = 3 * s * (1 - s), 2 * s - y + 3 * x.T + y**2
+    noise = np.random.default_rng(5).normal(0, 1, (ROWS, COLUMNS))
+    design = np.stack([np.ones_like(s), y + 0 * s, x.T + 0 * s, y**2 + 0 * s, x.T**2 + 0 * s,
+                       y * x.T]).reshape(6, -1).T  # fmt: skip
+    flat = ring.ravel()
+    beyond = flat - design @ np.linalg.lstsq(design, flat, rcond=None)[0]
+    sizes = [parts(noise + more, 1.0).numbers[RING][0] for more in (bowed, ring + bowed)]
+    assert abs(sizes[0]) < SURE
+    assert sizes[1] == pytest.approx(np.linalg.norm(beyond), abs=SURE)
 
 
 def test_bright_pixels_are_counted() -> None:

@@ -32,7 +32,7 @@ def _ranked(**gains: float) -> list[Ranked]:
 def _frames(jumping: float, spread: float) -> WholeFrames:
     made = WholeFrames(Stub(), lambda _: [])  # type: ignore[arg-type] # a stub
     values = {"pixel_fraction": 0.01, "amplitude_dn": 8.0, "switch_probability": 0.2}
-    made.__dict__["_telegraph"] = Stub(jumping=jumping, spread=spread, values=values)
+    made.__dict__["telegraph"] = Stub(jumping=jumping, spread=spread, values=values)
     return made
 
 

@@ -1,5 +1,6 @@
 """Standard errors of parameters: no smaller than pixels, sensors or gaps between levels allow."""
 
+from dataclasses import dataclass
 from math import sqrt
 
 import numpy as np
@@ -7,11 +8,13 @@ import pytest
 
 from analysis.mismatch.candidates import Proposal
 from analysis.mismatch.observe import observe
+from analysis.mismatch.polish import shifted
 from analysis.mismatch.segments import second_path
 from analysis.mismatch.state import Setting, State
 from analysis.mismatch.taking import layout_of
-from analysis.mismatch.uncertainty import inverse_information, settled
+from analysis.mismatch.uncertainty import _slope, inverse_information, settled
 from dsis.camera import Camera
+from dsis.effects.dsnu import Dsnu
 from dsis.effects.hot_pixels import HotPixels
 from mismatch_recordings import COLUMNS, ROWS, camera, recorded
 
@@ -43,6 +46,26 @@ def test_scatter_of_slopes_is_no_information(scatter: float) -> None:
     expected = np.linalg.inv(4 * true.T @ true)
     assert np.diag(inverse) == pytest.approx(np.diag(expected), rel=SURE * 0.01)
     assert share == pytest.approx(1 / (1 + scatter**2 / 8), abs=SURE * 0.01)
+
+
+@dataclass(frozen=True)
+class _Squares:
+    """What numbers do that go with the square of an effect."""
+
+    def changes(self, camera: Camera) -> np.ndarray:
+        (effect,) = camera.effect
+        assert isinstance(effect, Dsnu)
+        return np.full((1, 3), effect.sigma_dn**2)
+
+
+def test_a_slope_is_that_of_the_middle_of_its_step() -> None:
+    """Of sigma^2 = 4 by log sigma it is 8: from 1 to 1.12 sigma alone it would be 9."""
+    effects = (Dsnu(sigma_dn=2.0),)
+    free = [(0, "sigma_dn", False)]
+    (up,), (down,) = (list(shifted(camera(), effects, free, way)) for way in (1, -1))
+    assert up[1] == -down[1] > 0
+    assert _slope(_Squares(), (up, down), 3) == pytest.approx(8, rel=0.01)
+    assert _slope(_Squares(), ((None, 1.0), (None, 1.0)), 3) == pytest.approx(0)
 
 
 def test_few_hot_pixels_tell_their_law_no_better_than_their_number_allows() -> None:

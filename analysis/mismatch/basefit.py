@@ -176,7 +176,7 @@ def _sound(level: Level) -> bool:
     return not clipped and level.variance_dn2 > 0
 
 
-def _cut_off(level: Level, offsets: Offsets, place: Place) -> bool:
+def cut_off(level: Level, offsets: Offsets, place: Place) -> bool:
     """Return whether noise is cut off where the model's is not: its mean says nothing of black."""
     if not level.clipped_low > _CUT:
         return False
@@ -191,7 +191,7 @@ def _black(
         places = [
             place
             for e in layout.exposures
-            if e.kind == "dark" and not _cut_off(levels[place := (e.name, channel)], offsets, place)
+            if e.kind == "dark" and not cut_off(levels[place := (e.name, channel)], offsets, place)
         ]
         if not places:
             black[channel], error[channel] = nominal, np.nan
@@ -218,7 +218,7 @@ def _signals(
         for e in uniform:
             if e.kind == "dark":
                 place = (e.name, channel)
-                if _cut_off(levels[place], offsets, place):
+                if cut_off(levels[place], offsets, place):
                     continue
                 own = levels[place].level_dn - offsets.level_dn.get(place, 0.0)
                 darks.setdefault(e.exposure_time_s, []).append(own)

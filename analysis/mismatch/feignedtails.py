@@ -4,6 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.bank.persistent import BY_LINE, SURFACE
+from analysis.mismatch.basefit import cut_off
+from analysis.mismatch.burst import TAILS
 from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.layout import Place
 from analysis.mismatch.recalibrate import code_step
@@ -22,6 +24,7 @@ _ALIKE = frozenset(
 )  # fmt: skip
 _MOST = 0.5  # of tails, that something else may feign
 _SCATTER = 1.84  # see `coded`
+_TAILS = TAILS | {"read_noise_spread", "rts"}
 _LIKELY = 2.0  # standard deviations that chance may well have
 _FEW_ELECTRONS = 1.0  # skewness of shot noise of one electron: read noise beside it lessens it
 
@@ -41,7 +44,7 @@ def coded(state: State, kind: str, without: Array) -> Denial | None:
     widths = [e.rms_lsb for e in state.camera.effect if isinstance(e, AdcDnl)]
     drawn = float(np.linalg.norm(widths)) if widths else 0.0
     open_ = any(m.statistic in codes for m in state.mismatches)
-    if kind not in ("heavy_tailed_read_noise", "impulse") or not (open_ or drawn):
+    if kind not in TAILS or not (open_ or drawn):
         return None
     claimed: dict[Place, float] = {}
     left: dict[Place, float] = {}
@@ -107,21 +110,52 @@ def placed(state: State, kind: str, without: Array) -> Denial | None:
     """
     lines = any(m.statistic in BY_LINE for m in state.mismatches)
     uneven = lines or any(m.statistic == SURFACE for m in state.mismatches)
-    if kind not in ("heavy_tailed_read_noise", "impulse") or not uneven:
+    if kind not in TAILS or not uneven:
         return None
     own = np.array([key.statistic == "kurtosis_within_pixels" for key in state.vector.keys])
     own &= state.null.known & np.isfinite(without)
-    change = (state.null.mean - without)[own] / state.null.sd[own]
-    seen = (state.vector.values - without)[own] / state.null.sd[own]
-    size = float(np.linalg.norm(change))
+    size, shown = _shown(state, without, own)
     if size < CLEAR:
         few = Denial(0.0, "lines differ in noise, and what is far out may be noise of these")
         return few if lines and kind == "impulse" else None
-    shown = float(change @ seen) / size
     if shown >= max(CLEAR, _MOST * size):
         return None
     why = f"noise differs from place to place, and single pixels show them by {shown:.1f} errors"
     return Denial(0.0, why)
+
+
+def clamped(state: State, kind: str, without: Array) -> Denial | None:
+    """Return how tails or spikes are denied by noise that is cut off at a code; None: they are not.
+
+    What is left of noise that a clamp at black cuts off has another shape, whatever it was before.
+    Where the model's is not cut off, tails must show in the other exposures, surely and by half of
+    what they explain there.
+    """
+    levels, offsets = state.setting.seen.levels, state.calibrated.offsets
+    cut = {p for p, own in levels.items() if cut_off(own, offsets, p)}
+    if kind not in _TAILS or not cut:
+        return None
+    own = np.array(
+        [
+            key.scope == "exposure"
+            and key.statistic in _SHAPES
+            and (key.exposure, key.channel) not in cut
+            for key in state.vector.keys
+        ]
+    )
+    own &= state.null.known & np.isfinite(without)
+    size, shown = _shown(state, without, own)
+    if shown >= max(CLEAR, _MOST * size):
+        return None
+    return Denial(0.0, "noise is cut off at a code, and shows none where it is not")
+
+
+def _shown(state: State, without: Array, own: NDArray[np.bool_]) -> tuple[float, float]:
+    """Return what an effect changes some numbers by, and how far they go along, in errors."""
+    change = (state.null.mean - without)[own] / state.null.sd[own]
+    seen = (state.vector.values - without)[own] / state.null.sd[own]
+    size = float(np.linalg.norm(change))
+    return size, float(change @ seen) / size if size > 0 else 0.0
 
 
 def replaced(state: State, kind: str) -> Denial | None:

@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 from analysis.mismatch.candidates import CANDIDATES, Proposal
+from analysis.mismatch.candidates.patterns import of_any_shape
 from analysis.mismatch.credited import given_back
 from analysis.mismatch.named import Named, camera_without, renewed
 from analysis.mismatch.own import Own, called, explained, refitted, resized, sizes, without_own
@@ -73,7 +74,7 @@ class Fitted:
         bare, mine = self._parts(state)
         if not mine:
             return state
-        camera = self._fitted(bare, *settled(state, bare, mine))
+        camera = self._fitted(bare, *settled(state, bare, [of_any_shape(own) for own in mine]))
         if camera is None:
             return state
         # Beside what is named now, the user's sizes may do.

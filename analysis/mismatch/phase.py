@@ -8,20 +8,16 @@ the chance of the largest of all frequencies is known.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.aliases import aliases, strongest
+from analysis.mismatch.asked import FramesAsked
 from analysis.mismatch.bandgain import gain_of_bands, place_of_bands
 from analysis.mismatch.instance import Frequency, frequency_of, same_line
 from analysis.mismatch.layout import Layout
-from analysis.mismatch.paired import Pairs, pairs_of
 from analysis.mismatch.projections import LEAST, SURE, FramesOf, Power, projections
-from analysis.mismatch.rowlaw import RowLaw
-from analysis.mismatch.rowpower import Size, row_powers
-from analysis.mismatch.telegraph import Telegraph, telegraph
 from dsis.effects import Effect
 from dsis.effects.line_flicker import LineFlicker
 from dsis.effects.rts import Rts
@@ -51,20 +47,9 @@ _BROAD = "frequencies beside it are raised as well: it is no line"
 
 
 @dataclass(frozen=True)
-class WholeFrames:
-    """What whole frames say of lines, asked once for each.
+class WholeFrames(FramesAsked):
+    """What whole frames say of lines, and of pixels that jump, asked once for each."""
 
-    Attributes
-    ----------
-    layout, frames_of
-        The frames.
-    jobs
-        Threads that look at them.
-    """
-
-    layout: Layout
-    frames_of: FramesOf
-    jobs: int = 1
     _shown: dict[Frequency, bool] = field(default_factory=dict)
     _looks: dict[Frequency, "Look"] = field(default_factory=dict)
     _gains: dict[tuple[Frequency, bool], float] = field(default_factory=dict)
@@ -118,7 +103,7 @@ class WholeFrames:
         The parameters that are so known, and their errors.
         """
         if isinstance(effect, Rts):
-            seen = self._telegraph
+            seen = self.telegraph
             sure = seen is not None and seen.gain >= SURE and seen.known
             return (seen.values, seen.errors) if seen is not None and sure else None
         if isinstance(effect, LineFlicker):
@@ -127,33 +112,6 @@ class WholeFrames:
             return None if place is None else ({name: place[0]}, {name: place[1]})
         line = self.line(effect)
         return None if line is None else (line.values, line.errors)
-
-    @cached_property
-    def _telegraph(self) -> Telegraph | None:
-        """The pixels that jump; of a large recording nothing is asked."""
-        if self.layout.large:
-            return None
-        return telegraph(self.layout, self.frames_of, self.jobs)
-
-    def spread_rather(self, sure: float) -> float:
-        """Return by how much frames prefer read noises that spread to pixels that jump, nats.
-
-        What one gains that is `sure` where the other is not, negative of jumps; else 0.
-        """
-        seen = self._telegraph
-        if seen is None or (seen.spread > sure) == (seen.jumping > sure):
-            return 0.0
-        return seen.spread if seen.spread > sure else -seen.jumping
-
-    def no_jumps(self, sure: float) -> bool:
-        """Return whether frames are `sure` that noisy pixels do not jump, nats."""
-        return self._telegraph is not None and self._telegraph.jumping < -sure
-
-    @property
-    def jumps(self) -> Rts | None:
-        """The pixels that jump, of the most likely numbers; None: nothing is asked."""
-        seen = self._telegraph
-        return None if seen is None else Rts.model_validate({"kind": "rts", **seen.values})
 
     def line(self, effect: Effect) -> "Line | None":
         """Return amplitude and frequency of a line; None: too little is seen.
@@ -187,7 +145,7 @@ class WholeFrames:
         them there too. Minus infinity where frames deny the line, or cannot tell.
         """
         if isinstance(effect, Rts):
-            return -np.inf if self._telegraph is None else self._telegraph.gain
+            return -np.inf if self.telegraph is None else self.telegraph.gain
         if isinstance(effect, LineFlicker):
             at = effect.cycles_per_frame
             if at not in self._bands:
@@ -214,17 +172,6 @@ class WholeFrames:
         anywhere = float(np.log(self.layout.rows * self.layout.columns / 2 / share))
         chosen = float(np.log(_FEW)) if kept and self._looks[frequency].exact else anywhere
         return line.there(power, kept=kept, real=real) - chosen
-
-    @cached_property
-    def pairs(self) -> Pairs:
-        """What successive frames share, of even and of odd numbers."""
-        return pairs_of(self.layout, self.frames_of)
-
-    @cached_property
-    def rows(self) -> RowLaw:
-        """What they say of the causes that make rows alike."""
-        powers = row_powers(self.layout, self.frames_of)
-        return RowLaw(Size(self.layout.rows, self.layout.columns), powers)
 
     @property
     def _size(self) -> tuple[int, int]:

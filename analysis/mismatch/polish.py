@@ -149,11 +149,14 @@ def jacobian(
 
 
 def shifted(
-    camera: Camera, effects: tuple[Effect, ...], free: Sequence[Free]
+    camera: Camera, effects: tuple[Effect, ...], free: Sequence[Free], way: int = 1
 ) -> Iterator[tuple[Camera | None, float]]:
-    """Yield the camera with each free parameter moved in turn, or None, and by how much."""
+    """Yield the camera with each free parameter moved in turn, or None, and by how much.
+
+    It moves up, or down where `way` is -1.
+    """
     for i, name, signed in free:
-        other = moved(effects, i, name, signed, _step(camera, effects[i], name))
+        other = moved(effects, i, name, signed, way * _step(camera, effects[i], name))
         yield (None, 1.0) if other is None else (with_effects(camera, other[0]), other[1])
 
 

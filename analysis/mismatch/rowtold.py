@@ -5,6 +5,7 @@ from dataclasses import replace
 from functools import partial
 from math import isfinite
 
+from analysis.mismatch.burst import TAILS
 from analysis.mismatch.contradicted import Denial, rival
 from analysis.mismatch.forms import OTHER_LEVELS
 from analysis.mismatch.jumptold import PIXELS, as_pixels_show, unlike_pixels
@@ -61,6 +62,8 @@ def unlike_frames(
     """
     if best.kind in STEADY and frames is not None and (paired := frames.pairs.denial(best.kind)):
         return paired
+    if best.kind in TAILS and frames is not None and (burst := frames.bursts.denial(best.kind)):
+        return burst
     if best.kind in PIXELS:
         return unlike_pixels(state.camera, frames, best, others, partial(_explained, state))
     if (denial := no_field(state, best.polished.effects[0])) is not None:

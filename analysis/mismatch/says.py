@@ -49,6 +49,7 @@ _WORDS = {
     "fixed_smooth_variance": "the mean frame has a smooth fixed surface",
     "fixed_smooth_tilt": "the mean frame leans to one side",
     "fixed_smooth_falloff": "the mean frame falls or rises towards its corners",
+    "fixed_smooth_ring": "the mean frame is lighter or darker between its centre and its corners",
     "fixed_edge": "the mean frame decays from an edge",
     "fixed_patch_variance": "pixels that lie together have fixed deviations in common",
     "outlying_patch": "a patch of pixels stands out of the fixed pattern",

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.bank.key import Key
+from analysis.mismatch.bank.surfaces import RING
 from dsis.camera import Camera
 from dsis.effects import Effect
 
@@ -26,7 +27,7 @@ _CORRELATIONS = frozenset(
     {"correlation_0_1", "correlation_1_0", "correlation_1_1", "correlation_0_2", "correlation_2_0"}
 )
 _SIDED = frozenset(
-    {"half_seam", "parity", "fixed_edge", "fixed_smooth_tilt", "fixed_smooth_falloff"}
+    {"half_seam", "parity", "fixed_edge", "fixed_smooth_tilt", "fixed_smooth_falloff", RING}
 )
 # A mean over frames keeps 1/T of the lines' and frames' own noise.
 _FOLLOWS = {
@@ -52,6 +53,7 @@ _FOLLOWS = {
     "fixed_edge": _FIXED | _LINES,
     "fixed_smooth_tilt": _FIXED | _LINES,
     "fixed_smooth_falloff": _FIXED | _LINES,
+    RING: _FIXED | _LINES,
     "parity": _FIXED | _LINES,
     "channel_ratio": frozenset({"level"}),
     "level": frozenset({"level", "frame_variance"}),

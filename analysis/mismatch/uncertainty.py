@@ -24,6 +24,7 @@ from analysis.mismatch.polish import (
     shifted,
     with_effects,
 )
+from analysis.mismatch.predict import Predictor
 from analysis.mismatch.state import State
 from dsis.camera import Camera
 from dsis.effects import Effect
@@ -79,8 +80,7 @@ def settled(
         corrected = effects
     for (i, name, signed), half in zip(free, reach, strict=True):
         value = abs(float(getattr(corrected[i], name)))
-        far = value * np.sinh(half) if half < _FARTHEST else np.inf
-        own = half if signed else far
+        own = half if signed else value * np.sinh(min(half, _FARTHEST))
         errors[i][name] = float(own) / _NORMAL
     return corrected, errors
 
@@ -110,20 +110,35 @@ def _information(
 def _slopes(
     state: State, replicates: int, bare: Camera, effects: tuple[Effect, ...], free: Sequence[Free]
 ) -> Array:
-    """Return how numbers move with each parameter: (replicate, number, parameter)."""
+    """Return how numbers move with each parameter: (replicate, number, parameter).
+
+    From below it to above it: numbers that go with its square rise by an eighth more above it.
+    """
     alike = [state.setting.alike(effects[i]) for i, _, _ in free]
-    beside = list(shifted(bare, effects, free))
+    ways = [list(shifted(bare, effects, free, way)) for way in (1, -1)]
     asked = {same: state.predictor(1 if same else replicates) for same in set(alike)}
     for same, predictor in asked.items():
-        predictor.ready(other for own, (other, _) in zip(alike, beside, strict=True) if own == same)
+        predictor.ready(
+            other
+            for beside in ways
+            for own, (other, _) in zip(alike, beside, strict=True)
+            if own == same
+        )
     size = state.null.mean.size
     columns = [
-        np.zeros((replicates, size))
-        if other is None
-        else np.broadcast_to(asked[same].changes(other) / step, (replicates, size))
-        for same, (other, step) in zip(alike, beside, strict=True)
+        np.broadcast_to(_slope(asked[same], both, size), (replicates, size))
+        for same, both in zip(alike, zip(*ways, strict=True), strict=True)
     ]
     return np.stack(columns, 2)
+
+
+def _slope(predictor: Predictor, both: Sequence[tuple[Camera | None, float]], size: int) -> Array:
+    """Return the slope between the cameras that there are, one of them the state's own if not."""
+    there = [(predictor.changes(other), by) for other, by in both if other is not None]
+    if not there:
+        return np.zeros(size)
+    (first, up), (last, down) = there[0], (there[1] if len(there) > 1 else (0.0, 0.0))
+    return np.asarray((first - last) / (up - down))
 
 
 def inverse_information(slopes: Array, weights: Array) -> tuple[Array, float]:

@@ -53,6 +53,7 @@ STATISTICS = {
     "fixed_smooth_variance": "smooth fixed pattern",
     "fixed_smooth_tilt": "tilt of the fixed pattern",
     "fixed_smooth_falloff": "fall of the fixed pattern towards the corners",
+    "fixed_smooth_ring": "ring of the fixed pattern between centre and corner",
     "fixed_edge": "decay of the fixed pattern from an edge",
     "fixed_patch_variance": "fixed pattern of patches of pixels",
     "outlying_patch": "patch of pixels that stands out",

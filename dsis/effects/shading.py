@@ -5,8 +5,10 @@ from functools import lru_cache
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
+from dsis.cfa import Cfa
 from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, Stage
 from dsis.grid import PixelGrid
 from dsis.lines import Line, lit
@@ -15,13 +17,15 @@ from dsis.lines import Line, lit
 class Shading(Effect):
     """A fixed smooth fall-off of light: to the corners, and to one side where light is uneven.
 
-    S'(y, x) = S(y, x) max(1 - f r^2 / R^2 + a v + b u + c (v^2 - 1/3) + d (u^2 - 1/3), 0), from the
-    sensor's centre: r the distance and R the corner's, v = y / Y and u = x / X, Y and X half the
-    height and width. On a whole sensor the mean falls by f S / 3, for the mean of r^2 / R^2 is 1/3;
-    tilts a, down, and b, to the right, leave it where light ends nowhere, and so do bows c and d,
-    which rise to both ends where they are positive. A lamp beside the axis gives a fall and a tilt,
-    and so does a part of a sensor, whose centre is another; an integrating sphere or a lamp behind
-    a slit, bows.
+    S'(y, x) = S(y, x) max(1 - f s + e s (1 - s) + a v + b u + c (v^2 - 1/3) + d (u^2 - 1/3), 0),
+    from the sensor's centre: s = r^2 / R^2, r the distance and R the corner's, v = y / Y and
+    u = x / X, Y and X half the height and width. On a whole sensor the mean falls by f S / 3, for
+    the mean of s is 1/3; tilts a, down, and b, to the right, leave it where light ends nowhere, and
+    so do bows c and d, which rise to both ends where they are positive. The ring e is light between
+    centre and corner beside what the square of the distance has: below 0 of the fourth power of the
+    cosine (-0.43 f where the corner is 30 degrees off the axis), above 0 of edges of a lens that
+    shade the corners alone. A lamp beside the axis gives a fall and a tilt, and so does a part of a
+    sensor, whose centre is another; an integrating sphere or a lamp behind a slit, bows.
     """
 
     kind: Literal["shading"] = "shading"
@@ -30,6 +34,7 @@ class Shading(Effect):
     tilt_right_percent: Annotated[float, Field(ge=-100, le=100)] = 0.0
     bow_down_percent: Annotated[float, Field(ge=-100, le=100)] = 0.0
     bow_right_percent: Annotated[float, Field(ge=-100, le=100)] = 0.0
+    ring_percent: Annotated[float, Field(ge=-400, le=400)] = 0.0
 
     stage: ClassVar[Stage] = Stage.LIGHT
     draws: ClassVar[bool] = False
@@ -50,6 +55,8 @@ class Shading(Effect):
 
     def apply(self, image: Image, exposure: Exposure) -> Image:
         """Multiply by the light that reaches each pixel."""
+        if self.ring_percent:
+            return np.asarray(image * _whole(self, exposure.grid))
         down, across, ends = _light(self, exposure.grid)
         if not ends:
             return lit(image, down, across)
@@ -59,6 +66,14 @@ class Shading(Effect):
 
     def contributions(self, point: OperatingPoint) -> Mapping[str, float]:
         """Return what mean and shot noise lose, and the variance of the whole sensor's light."""
+        if self.ring_percent:
+            whole = _uncut(self, PixelGrid(point.rows, point.columns, Cfa.MONO))
+            gained = float(whole.mean()) - 1
+            return {
+                "level": gained * point.signal_dn,
+                "pixel_variance": gained * point.shot_variance_dn2,
+                "fixed_smooth_variance": float(whole.var()) * point.signal_dn**2,
+            }
         f, h2, w2 = self.falloff_percent / 100, point.rows**2, point.columns**2
         down, right = self.bow_down_percent / 100, self.bow_right_percent / 100
         lost = f * (h2 + w2 - 2) / (3 * (h2 + w2)) + down / (3 * h2) + right / (3 * w2)
@@ -91,3 +106,21 @@ def _light(effect: Shading, grid: PixelGrid) -> tuple[Line, Line, bool]:
     for line in lines:
         line.flags.writeable = False
     return *lines, bool(down.min() + across.min() < 0)
+
+
+@lru_cache(maxsize=16)
+def _whole(effect: Shading, grid: PixelGrid) -> Image:
+    """Return the light of every pixel: float32 (row, column), or (row, column, 1) of colours."""
+    light = np.maximum(_uncut(effect, grid), 0).astype(np.float32)
+    light.flags.writeable = False
+    return light
+
+
+def _uncut(effect: Shading, grid: PixelGrid) -> NDArray[np.float64]:
+    """Return the light of every pixel as if it could be below nothing."""
+    down, across, _ = _light(effect, grid)
+    rows, columns = grid.sensor_shape
+    y = grid.row_numbers() - (rows - 1) / 2
+    x = grid.column_numbers() - (columns - 1) / 2
+    s = (y**2 + x**2) / ((rows / 2) ** 2 + (columns / 2) ** 2)
+    return np.asarray(down.astype(np.float64) + across + effect.ring_percent / 100 * s * (1 - s))

@@ -18,7 +18,7 @@ from analysis.mismatch.bank.patches import OUTLYING_PATCH, SIZES
 from analysis.mismatch.bank.periods import FEW_PIXELS
 from analysis.mismatch.bank.persistent import BY_LINE, OUTSTANDING, SURFACE
 from analysis.mismatch.bank.seams import WHOLE
-from analysis.mismatch.bank.surfaces import LOW
+from analysis.mismatch.bank.surfaces import LOW, RING
 from analysis.mismatch.bank.together import TOGETHER
 
 BOTH = "along rows and columns"
@@ -31,7 +31,7 @@ PERSISTENT = "of read noise, in all exposures"
 LAG = 0.1  # share of one of many lags along a line, in that of another sum
 _TWO_SIDED = frozenset({"pixel_variance", "channel_ratio", "half_seam", "parity",
                         "fixed_edge", "line_correlation", "carry_over", "fixed_smooth_tilt",
-                        "fixed_smooth_falloff"})  # fmt: skip
+                        "fixed_smooth_falloff", RING})  # fmt: skip
 # Sums over exposures: statistic, how what it shows grows with the signal.
 SHAPED: Mapping[str, tuple[str, ...]] = {
     "row_variance": ("constant", "with the signal squared"),
@@ -95,7 +95,7 @@ _SPECTRA = frozenset({"spectral_peak", "row_spectrum_peak", "column_spectrum_pea
                       "patch_variance", "slow_row_variance", "row_correlation",
                       "slow_column_variance", "code_imbalance"})  # fmt: skip
 _SHARED = frozenset({"fixed_row_variance", "fixed_column_variance", "fixed_smooth_variance",
-                     "fixed_smooth_tilt", "fixed_smooth_falloff", "fixed_edge",
+                     "fixed_smooth_tilt", "fixed_smooth_falloff", RING, "fixed_edge",
                      "fixed_patch_variance", OUTLYING_PATCH, "half_seam",
                      "outlying_pixels"})  # fmt: skip
 

@@ -15,7 +15,8 @@ from dsis.measures.fixed_pattern import Smooth
 Array = NDArray[np.float64]
 LOW = "low order"
 _OF_LOW = f"fixed_smooth_variance of {LOW}"
-_BOWED = 2  # degree of surfaces that bow
+_BOWED, _OF_RING = 2, 4  # degree of surfaces that bow, and of a ring
+RING = "fixed_smooth_ring"
 
 
 def surfaces(
@@ -69,7 +70,8 @@ def slopes(
     """Return the tilt along each axis and the fall to the corners, each in its own noise.
 
     Of the same coefficients and squares as `surfaces`; by the shape, rows and columns, a fall with
-    the distance from the centre bends along both.
+    the distance from the centre bends along both. What is lighter between centre and corner, beside
+    all that leans and bows, is a ring: of planes that have polynomials of degree 4.
     """
     row, column, square = squares
     if len(coefficients) < 3:
@@ -81,10 +83,15 @@ def slopes(
     )
     n, m = float(shape[0]) ** 2, float(shape[1]) ** 2
     fall = n * bow_down + m * bow_across
+    ring = _ringed(shape[0], shape[1])[: len(coefficients), : len(coefficients)]
+    noise = np.full(ring.shape, square)
+    noise[:, 0], noise[0] = down, across
+    scatter = sqrt(float((ring**2 * noise).sum()))
     return {
         "fixed_smooth_tilt of rows": (tilt_down / sqrt(down), 1.0),
         "fixed_smooth_tilt of columns": (tilt_across / sqrt(across), 1.0),
         "fixed_smooth_falloff": (fall / sqrt(n**2 * down + m**2 * across), 1.0),
+        **({RING: (float((ring * coefficients).sum()) / scatter, 1.0)} if scatter else {}),
     }
 
 
@@ -100,6 +107,21 @@ def _rising(rows: int, columns: int) -> tuple[float, ...]:
     smooth = Smooth.of(rows, columns)
     signed = np.outer(np.sign(smooth.along_rows[-1]), np.sign(smooth.along_columns[-1]))
     return tuple(float(signed[place]) for place in _LOWEST)
+
+
+@lru_cache(maxsize=64)
+def _ringed(rows: int, columns: int) -> Array:
+    """Return coefficients of a ring's light, s (1 - s), of degree 3 and more: (degree, degree).
+
+    s is the square of the distance from the centre, 1 in the corner.
+    """
+    y, x = ((np.arange(size) - (size - 1) / 2)[:, np.newaxis] for size in (rows, columns))
+    s = (y**2 + x.T**2) / (rows**2 + columns**2) * 4
+    found = Smooth.of(rows, columns).coefficients(s * (1 - s))
+    order = np.add.outer(np.arange(len(found)), np.arange(len(found)))
+    own = np.where((order > _BOWED) & (order <= _OF_RING), found, 0.0)
+    own.flags.writeable = False
+    return own
 
 
 @dataclass(frozen=True, eq=False)

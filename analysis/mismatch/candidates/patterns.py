@@ -9,6 +9,7 @@ import scipy.optimize
 from numpy.typing import NDArray
 
 from analysis.mismatch.bank.seams import WHOLE
+from analysis.mismatch.bank.surfaces import RING
 from analysis.mismatch.bank.together import TOGETHER
 from analysis.mismatch.candidates.candidate import Candidate, Proposal, proposals
 from analysis.mismatch.candidates.parts import unequal_parts
@@ -18,13 +19,16 @@ from analysis.mismatch.layout import Layout, Place
 from dsis.effects import Effect
 from dsis.effects.amp_glow import AmpGlow
 from dsis.grid import PixelGrid
+from dsis.measures.fixed_pattern import Smooth
 
 Array = NDArray[np.float64]
 _FALL = "falloff_percent"
 _TILTS = ("tilt_down_percent", "tilt_right_percent")
 _BOWS = ("bow_down_percent", "bow_right_percent")
-_ROUND, _BOWED = (_FALL, *_TILTS), (*_TILTS, *_BOWS)
-SURFACES = frozenset({_FALL, *_BOWED})
+_RING = "ring_percent"
+_ROUND, _RINGED, _BOWED = (_FALL, *_TILTS), (_FALL, *_TILTS, _RING), (*_TILTS, *_BOWS)
+SURFACES = frozenset({*_RINGED, *_BOWED})
+_BOWS_DEGREE = 2
 _CLEAR = 3.0  # standard errors from which a tilt is worth a trial
 _JUMP = 0.15  # z of the step where halves meet, of that of their means: some 0.4 of two amplifiers
 _UNEVEN = ("shading", "line_settling", "tap_mismatch")
@@ -35,7 +39,7 @@ PLACES = (
 EXTENTS = (0.05, 0.1, 0.2, 0.35, 0.6)  # of the sensor's longer side, to start from
 _WIDEST_GLOW = 1.0  # of it: what falls off by less is as good as the same everywhere
 _OF_EXTENT = 0.01  # of its logarithm
-_SMOOTH = ("fixed_smooth_variance", "fixed_smooth_tilt", "fixed_smooth_falloff")
+_SMOOTH = ("fixed_smooth_variance", "fixed_smooth_tilt", "fixed_smooth_falloff", RING)
 
 
 def _constant(kind: str, statistic: str) -> Candidate:
@@ -62,7 +66,10 @@ def _gains(kind: str, statistic: str) -> Candidate:
 
 
 def _shading(clues: Clues) -> Sequence[Proposal]:
-    """Start from the surface that fits the gain: a fall to the corners, tilts, bows."""
+    """Start from the surface that fits the gain: a fall to the corners, tilts, bows.
+
+    Between centre and corner the fall has a shape of its own where all channels together tell it.
+    """
     if not clues.image("gain"):
         return _of_strength(clues)
     round_, clear = _fitted(clues, _ROUND)
@@ -70,14 +77,32 @@ def _shading(clues: Clues) -> Sequence[Proposal]:
     found: list[Proposal] = []
     for names in ([_FALL], leaning, [_FALL, *leaning] if leaning else []):
         found += _of_light(round_, names)
+    ringed, clear = _fitted(clues, _RINGED)
+    if _RING in clear:
+        found += _of_light(ringed, [_FALL, *leaning, _RING])
     bowed, clear = _fitted(clues, _BOWED)
     if any(name in clear and bowed[name] > 0 for name in _BOWS):  # no fall rises to the ends
         found += _of_light(bowed, [name for name in _BOWED if name in clear])
     return found
 
 
+def of_any_shape(proposal: Proposal) -> Proposal:
+    """Return a fall of light whose shape between centre and corner is fitted as well.
+
+    Where it is not clear, how far the light falls in the corners is the less known for it.
+    """
+    if _FALL not in proposal.free or _RING in proposal.free:
+        return proposal
+    return replace(
+        proposal, free=(*proposal.free, _RING), signed=frozenset({*proposal.signed, _RING})
+    )
+
+
 def _fitted(clues: Clues, names: Sequence[str]) -> tuple[dict[str, float], set[str]]:
-    """Return what the gain has of each surface, per cent, and which are clear."""
+    """Return what the gain has of each surface, per cent, and which are clear.
+
+    A ring is one of many smooth surfaces: it is clear beside what else they have.
+    """
     values, errors = np.zeros(len(names)), np.zeros(len(names))
     images = clues.image("gain")
     for channel, (image, noise) in images.items():
@@ -85,12 +110,24 @@ def _fitted(clues: Clues, names: Sequence[str]) -> tuple[dict[str, float], set[s
         inverse = np.linalg.inv(shapes @ shapes.T)
         scale = 100 / clues.scale("gain", channel) / len(images)
         rest = scale * (image - image.mean()).ravel() - had(clues, channel) / len(images)
-        values += inverse @ shapes @ rest
-        errors = np.hypot(errors, scale * noise * np.sqrt(np.diag(inverse)))
-    own = dict(zip(names, values.tolist(), strict=True))
+        own = inverse @ shapes @ rest
+        values += own
+        scatter = scale * noise
+        if _RING in names:
+            scatter = max(scatter, _smooth_scatter((rest - own @ shapes).reshape(image.shape)))
+        errors = np.hypot(errors, scatter * np.sqrt(np.diag(inverse)))
+    found = dict(zip(names, values.tolist(), strict=True))
     clear = {name for name, error in zip(names, errors, strict=True)
-             if abs(own[name]) > _CLEAR * error}  # fmt: skip
-    return own, clear
+             if abs(found[name]) > _CLEAR * error}  # fmt: skip
+    return found, clear
+
+
+def _smooth_scatter(image: Array) -> float:
+    """Return the root mean square of an image's surfaces that neither lean nor bow."""
+    coefficients = Smooth.of(*image.shape).coefficients(image)
+    order = np.add.outer(*(np.arange(size) for size in coefficients.shape))
+    own = coefficients[(order > _BOWS_DEGREE) & (order <= coefficients.shape[0] - 1)]
+    return float(np.sqrt((own**2).mean())) if own.size else 0.0
 
 
 def _of_strength(clues: Clues) -> Sequence[Proposal]:
@@ -133,7 +170,8 @@ def surfaces(shape: tuple[int, ...], names: Sequence[str]) -> Array:
     y, x = ((np.arange(size) - (size - 1) / 2) / (size / 2) for size in shape)
     y = y[:, None]
     fall = -((n * y) ** 2 + (m * x) ** 2) / (n**2 + m**2)
-    every = dict(zip((_FALL, *_BOWED), (fall, y, x, y**2, x**2), strict=True))
+    own = fall, -fall * (1 + fall), y, x, y**2, x**2
+    every = dict(zip((_FALL, _RING, *_BOWED), own, strict=True))
     made = np.stack([np.broadcast_to(every[name], shape).ravel() for name in names])
     return np.asarray(made - made.mean(1, keepdims=True))
 

@@ -17,8 +17,8 @@ Array = NDArray[np.float64]
 NOISY = "variance"
 UNITS = {"offset": "DN", "gain": "%", "time": "DN/s", NOISY: "variance over its mean"}
 # What no single exposure shows by itself: channels together may be clear, where each is not.
-_MAPS_ALONE = ("fixed_smooth_tilt", "fixed_smooth_falloff", "half_seam", "parity",
-               "fixed_edge", "fixed_spectral_peak")  # fmt: skip
+_MAPS_ALONE = ("fixed_smooth_tilt", "fixed_smooth_falloff", "fixed_smooth_ring", "half_seam",
+               "parity", "fixed_edge", "fixed_spectral_peak")  # fmt: skip
 KINDS = (*MAPS, *(f"{name} alone" for name in ALONE))
 
 

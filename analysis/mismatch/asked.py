@@ -1,0 +1,74 @@
+"""What whole frames say of pixels that jump, of pairs and rows of frames, and of bursts."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+from analysis.mismatch.burst import Bursts, bursts_of
+from analysis.mismatch.layout import Layout
+from analysis.mismatch.paired import Pairs, pairs_of
+from analysis.mismatch.projections import FramesOf
+from analysis.mismatch.rowlaw import RowLaw
+from analysis.mismatch.rowpower import Size, row_powers
+from analysis.mismatch.telegraph import Telegraph
+from analysis.mismatch.telegraph import telegraph as find_telegraph
+from dsis.effects.rts import Rts
+
+
+@dataclass(frozen=True)
+class FramesAsked:
+    """Frames that are asked once for each of these.
+
+    Attributes
+    ----------
+    layout, frames_of
+        The frames.
+    jobs
+        Threads that look at them.
+    """
+
+    layout: Layout
+    frames_of: FramesOf
+    jobs: int = 1
+
+    @cached_property
+    def telegraph(self) -> Telegraph | None:
+        """The pixels that jump; of a large recording nothing is asked."""
+        if self.layout.large:
+            return None
+        return find_telegraph(self.layout, self.frames_of, self.jobs)
+
+    def spread_rather(self, sure: float) -> float:
+        """Return by how much frames prefer read noises that spread to pixels that jump, nats.
+
+        What one gains that is `sure` where the other is not, negative of jumps; else 0.
+        """
+        seen = self.telegraph
+        if seen is None or (seen.spread > sure) == (seen.jumping > sure):
+            return 0.0
+        return seen.spread if seen.spread > sure else -seen.jumping
+
+    def no_jumps(self, sure: float) -> bool:
+        """Return whether frames are `sure` that noisy pixels do not jump, nats."""
+        return self.telegraph is not None and self.telegraph.jumping < -sure
+
+    @property
+    def jumps(self) -> Rts | None:
+        """The pixels that jump, of the most likely numbers; None: nothing is asked."""
+        seen = self.telegraph
+        return None if seen is None else Rts.model_validate({"kind": "rts", **seen.values})
+
+    @cached_property
+    def pairs(self) -> Pairs:
+        """What successive frames share, of even and of odd numbers."""
+        return pairs_of(self.layout, self.frames_of)
+
+    @cached_property
+    def bursts(self) -> Bursts:
+        """How much of their tails lies in single lines."""
+        return bursts_of(self.layout, self.frames_of)
+
+    @cached_property
+    def rows(self) -> RowLaw:
+        """What they say of the causes that make rows alike."""
+        powers = row_powers(self.layout, self.frames_of)
+        return RowLaw(Size(self.layout.rows, self.layout.columns), powers)

@@ -14,7 +14,7 @@ from analysis.mismatch.layout import Layout
 from analysis.mismatch.taking import layout_of
 from dsis.cfa import Cfa
 from dsis.effects import registry
-from mismatch_recordings import FEW_LEVELS, InMemory, camera, recorded
+from mismatch_recordings import FEW_LEVELS, InMemory, camera, recorded, state_of
 
 ROWS, COLUMNS, FRAMES = 64, 80, 12
 SURE = 5.0  # standard errors

@@ -27,7 +27,7 @@ def gains_beside(clues: Clues, effects: Sequence[Effect]) -> Array | None:
     layout, images = clues.layout, clues.image("gain")
     if set(images) != set(layout.sites):
         return None
-    grid, step = PixelGrid(layout.rows, layout.columns, layout.cfa), 1 + (len(layout.sites) > 1)
+    grid, step = layout.grid, 1 + (len(layout.sites) > 1)
     if not any(_moves(own) for own in effects):
         return _whole(clues, images, {})
     made = {}
@@ -36,7 +36,7 @@ def gains_beside(clues: Clues, effects: Sequence[Effect]) -> Array | None:
         for channel, (y, x) in layout.sites.items():
             even[y::step, x::step] = max(layout.signal_dn[taken.name, channel], 0.0)
         time_s, read_out = taken.exposure_time_s, clues.camera.read_out
-        made[taken.name] = mean_frame(even, effects, grid, read_out, time_s)
+        made[taken.name] = layout.seen(mean_frame(even, effects, grid, read_out, time_s))
     return _whole(clues, images, made)
 
 

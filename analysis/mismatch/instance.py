@@ -47,13 +47,13 @@ def same_line(one: Frequency, other: Frequency, rows: int, columns: int, step: i
 
 def same_place(one: Effect, other: Effect, layout: Layout) -> bool:
     """Return whether two effects are waves of one frequency: bands of light go down the rows."""
-    first, second = (_wave(own, layout.rows) for own in (one, other))
+    first, second = (_wave(own, layout) for own in (one, other))
     if first is None or second is None:
         return False
     return same_line(first, second, layout.rows, layout.columns)
 
 
-def _wave(effect: Effect, rows: int) -> Frequency | None:
+def _wave(effect: Effect, layout: Layout) -> Frequency | None:
     if isinstance(effect, LineFlicker):
-        return 0.0, effect.cycles_per_frame / rows
+        return 0.0, layout.seen_cycles(effect.cycles_per_frame) / layout.rows
     return frequency_of(effect)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cache, cached_property
+from functools import cache, cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,10 @@ from numpy.typing import NDArray
 from analysis.mismatch.bank.maps import Regressors
 from analysis.mismatch.scenes import SCENE, Local, Scene
 from dsis.cfa import Cfa, pattern
+from dsis.effects import Image
+from dsis.grid import PixelGrid
 
+_grid = lru_cache(maxsize=8)(PixelGrid)  # fields are found sooner by the very same grid
 _LARGE = 2.5e7  # samples
 _OF_FULL = 1e-9  # of the weight of a flat whose pixels are full: it says nothing of gains
 Place = tuple[str, str]
@@ -65,6 +68,8 @@ class Layout:
     full
         Where noise is far less than in flats of less light: pixels are full, and their gains do
         not show.
+    unseen
+        Rows and columns of the frames beyond the last ones that are looked at.
     """
 
     exposures: tuple[Taken, ...]
@@ -79,6 +84,20 @@ class Layout:
     moving: tuple[str, ...] = ()
     still: frozenset[Place] = frozenset()
     full: frozenset[Place] = frozenset()
+    unseen: tuple[int, int] = (0, 0)
+
+    @property
+    def grid(self) -> PixelGrid:
+        """The whole frames, with what is not looked at: charge crosses the edge of that."""
+        return _grid(self.rows + self.unseen[0], self.columns + self.unseen[1], self.cfa)
+
+    def seen(self, frame: Image) -> Image:
+        """Return what is looked at of a whole frame (row, column)."""
+        return np.ascontiguousarray(frame[: self.rows, : self.columns])
+
+    def seen_cycles(self, cycles_per_frame: float) -> float:
+        """Return cycles in the rows that are looked at of cycles in those of a whole frame."""
+        return cycles_per_frame * self.rows / (self.rows + self.unseen[0])
 
     @property
     def samples(self) -> int:
@@ -108,7 +127,8 @@ class Layout:
         axis = int(edge in ("left", "right"))
         size = (self.rows, self.columns)[axis]
         line = np.arange(self.sites[channel][axis], size, 1 + (len(self.sites) > 1))
-        distance = line if edge in ("left", "top") else size - 1 - line
+        last = size + self.unseen[axis] - 1
+        distance = line if edge in ("left", "top") else last - line
         return distance.astype(np.float64)
 
     @property

@@ -10,7 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from contextvars import ContextVar, copy_context
 from dataclasses import dataclass, replace
-from functools import lru_cache, partial
+from functools import partial
 from typing import Any, TypeVar
 
 import numpy as np
@@ -26,7 +26,6 @@ from dsis.draw import Draw, keep_fields
 from dsis.effects import Image
 from dsis.effects.pink_noise import keep_series
 from dsis.exposing import Drawn, Shared, Shutter
-from dsis.grid import PixelGrid
 from dsis.simulate.shot import tiled
 from dsis.workers import Workers, workers
 
@@ -37,7 +36,6 @@ R = TypeVar("R")
 _KEPT_BYTES = 400 << 20  # of pink noise, in each process: 300 frames of VGA
 _FIELDS_BYTES = 256 << 20  # of shot and read noise: cheaper to make
 _pool: ContextVar[Workers | None] = ContextVar("pool", default=None)
-_grid = lru_cache(maxsize=8)(PixelGrid)  # fields are found sooner by the very same grid
 _alone: ContextVar[bool] = ContextVar("alone", default=True)
 
 
@@ -79,7 +77,7 @@ class Model:
         """
         keep_series(_KEPT_BYTES)
         keep_fields(_FIELDS_BYTES)
-        grid = _grid(layout.rows, layout.columns, layout.cfa)
+        grid = layout.grid
         sensor = Draw(seed).within("sensor", str(replicate))
         times = {e.name: e.exposure_time_s for e in layout.exposures}
         black = self.camera.black_level
@@ -88,7 +86,12 @@ class Model:
         def light(name: str) -> tuple[Drawn, Image]:
             picture, signal = name in layout.scenes, self.signals[name]
             camera = without_picture(self.camera) if picture else self.camera
-            clean = signal.astype(np.float32) if picture else tiled(signal, grid)
+            beyond = [(0, lines) for lines in layout.unseen]
+            clean = (
+                np.pad(signal.astype(np.float32), beyond, mode="edge")
+                if picture
+                else tiled(signal, grid)
+            )
             temporal = Draw(seed).within("exposure", name, str(replicate))
             return camera.drawn(temporal, sensor), clean
 
@@ -100,7 +103,7 @@ class Model:
                 lit[name] = own
             drawn, clean = own
             image = Shutter(clean, number, grid, times[name]).through(drawn, shared)
-            return codes_of(image, black)
+            return layout.seen(codes_of(image, black))
 
         return shot
 

@@ -107,9 +107,11 @@ class WholeFrames(FramesAsked):
             sure = seen is not None and seen.gain >= SURE and seen.known
             return (seen.values, seen.errors) if seen is not None and sure else None
         if isinstance(effect, LineFlicker):
-            place = place_of_bands(self.layout, self.frames_of, effect.cycles_per_frame)
+            share = self.layout.seen_cycles(1.0)
+            cycles = effect.cycles_per_frame * share
+            place = place_of_bands(self.layout, self.frames_of, cycles)
             name = "cycles_per_frame"
-            return None if place is None else ({name: place[0]}, {name: place[1]})
+            return None if place is None else ({name: place[0] / share}, {name: place[1] / share})
         line = self.line(effect)
         return None if line is None else (line.values, line.errors)
 
@@ -147,7 +149,7 @@ class WholeFrames(FramesAsked):
         if isinstance(effect, Rts):
             return -np.inf if self.telegraph is None else self.telegraph.gain
         if isinstance(effect, LineFlicker):
-            at = effect.cycles_per_frame
+            at = self.layout.seen_cycles(effect.cycles_per_frame)
             if at not in self._bands:
                 self._bands[at] = gain_of_bands(self.layout, self.frames_of, at)
             return self._bands[at]

@@ -9,6 +9,7 @@ from analysis.mismatch.basefit import CLIPPED_SHARE
 from analysis.mismatch.layout import Layout, Place, Taken, sites
 from analysis.mismatch.scenes import SCENE
 from analysis.mismatch.staging import with_scenes
+from analysis.mismatch.wholecells import unseen
 from dsis.cfa import Cfa
 from dsis.errors import InputError
 from dsis.recording import Recording
@@ -87,6 +88,7 @@ def layout_of(
         variances,
         still=frozenset(still),
         full=_full(taken, signal, plain),
+        unseen=unseen(recording),
     )
     return with_scenes(layout, means, first)
 

@@ -145,7 +145,8 @@ class Trial:
         lines, locked = self.lines, self.split.locked
         whole, frequency = (lines.layout, lines.frames_of), frequency_of(effect)
         if isinstance(effect, LineFlicker):
-            nats = foretold(*whole, effect.cycles_per_frame, locked)
+            cycles = lines.layout.seen_cycles(effect.cycles_per_frame)
+            nats = foretold(*whole, cycles, locked)
         elif frequency is not None:
             kept = effect.kind == "bistable_pattern"
             nats = line_foretold(*whole, frequency, locked, kept=kept)

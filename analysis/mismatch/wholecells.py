@@ -26,6 +26,14 @@ class Cropped(Recording):
         return np.ascontiguousarray(self.stored.frame(exposure, index)[: self.rows, : self.columns])
 
 
+def unseen(recording: Recording) -> tuple[int, int]:
+    """Return how many rows and columns of frames as stored are not looked at."""
+    if not isinstance(recording, Cropped):
+        return 0, 0
+    stored = recording.stored
+    return stored.rows - recording.rows, stored.columns - recording.columns
+
+
 def whole_cells(recording: Recording) -> Recording:
     """Return a recording of whole 2 x 2 cells; one that has no colours, or even sizes, as it is."""
     rows, columns = (n - n % 2 for n in (recording.rows, recording.columns))

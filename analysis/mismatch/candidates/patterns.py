@@ -18,7 +18,6 @@ from analysis.mismatch.gainmap import mean_frame
 from analysis.mismatch.layout import Layout, Place
 from dsis.effects import Effect
 from dsis.effects.amp_glow import AmpGlow
-from dsis.grid import PixelGrid
 from dsis.measures.fixed_pattern import Smooth
 
 Array = NDArray[np.float64]
@@ -147,9 +146,9 @@ def had(clues: Clues, channel: str) -> Array:
     layout, uneven = clues.layout, [e for e in clues.camera.effect if e.kind in _UNEVEN]
     y, x = layout.sites[channel]
     step = 1 if len(layout.sites) == 1 else 2
-    grid = PixelGrid(layout.rows, layout.columns, layout.cfa)
+    grid, read_out = layout.grid, clues.camera.read_out
     dark, lit = (
-        mean_frame(np.full(grid.shape, light, np.float32), uneven, grid, clues.camera.read_out, 0.0)
+        layout.seen(mean_frame(np.full(grid.shape, light, np.float32), uneven, grid, read_out, 0.0))
         for light in (0.0, _LIGHT_DN)
     )
     gain = 100 * (lit.astype(np.float64) - dark)[y::step, x::step].ravel() / _LIGHT_DN

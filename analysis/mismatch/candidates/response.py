@@ -219,7 +219,8 @@ def skewness_below(limit: float) -> float:
 def _gain_mismatch(clues: Clues) -> Sequence[Proposal]:
     """Start from what the gain does at the switch: the mean steps or kinks.
 
-    A side of one flat only has neither.
+    A side of one flat only has no step. Three flats above lie on a line that crosses that of one
+    below, and of black, at the switch: they have a kink.
     """
     ends = [s.upper_dn for s in clues.camera.noise.segment if s.upper_dn is not None]
     flats = {e.name for e in clues.layout.exposures if e.kind == "flat"}
@@ -233,23 +234,21 @@ def _gain_mismatch(clues: Clues) -> Sequence[Proposal]:
     signal, value, sd = (np.array(part) for part in list(zip(*rows, strict=True))[:3])
     above = signal >= ends[0]
     names = np.array([name for *_, name in rows])
-    if any(len(set(names[side].tolist())) < _LEAST_FLATS for side in (above, ~above)):
+    upper, lower = (len(set(names[side].tolist())) for side in (above, ~above))
+    steps = min(upper, lower) >= _LEAST_FLATS
+    if not (steps or (upper > _LEAST_FLATS and lower)):
         return []
-    step = 100 * float(np.median((value / signal)[above]) - np.median((value / signal)[~above]))
+    name = "gain_error_percent"
     bent = np.stack([np.where(above, signal - ends[0], 0.0), signal], 1) / sd[:, None]
     kink = 100 * float(np.linalg.lstsq(bent, value / sd, rcond=None)[0][0])
-    name = "gain_error_percent"
-    found = proposals("dual_gain_mismatch", [name], [name], gain_error_percent=step or 0.1)
-    return [
-        *found,
-        *proposals(
-            "dual_gain_mismatch",
-            [name],
-            [name],
-            gain_error_percent=float(np.clip(kink, -20, 20)) or 0.1,
-            mean="kinks",
-        ),
-    ]
+    kinked = float(np.clip(kink, -20, 20)) or 0.1
+    found = proposals("dual_gain_mismatch", [name], [name], gain_error_percent=kinked, mean="kinks")
+    if steps:
+        ratio = value / signal
+        step = 100 * float(np.median(ratio[above]) - np.median(ratio[~above]))
+        own = proposals("dual_gain_mismatch", [name], [name], gain_error_percent=step or 0.1)
+        found = [*own, *found]
+    return found
 
 
 CANDIDATES = (

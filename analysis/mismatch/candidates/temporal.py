@@ -131,7 +131,7 @@ def _line_flicker(clues: Clues) -> Sequence[Proposal]:
 
 def _cycles(clues: Clues, channel: str, peak: Peak) -> float:
     """Return cycles per frame of a peak."""
-    return peak.fy * clues.shape(channel)[0] + peak.off
+    return (peak.fy * clues.shape(channel)[0] + peak.off) / clues.layout.seen_cycles(1.0)
 
 
 def _brightness(clues: Clues, channel: str) -> list[tuple[float, float]]:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.prove.sites import site_means
+from analysis.mismatch.wholecells import unseen
 from dsis.cfa import Cfa
 from dsis.grid import PixelGrid
 from dsis.recording import RecordedExposure, Recording
@@ -163,7 +164,9 @@ def _window(recording: Recording, most_pixels: int) -> PixelGrid:
     shrink = min(1.0, sqrt(most_pixels / (rows * columns)))
     high, wide = (max(int(n * shrink) // 2 * 2, 2) for n in (rows, columns))
     top, left = ((n - part) // 4 * 2 for n, part in ((rows, high), (columns, wide)))
-    return PixelGrid(high, wide, recording.sensor.cfa, top, left, rows, columns)
+    below, beside = unseen(recording)
+    whole = rows + below, columns + beside
+    return PixelGrid(high, wide, recording.sensor.cfa, top, left, *whole)
 
 
 def _hold(

@@ -13,7 +13,7 @@ from analysis.mismatch.bank.coherent import SpectrumSums, slow_lines
 from analysis.mismatch.candidates import temporal
 from analysis.mismatch.candidates.response import skewness_below
 from analysis.mismatch.clues import Clues
-from analysis.mismatch.layout import sites
+from analysis.mismatch.layout import Layout, sites
 from dsis.cfa import Cfa
 from dsis.measures import Accumulator, Channel
 
@@ -77,6 +77,7 @@ def test_a_fit_starts_where_the_band_is_and_at_its_depth(cycles: float) -> None:
         ),
         frames=lambda _: FRAMES,
         shape=lambda _: (ROWS // 2, COLUMNS // 2),
+        layout=Layout((), ROWS, COLUMNS, Cfa.RGGB, 0.0, 4095.0, {}, {}),
     )
     (proposal,) = temporal._line_flicker(cast(Clues, clues))
     found = proposal.effect.model_dump()

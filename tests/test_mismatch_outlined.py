@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from analysis.mismatch.edged import outlined
+from analysis.mismatch.edged import edged, outlined
 from analysis.mismatch.layout import Layout
 from dsis.cfa import Cfa
 from exposing import effect
@@ -112,3 +112,16 @@ def test_what_is_no_decay_is_not_asked() -> None:
     state = _state(np.zeros(96), np.random.default_rng(0))
     assert not outlined(state, effect("line_settling", offset_dn=1.0, length_pixels=5.0))
     assert not outlined(state, effect("prnu", sigma_percent=1.0))
+
+
+@pytest.mark.parametrize(("light", "denied"), [("falls", False), ("settles", True)])
+def test_light_that_falls_to_both_ends_is_no_decay_from_them(light: str, denied: bool) -> None:
+    """cos^4 from the middle, whose ends two long decays follow; or lines that settle at one end."""
+    rng, u = np.random.default_rng(3), np.linspace(-1, 1, SHAPE[0])
+    settles = np.exp(-np.arange(SHAPE[0]) / 3.0)
+    means = 4.0 * (1 + u**2 / 3) ** -2 if light == "falls" else 4.0 * settles
+    state = _state(means, rng)
+    state.mismatches = [Stub(statistic="fixed_edge")]
+    assert (edged(state, "shading") is not None) == denied
+    state.mismatches = []
+    assert edged(state, "shading") is None

@@ -3,8 +3,7 @@
 Each law is of the statistics alone, whatever makes them: physics without a word, too.
 """
 
-from collections.abc import Callable, Mapping
-from functools import partial
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,33 +15,30 @@ from analysis.mismatch.brighter import no_brighter_alike
 from analysis.mismatch.bylevel import otherwise_by_level
 from analysis.mismatch.candidates.response import skewness_below
 from analysis.mismatch.contradicted import Denial
+from analysis.mismatch.covariances import of_neighbours, straightened
 from analysis.mismatch.feignedtails import replaced
 from analysis.mismatch.fewlines import of_few_lines
 from analysis.mismatch.framelag import alike_without_light
 from analysis.mismatch.gathered import gathered
 from analysis.mismatch.latelight import of_late_light
 from analysis.mismatch.layout import Place
-from analysis.mismatch.leftopen import Left, left_open
+from analysis.mismatch.leftopen import left_open
 from analysis.mismatch.leftout import left_out
 from analysis.mismatch.movinglines import LINES, moving_lines
 from analysis.mismatch.otherlags import other_lags
 from analysis.mismatch.recalibrate import code_step
 from analysis.mismatch.resolved import FAR_OFF
-from analysis.mismatch.sharing import of_charge, shared_otherwise
+from analysis.mismatch.sharing import shared_otherwise
 from analysis.mismatch.smooth import at_a_switch, by_levels
 from analysis.mismatch.state import State
-from analysis.mismatch.straight import curves, misfit, misfits, upwards
+from analysis.mismatch.straight import curves, misfit
 from analysis.mismatch.wholeframes import of_moving_parts
 from analysis.mismatch.wholelines import of_parts
 from dsis.effects.readout_memory import ReadoutMemory
 
 Array = NDArray[np.float64]
 _BENDS = frozenset({"nonlinearity", "dual_gain", "dual_gain_mismatch"})
-_PAIRS = {"correlation_0_1": 2, "correlation_1_0": 2, "correlation_1_1": 4}
-"""How many neighbours of a pixel a correlation is that of."""
 _ADJACENT = ("correlation_0_1", "correlation_1_0")
-_GRAINS = np.geomspace(1.0, 8.0, 13)  # inverse correlations of neighbours in what they share
-_LEAST = 0.05  # of a variance is other noise
 _GREENS = frozenset({"channel_imbalance", "tap_mismatch"})
 _MIXES = "crosstalk"  # which makes neighbours alike, and by that the greens differ
 _BESIDE = ("R", "Gr", "Gb", "B")
@@ -81,7 +77,7 @@ def displaced(state: State, kind: str, mean: Array, without: Array | None = None
     if kind in _BENDS:
         seen, denial = by_levels(state, kind, without, mean)
         if denial is None and not seen:
-            denial = _of_neighbours(state) or _of_limits(state) or _of_codes(state)
+            denial = of_neighbours(state, mean) or _of_limits(state) or _of_codes(state)
         return denial
     if kind in LINES:
         denial = of_few_lines(state, kind, without) or of_parts(state, kind)
@@ -105,76 +101,6 @@ def displaced(state: State, kind: str, mean: Array, without: Array | None = None
     return denial or no_brighter_alike(state, kind, without)
 
 
-def _of_neighbours(state: State) -> Denial | None:
-    """Return how a bend is denied by pixels that share what they collect; None: it is not.
-
-    Charge that is shared is not lost: the variance of sums over pixels, v (1 + sum of correlations
-    with all neighbours), remains, whatever the law by which it is shared.
-    """
-    left = left_open(state, _PAIRS)
-    if not left:
-        return _of_charge(state)
-    factors: dict[Place, float] = {}
-    for (place, statistic), (rest, _) in left.items():
-        factors[place] = factors.get(place, 1.0) + _PAIRS[statistic] * rest
-    why = "neighbours are alike for another reason, and have as covariance what variances lack"
-    denial = _straightened(state, factors.get, why) or _of_grains(state, left)
-    return denial or _of_charge(state)
-
-
-def _of_grains(state: State, left: Left) -> Denial | None:
-    """Return how a bend is denied by noise that neighbours share as it grows; None: it is not.
-
-    Noise on top of all other, in grains of some pixels - of light that interferes, say - adds to
-    variances k times the covariance of pixels side by side, 1 / k its own correlation. It goes with
-    the square of the signal, see `upwards`.
-    """
-    if not upwards(state):
-        return None
-    shared = _shared_squared(state, left)
-    why = "neighbours are alike, and what they share makes variances grow"
-    found = [_straightened(state, partial(_less, shared, k), why) for k in _GRAINS]
-    return min((one for one in found if one), key=lambda one: one.share, default=None)
-
-
-def _shared_squared(state: State, left: Left) -> dict[Place, float]:
-    """Return the share of each variance that neighbours along rows or columns have in common.
-
-    Their covariances are fitted, all places together, by the square of the signal: the correlations
-    of single places are noisy. A direction along which nothing is shared for certain has none.
-    """
-    levels, signals = state.setting.seen.levels, state.calibrated.fit.signal_dn
-    found: dict[Place, float] = {}
-    for direction in _ADJACENT:
-        own = {at: one for (at, name), one in left.items() if name == direction and at in signals}
-        squares = np.array([signals[at] ** 2 / levels[at].variance_dn2 for at in own])
-        rest, sd = np.array(list(own.values())).reshape(-1, 2).T
-        weight = float(((squares / sd) ** 2).sum())
-        if weight <= 0 or (rate := float((squares * rest / sd**2).sum()) / weight) < (
-            FAR_OFF / weight**0.5
-        ):
-            continue
-        for at, square in zip(own, squares.tolist(), strict=True):
-            found[at] = max(found.get(at, 0.0), rate * square)
-    return found
-
-
-def _less(shared: Mapping[Place, float], times: float, at: Place, usual: float) -> float:
-    """Return which share of a variance is left without what is shared, so many times."""
-    return max(usual - times * shared.get(at, 0.0), _LEAST)
-
-
-def _of_charge(state: State) -> Denial | None:
-    """Return how a bend is denied by pixels that share the more the brighter; None: it is not.
-
-    Of correlations that are not certain one by one, or that crosstalk of the camera explains as
-    well: by the law that they follow, see `sharing`.
-    """
-    shared = of_charge(state)
-    why = "neighbours are alike the more the brighter, and have as covariance what variances lack"
-    return _straightened(state, shared, why) if shared is not None else None
-
-
 def _of_limits(state: State) -> Denial | None:
     """Return how a bend is denied by noise that is cut off on one side; None: it is not.
 
@@ -187,7 +113,7 @@ def _of_limits(state: State) -> Denial | None:
         if abs(rest) < -skewness_below(_LIMITS[0])
     }
     why = "noise leans to one side for another reason, and what cuts it off lessens variances"
-    return _straightened(state, cut.get, why) if cut else None
+    return straightened(state, cut.get, why) if cut else None
 
 
 def _of_codes(state: State) -> Denial | None:
@@ -216,18 +142,6 @@ def _of_codes(state: State) -> Denial | None:
     if free <= 0 or apart > float(chi2.isf(_CHANCE, free)):
         return None
     return Denial(0.0, "codes are not equally wide, and scatter the variances by as much")
-
-
-def _straightened(state: State, factor: Callable[[Place, float], float], why: str) -> Denial | None:
-    """Return how a bend is denied where variances times a factor lie on lines; None: not.
-
-    Beyond what chance makes them misfit.
-    """
-    chance = sum(signal.size - 2 for signal, *_ in curves(state))
-    before, after = (max(one - chance, 0.0) for one in misfits(state, factor, beside=True))
-    if before <= 0 or after > _MOST * before:
-        return None
-    return Denial(after / before, why)
 
 
 def _left_of_codes(state: State) -> dict[Place, tuple[float, float]]:

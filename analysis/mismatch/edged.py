@@ -16,6 +16,7 @@ STATISTIC = "fixed_edge"
 # Where each kind is seen; of two maps of a gain the one that knows of no other.
 _MAPS = {"shading": ("gain",), "tap_mismatch": ("gain",), "amp_glow": ("time", "gain")}
 _MOST = 0.5  # of what the surfaces explain, that decays may feign
+_NEARLY_ALL = 0.8  # of what surfaces and decays explain together
 _SURE, _SEEN = 2.0, 3.0  # standard errors
 
 
@@ -24,11 +25,12 @@ def edged(state: State, kind: str) -> Denial | None:
 
     The few bright lines of an edge lean and bend the whole map, and part its halves. Where a decay
     is left unexplained, and tilts, bows and halves beside decays explain not half of what they
-    explain alone, there may be none.
+    explain alone, there may be none; there are where they alone explain nearly all of what both do:
+    long decays from both ends make a bow.
     """
     if kind not in _MAPS or all(m.statistic != STATISTIC for m in state.mismatches):
         return None
-    alone, beside = 0.0, 0.0
+    alone, beside, both = 0.0, 0.0, 0.0
     images = state.setting.seen.images
     for (channel, name), (image, noise) in images.items():
         if name not in {one if (channel, f"{one} alone") not in images else f"{one} alone"
@@ -38,10 +40,12 @@ def edged(state: State, kind: str) -> Denial | None:
             means = image.mean(1 - axis) / noise * image.shape[1 - axis] ** 0.5
             smooth, edge = _designs(means.size)
             level = np.ones((means.size, 1))
-            alone += _left(means, level) - _left(means, np.hstack([level, smooth]))
-            edge = np.hstack([level, edge])
-            beside += _left(means, edge) - _left(means, np.hstack([edge, smooth]))
-    if alone <= 0 or beside >= _MOST * alone:
+            flat, edge = _left(means, level), np.hstack([level, edge])
+            rest = _left(means, np.hstack([edge, smooth]))
+            alone += flat - _left(means, np.hstack([level, smooth]))
+            beside += _left(means, edge) - rest
+            both += flat - rest
+    if alone <= 0 or beside >= _MOST * alone or alone >= _NEARLY_ALL * both:
         return None
     return Denial(beside / alone, "lines that decay from an edge make most of what it explains")
 

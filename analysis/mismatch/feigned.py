@@ -65,7 +65,7 @@ def of_another(state: State, effect: Effect, without: Array) -> Denial | None:
     kind = effect.kind
     return (
         feigned(state, kind, without)
-        or outlying(state, kind)
+        or outlying(state, kind, without)
         or of_few_that_stand_out(state, effect)
         or side_by_side(state, kind)
         or in_patches(state, kind)
@@ -240,17 +240,18 @@ def carried(state: State, effect: Effect) -> Denial | None:
     return rival(behind, "samples follow the codes before them, which explains it as well")
 
 
-def outlying(state: State, kind: str) -> Denial | None:
+def outlying(state: State, kind: str, without: Array) -> Denial | None:
     """Return how a pattern of all pixels is denied by few that stand far out; None: not.
 
     Where pixels that stand out are left unexplained, and make half of the map's variance beyond its
     noise, the others may be alike: quartiles know of the many. Where these differ for certain in
     the map from which offsets or gains beside it are taken off, they do. Hot pixels are few, and
-    stand out: asked is whether those are left that do so with exposure time.
+    stand out: asked is whether most of those are left that do so with exposure time. The law of
+    their heights may be another, and leave some.
     """
     if kind not in _MAPS or all(m.statistic != "outlying_pixels" for m in state.mismatches):
         return None
-    if kind == "hot_pixels" and not warm_left(state):
+    if kind == "hot_pixels" and not (warm_left(state) and _mostly_left(state, without)):
         return None
     shares: list[float] = []
     own = True
@@ -266,6 +267,22 @@ def outlying(state: State, kind: str) -> Denial | None:
     return Denial(
         max(share, 0.0), "few pixels that stand far out make most of what it would explain"
     )
+
+
+def _mostly_left(state: State, without: Array) -> bool:
+    """Return whether half of the pixels that stand out with exposure time are left, at any limit.
+
+    They are counted: a fourth moment is the brightest one's, of whatever law.
+    """
+    own = np.array(
+        [
+            key.statistic == "outlying_pixels" and key.scope == "time" and key.detail != ""
+            for key in state.vector.keys
+        ]
+    )
+    own &= state.null.known & np.isfinite(without)
+    left = (state.vector.values - state.null.mean)[own]
+    return bool((left > _MOST * (state.vector.values - without)[own]).any())
 
 
 def side_by_side(state: State, kind: str) -> Denial | None:

@@ -6,13 +6,14 @@ from dataclasses import dataclass, field, replace
 from analysis.mismatch.candidates import CANDIDATES, Proposal
 from analysis.mismatch.candidates.patterns import of_any_shape
 from analysis.mismatch.credited import given_back
+from analysis.mismatch.displaced import displaced
 from analysis.mismatch.named import Named, camera_without, renewed
 from analysis.mismatch.own import Own, called, explained, refitted, resized, sizes, without_own
 from analysis.mismatch.polish import polish, with_effects
 from analysis.mismatch.predict import Predictor
 from analysis.mismatch.rank import LEAST_GAIN, Ranked, replicates_for
 from analysis.mismatch.resolved import FAR_OFF
-from analysis.mismatch.segments import Path
+from analysis.mismatch.segments import Path, second_path
 from analysis.mismatch.state import Setting, State
 from analysis.mismatch.uncertainty import settled
 from dsis.camera import Camera
@@ -21,6 +22,7 @@ from dsis.effects import Effect
 Step = Callable[[], None]
 WEAK = 30.0  # gain below which an effect may be what others, fitted one by one, left over
 _POLISHES = 3  # of what is strong
+MAKE_ALIKE = frozenset({"brighter_fatter", "crosstalk", "readout_memory", "spatial_filtering"})
 
 
 @dataclass
@@ -49,6 +51,8 @@ class Fitted:
         The state that was fitted last.
     rough
         Whether a strong effect was taken in since.
+    beside_path
+        By the kinds of those taken in: whether a second path that was denied stands beside them.
     whole, of_whole
         All frames of a small recording: they say whether anything differs. The model of these that
         was asked last.
@@ -65,6 +69,7 @@ class Fitted:
     sized: set[int] = field(default_factory=set)
     polished: State | None = None
     rough: bool = False
+    beside_path: dict[tuple[str, ...], bool] = field(default_factory=dict)
     whole: Setting | None = None
     of_whole: State | None = None
 
@@ -224,6 +229,27 @@ class Fitted:
             return state, 0.0
         gain = polished.loglik - predictor.loglik(state.null.mean)
         return State.of(self.setting, camera, self.step, near=state), gain
+
+    def path(self, state: State) -> Path | None:
+        """Return a second read-out path that variances show; None: they do not, or it is denied.
+
+        What neighbours share was fitted without it, and may feign a bend or hide where it begins:
+        a strong one that is denied stands where it does once all is fitted beside it.
+        """
+        found = second_path(state)
+        if found is None or not displaced(state, found.kind, found.mean):
+            return found
+        kinds = tuple(sorted(one.kind for one in self.named))
+        if found.gain < WEAK or MAKE_ALIKE.isdisjoint(kinds):
+            return None
+        if kinds not in self.beside_path:
+            kept = self.named, self.own, self.camera, self.polished, self.rough
+            made = State.of(self.setting, found.camera, self.step, draft=True, near=state)
+            made = self._polished(made)
+            self.named, self.own, self.camera, self.polished, self.rough = kept
+            denial = displaced(made, found.kind, made.null.mean, state.null.mean)
+            self.beside_path[kinds] = denial is None
+        return found if self.beside_path[kinds] else None
 
     def _depart(self, state: State, least: float = 0.0) -> bool:
         """Return whether statistics differ for certain that call for effects taken in.

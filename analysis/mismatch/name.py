@@ -35,7 +35,7 @@ from analysis.mismatch.rank import (
 )
 from analysis.mismatch.resolved import calls_alone, differ, explains, gained, opened
 from analysis.mismatch.rowtold import AS_WELL, as_shown, unlike_frames
-from analysis.mismatch.segments import Path, second_path, spiky
+from analysis.mismatch.segments import Path, spiky
 from analysis.mismatch.state import State
 from analysis.mismatch.ties import akin, bends_as_well, by_numbers, plainest, ties, twin
 from dsis.camera import Camera
@@ -219,8 +219,7 @@ class Search(Fitted):
         """Return the effect that explains most, and the camera with it."""
         left = self._left()
         off = {m.statistic for m in state.mismatches}
-        path = second_path(state) if "dual_gain" in left and "pixel_variance" in off else None
-        path = None if path and displaced(state, path.kind, path.mean) else path
+        path = self.path(state) if "dual_gain" in left and "pixel_variance" in off else None
         silent = spiky(state, path)  # its variances say nothing yet, unless there is nothing else
         fitted = self._decided(state, None if silent else path)
         if (fitted and silent) or any(pair[1] is path for pair in self.ties):

@@ -13,6 +13,7 @@ from analysis.mismatch.bank.seams import beyond_smooth
 from analysis.mismatch.candidates.patterns import EXTENTS, PLACES, glowing
 from analysis.mismatch.contradicted import Denial, rival
 from analysis.mismatch.leftopen import warm_left
+from analysis.mismatch.rank import TOLD_APART
 from analysis.mismatch.state import State
 from dsis.effects import Effect
 from dsis.effects.amp_glow import AmpGlow
@@ -23,6 +24,8 @@ Array = NDArray[np.float64]
 _PARTS = 4  # along each side
 _LEAST_SHARE = 0.5  # of a dark current, that every part of the sensor must show
 _SURE = 3.0  # standard errors: the least of sixteen
+_POWERS = (0.5, 0.75, 1.0, 1.5, 2.0, 3.0)
+_LENGTHS = (0.005, 0.01, 0.02, *EXTENTS)
 _TAIL = 1 / 3  # of a glow's height, that it may have where it is least
 _SEEN = 3.5  # of a surface: chance has that among the map's few numbers in 1 % of recordings
 _SMOOTH = "fixed_smooth"
@@ -106,12 +109,48 @@ def _of_few(state: State, effect: DarkCurrent) -> Denial | None:
 
 
 def _tail(state: State, effect: DarkCurrent) -> Denial | None:
-    """Return how a dark current is denied by the glow that is named: its tail may be as much."""
-    glow = max((e.dn_per_s for e in state.camera.effect if isinstance(e, AmpGlow)), default=0.0)
-    if effect.dn_per_s >= _TAIL * glow:
+    """Return how a dark current is denied by the glow that is named: its tail may be as much.
+
+    Unless the map tells, at odds of 20: of a glow that falls off by some power, and has the mean of
+    both, it shows less than of the exponential one of whatever height.
+    """
+    glows = [e for e in state.camera.effect if isinstance(e, AmpGlow)]
+    glow = max(glows, key=lambda own: own.dn_per_s, default=None)
+    if glow is None or effect.dn_per_s >= _TAIL * glow.dn_per_s:
+        return None
+    behind = _behind_powers(state, effect, glow)
+    if behind < -TOLD_APART:
         return None
     why = "a glow that falls off more slowly has as much all over the sensor"
-    return Denial(effect.dn_per_s / glow, why)
+    return rival(behind, why)
+
+
+def _behind_powers(state: State, effect: DarkCurrent, glow: AmpGlow) -> float:
+    """Return by how much a glow that falls off by a power shows more in the map, nats.
+
+    Its mean is that of both; the exponential glow beside the dark current has any height.
+    """
+    layout = state.setting.layout
+    images = {c: own for (c, name), own in state.setting.seen.images.items() if name == "time"}
+    maps = {c: _Map.of(*own, min(len(images), 2)) for c, own in images.items()}
+
+    def products(extent: float, power: float) -> tuple[float, float]:
+        square = along = 0.0
+        for channel, own in maps.items():
+            plain = glowing(own.image.shape, glow.place, glow.extent)
+            mean = effect.dn_per_s + glow.dn_per_s * float(plain.mean())
+            shape = glowing(own.image.shape, glow.place, extent, power)
+            growth = mean * layout.regressors(channel).scales["time"]
+            of_shape, of_both = own.products(growth * (shape / shape.mean() - 1))
+            square, along = square + of_shape, along + of_both
+        return square, along
+
+    if not maps:
+        return np.inf
+    square, along = products(glow.extent, 0.0)
+    own = along**2 / square / 2 if square > 0 else 0.0
+    slower = (products(extent, power) for extent, power in product(_LENGTHS, _POWERS))
+    return max(along - square / 2 for square, along in slower) - own
 
 
 def _glowing(state: State, effect: DarkCurrent) -> Denial | None:

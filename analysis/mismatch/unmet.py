@@ -39,7 +39,7 @@ def unmet(state: State, kind: str, without: Array, *, shown: bool = False) -> De
     if "level" not in registry()[kind].measures:
         known.discard("level")  # which only scatters with it: what stays is another's
     calls = np.array([key.statistic in known for key in state.null.keys])
-    calls &= _of_its_map(state, kind)
+    calls &= _of_its_map(state, kind) & _of_its_law(state, kind)
     change = changed(state, without)
     departures, off = off_without(state, without)
     if not (off & calls).any() and CANDIDATES[kind].hints:
@@ -59,6 +59,19 @@ def _of_its_map(state: State, kind: str) -> Mask:
     if not own or not {"offset", "gain"} <= known:
         return np.ones(len(keys), np.bool_)
     return np.array([key.scope == own for key in keys])
+
+
+def _of_its_law(state: State, kind: str) -> Mask:
+    """Return which numbers an effect meets whatever the law of its heights.
+
+    The fourth moment of a map with hot pixels is that of the brightest one: they are counted. So
+    are spikes of its shot noise.
+    """
+    keys = state.null.keys
+    if kind != "hot_pixels":
+        return np.ones(len(keys), np.bool_)
+    brightest = {("outlying_pixels", ""), ("one_off_outliers", "")}
+    return np.array([(key.statistic, key.detail) not in brightest for key in keys])
 
 
 def _stays(state: State, calls: Mask, change: Array, departures: Array, off: Mask) -> Denial | None:

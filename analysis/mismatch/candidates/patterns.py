@@ -286,13 +286,17 @@ def _is_glow(_: Layout, effect: Effect) -> bool:
     return isinstance(effect, AmpGlow) and EXTENTS[0] / 2 <= effect.extent <= _WIDEST_GLOW
 
 
-def glowing(shape: tuple[int, ...], place: str, extent: float) -> Array:
-    """Return a glow of height 1, exp(-r / L), in a map of such a shape: (row, column)."""
+def glowing(shape: tuple[int, ...], place: str, extent: float, power: float = 0.0) -> Array:
+    """Return a glow of height 1, exp(-r / L), in a map of such a shape: (row, column).
+
+    Of a power it falls off as (1 + r / L)^-power instead.
+    """
     n, m = shape
     y, x = np.arange(n)[:, None], np.arange(m)
     down = y if "top" in place else (n - 1 - y if "bottom" in place else np.zeros((n, 1)))
     across = x if "left" in place else (m - 1 - x if "right" in place else np.zeros(m))
-    return np.asarray(np.exp(-np.hypot(down, across) / (extent * max(n, m))))
+    distance = np.hypot(down, across) / (extent * max(n, m))
+    return np.asarray((1 + distance) ** -power if power else np.exp(-distance))
 
 
 CANDIDATES = (

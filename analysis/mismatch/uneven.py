@@ -1,6 +1,6 @@
 """Dark current that parts of a sensor do not have: something else grows with exposure time."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from math import log
 
@@ -132,7 +132,11 @@ def _behind_powers(state: State, effect: DarkCurrent, glow: AmpGlow) -> float:
     """
     layout = state.setting.layout
     images = {c: own for (c, name), own in state.setting.seen.images.items() if name == "time"}
-    maps = {c: _Map.of(*own, min(len(images), 2)) for c, own in images.items()}
+    maps = {
+        # The brightest pixels, which are far out, tell most.
+        c: replace(_Map.of(image, noise, min(len(images), 2)), image=image - image.mean())
+        for c, (image, noise) in images.items()
+    }
 
     def products(extent: float, power: float) -> tuple[float, float]:
         square = along = 0.0

@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.mismatch.bank.coherent import ALTERNATING
 from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.state import State
 from dsis.effects import Effect
@@ -10,6 +11,7 @@ from dsis.effects.readout_memory import ReadoutMemory
 
 Array = NDArray[np.float64]
 _KIND = "readout_memory"
+_NEIGHBOURS = frozenset({"adc_memory", "crosstalk", "readout_memory", "spatial_filtering"})
 _STATISTIC = "line_correlation"
 _CLEAR = 4.0  # standard deviations, from which a lag stands out
 _ALIKE = 0.5  # of what it explains, that most other lags must keep to be like it
@@ -32,8 +34,8 @@ def other_lags(state: State, kind: str, mean: Array, without: Array) -> Denial |
     mean, without
         The numbers predicted with it, and without it.
     """
-    if kind != _KIND:
-        return None
+    if (denial := _alternating(state, kind, mean, without)) is not None or kind != _KIND:
+        return denial
     keys = state.vector.keys
     if all(key.statistic != _STATISTIC for key in keys):
         return None
@@ -56,6 +58,35 @@ def other_lags(state: State, kind: str, mean: Array, without: Array) -> Denial |
             more += float(left[i]) ** 2
     share = shown / (shown + more)
     return Denial(share, "samples are alike at other lags as well") if share < _LEAST else None
+
+
+def _alternating(state: State, kind: str, mean: Array, without: Array) -> Denial | None:
+    """Return how what makes neighbours alike is denied by lines that alternate; None: it is not.
+
+    A line of n samples that alternates by noise of its own has that power, beside white noise's 1,
+    in one of n waves: neighbours are unlike by 1 / n of it, at all odd lags. Where that is half of
+    what the effect explains, or more, that may be all there is.
+    """
+    if kind not in _NEIGHBOURS or all(m.statistic != ALTERNATING for m in state.mismatches):
+        return None
+    layout, keys = state.setting.layout, state.vector.keys
+    for axis, statistic, count in (
+        ("rows", "correlation_0_1", layout.columns),
+        ("columns", "correlation_1_0", layout.rows),
+    ):
+        power = most = 0.0
+        for i, key in enumerate(keys):
+            if not (state.null.known[i] and np.isfinite(mean[i])):
+                continue
+            if key.statistic == ALTERNATING and key.detail == axis:
+                left = (state.vector.values[i] - mean[i]) / state.null.sd[i]
+                beyond = state.vector.values[i] ** 3 - mean[i] ** 3
+                power = max(power, float(beyond) if left > _CLEAR else 0.0)
+            elif key.statistic == statistic and key.scope == "exposure":
+                most = max(most, abs(float(mean[i] - without[i])))
+        if most > 0 and power / count > _LEAST * most:
+            return Denial(0.0, "lines alternate by noise of their own, and neighbours with them")
+    return None
 
 
 def alike(state: State, effect: Effect, without: Array) -> Denial | None:

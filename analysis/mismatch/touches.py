@@ -9,6 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.mismatch.bank.coherent import ALTERNATING
 from analysis.mismatch.bank.key import Key
 from analysis.mismatch.bank.surfaces import RING
 from dsis.camera import Camera
@@ -64,6 +65,7 @@ _FOLLOWS = {
     "fixed_correlation_1_0": frozenset({"fixed_correlation_1_0"}) | _CORRELATIONS,
     # Where light falls off, bands of it have slow waves.
     "patch_variance": frozenset({"spectral_peak", "row_spectrum_peak"}) | _CORRELATIONS,
+    ALTERNATING: frozenset({"spectral_peak"}) | _CORRELATIONS,
     "fixed_patch_variance": frozenset({"fixed_correlation_0_1", "fixed_correlation_1_0"})
     | _CORRELATIONS,
     # Few electrons of several DN each leave codes out.
@@ -85,6 +87,7 @@ _NEED: Mapping[str, frozenset[str]] = {
             "line_correlation",
             "alternation_variance",
             "patch_variance",
+            ALTERNATING,
             "fixed_spectral_peak",
         }
     ),

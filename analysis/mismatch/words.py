@@ -26,6 +26,7 @@ STATISTICS = {
     "line_correlation": "correlation along a line",
     "carry_over": "carry-over from the code before",
     "alternation_variance": "power that alternates from pixel to pixel or line to line",
+    "line_alternation": "power that alternates along lines, in each by itself",
     "patch_variance": "noise common to patches of pixels",
     "spectral_peak": "strongest line of the noise spectrum",
     "row_spectrum_peak": "strongest line of the spectrum of row means",

@@ -43,6 +43,10 @@ PATCHES = (4, 8, 16)  # pixels of the plane, that share noise
 _KEYS = ("", "signal")
 
 
+ALTERNATING = "line_alternation"
+_LEAST_LINES = 8
+
+
 class SpectrumSums:
     """Temporal power over all exposures, white noise scaled to 1.
 
@@ -132,6 +136,7 @@ class SpectrumSums:
             found["column_spectrum_peak of colour"] = of_colour(columns[0], degrees)
             found |= self._lags()
             found |= self._corners(degrees)
+            found |= self._edges(degrees)
             found |= self._patches(degrees)
         for key, label in (("", "row_spectrum_peak"), ("signal", "row_spectrum_peak of light")):
             total = self.weight[key][0]
@@ -245,6 +250,29 @@ class SpectrumSums:
             found[f"alternation_variance of {name}"] = ratio_root(float(power) / total, degrees)
         if not self.waves:
             found["alternation_variance of checkerboard"] = UNKNOWN
+        return found
+
+    def _edges(self, degrees: int) -> dict[str, Number]:
+        """Return the power of lines that alternate along themselves, each by as much as it likes.
+
+        Even and odd columns that are read by two chains, each of which has a noise of its own in
+        every row, say. What all of them share, and what alternates along both axes, is left out.
+        """
+        n, m = self.shape
+        found: dict[str, Number] = {}
+        for axis, (size, other) in (("rows", (n, m)), ("columns", (m, n))):
+            label = f"{ALTERNATING} of {axis}"
+            found[label] = UNKNOWN
+            if other % 2 or size < _LEAST_LINES or not self.waves:
+                continue
+            if axis == "rows":
+                power = np.delete(self.power[:, m // 2], [0, n // 2] if n % 2 == 0 else [0])
+                waves = power.size  # each of them twice, as a bin and its conjugate
+            else:
+                power = self.power[n // 2, 1 : (m + 1) // 2]
+                waves = 2 * power.size
+            mean = float(power.mean()) / self.weight[""][0]
+            found[label] = ratio_root(mean, degrees * waves)
         return found
 
     def _patches(self, degrees: int) -> dict[str, Number]:

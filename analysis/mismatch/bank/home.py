@@ -7,7 +7,7 @@ one side. What may have either sign (a step, a ratio of gains, a memory) is look
 from collections.abc import Mapping, Sequence
 
 from analysis.mismatch.bank.codephase import DETAIL as CODE_PHASE
-from analysis.mismatch.bank.coherent import PATCHES
+from analysis.mismatch.bank.coherent import ALTERNATING, PATCHES
 from analysis.mismatch.bank.common import SIGNS
 from analysis.mismatch.bank.edges import names as edge_names
 from analysis.mismatch.bank.framenoise import NAME as FRAME_NOISE
@@ -181,4 +181,5 @@ def _pooled(scopes: set[str], *, mosaic: bool, joint: bool) -> set[tuple[str, st
             found.add((statistic, "contrast", "", together_too(scope, detail)))
     if not mosaic:
         found |= {("alternation_variance", "all", "MONO", name) for name in SIGNS}
+        found |= {(ALTERNATING, "all", "MONO", axis) for axis in _AXES}
     return found

@@ -37,7 +37,8 @@ GROUPS: Mapping[str, profiles.Groups] = {"half_seam": "halves", "parity": "parit
 NOISY_PIXELS = frozenset(
     {"variance_spread", "variance_persistence", "noisy_pixels", "one_off_outliers"}
 )
-OFF_AXIS = frozenset({"spectral_peak", "phase", "alternation_variance", "patch_variance"})
+OFF_AXIS = frozenset({"spectral_peak", "phase", "alternation_variance", "patch_variance",
+                      "line_alternation"})  # fmt: skip
 OF_CODES = frozenset({"code_spacing", "code_imbalance"})
 _SURFACES = ("fixed_smooth_variance", "fixed_patch_variance", "outlying_patch")
 NOISY_PARTS = "smooth_variance_spread"

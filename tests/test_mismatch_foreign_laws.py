@@ -18,22 +18,41 @@ def _found(recording: InMemory, model: Any) -> set[str]:
     return {own.effect for own in found.omitted_physics}
 
 
+def _warmed(recording: InMemory, dn_per_s: Array, rng: np.random.Generator) -> InMemory:
+    """Return a recording of a sensor with a dark current, and the shot noise of that."""
+    assert recording.stacks is not None
+    stacks = {}
+    for exposure in recording.exposures:
+        frames = recording.stacks[exposure.name].astype(np.float64)
+        charge = dn_per_s * exposure.exposure_time_s
+        frames += charge + np.sqrt(0.5 * charge) * rng.standard_normal(frames.shape)
+        stacks[exposure.name] = np.clip(np.rint(frames), 0, 4095).astype(np.uint16)
+    return replace(recording, stacks=stacks)
+
+
 def test_hot_pixels_whose_heights_are_lognormal_are_hot_pixels() -> None:
     """A law with a longer tail: the brightest leaves a fourth moment, and spikes of its shot noise.
 
     numpy's own: 2 % of the pixels, 300 DN/s in the middle, within a factor of e^0.9.
     """
     rng, recording = np.random.default_rng(4), recorded(camera(), 4, levels=FEW_LEVELS)
-    assert recording.stacks is not None
     shape = recording.rows, recording.columns
     rate = np.where(rng.random(shape) < 0.02, 300 * np.exp(0.9 * rng.standard_normal(shape)), 0.0)
-    stacks = {}
-    for exposure in recording.exposures:
-        frames = recording.stacks[exposure.name].astype(np.float64)
-        charge = rate * exposure.exposure_time_s
-        frames += charge + np.sqrt(0.5 * charge) * rng.standard_normal(frames.shape)
-        stacks[exposure.name] = np.clip(np.rint(frames), 0, 4095).astype(np.uint16)
-    assert _found(replace(recording, stacks=stacks), camera()) == {"hot_pixels"}
+    assert _found(_warmed(recording, rate, rng), camera()) == {"hot_pixels"}
+
+
+def test_dark_current_that_differs_from_pixel_to_pixel_is_no_few_hot_pixels() -> None:
+    """Lognormal over all pixels, within a factor of e^0.5: its mean is named, its spread left."""
+    rng, recording = np.random.default_rng(5), recorded(camera(), 5, levels=FEW_LEVELS)
+    spread = np.exp(0.5 * rng.standard_normal((recording.rows, recording.columns)))
+    rate = 200.0 * spread / spread.mean()
+    found = find_mismatch(camera(), _warmed(recording, rate, rng), seed=1)
+    (named,) = found.omitted_physics
+    assert named.effect == "dark_current"
+    mean = named.parameters["dn_per_s"]
+    assert isinstance(mean.value, float)
+    assert abs(mean.value - 200.0) < 3.5 * mean.standard_error
+    assert "fixed_pixel_variance" in {left.statistic for left in found.unexplained}
 
 
 def test_a_kink_is_seen_beside_one_flat_below_it() -> None:

@@ -16,11 +16,15 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 _NUMBERS = ("pixel_fraction", "mean_dn_per_s")
 _CLEAR = 5.0  # standard deviations of a pixel's summed variance
+_FEW = 0.1  # of all pixels
 _SEEN = 2  # frames: of more there are variances
 
 
 def _hot(clues: Clues) -> Sequence[Proposal]:
-    """Return the likeliest laws of the map's pixels, where they gain more than their parameters."""
+    """Return the likeliest laws of the map's pixels, where they gain more than their parameters.
+
+    None where the likeliest makes more of them hot than few: all pixels' dark currents differ.
+    """
     grown = _grown(clues)
     if grown is None:
         return []
@@ -30,7 +34,8 @@ def _hot(clues: Clues) -> Sequence[Proposal]:
     pixels = clues.layout.rows * clues.layout.columns
     normal = Counted(clues.vector.keys, pixels).normal(clues.null.mean)
     found: list[Proposal] = []
-    for law in hot_laws(images, noisy):
+    laws = hot_laws(images, noisy)
+    for law in laws if laws and laws[0].share <= _FEW else ():
         if law.gain < len(_NUMBERS):
             continue
         values = dict(zip(_NUMBERS, (law.share, law.mean / scale), strict=True))

@@ -266,6 +266,7 @@ def test_hot_pixels_are_denied_by_those_that_grow_with_time(
     state.null = SimpleNamespace(
         keys=keys,
         known=np.array([True, True]),
+        sd=np.ones(2),
         mean=np.array([3.0, 30.0 * explained]),
         departures=lambda _: np.array([30.0, 30.0]),
     )

@@ -114,12 +114,12 @@ def test_what_is_no_decay_is_not_asked() -> None:
     assert not outlined(state, effect("prnu", sigma_percent=1.0))
 
 
-@pytest.mark.parametrize(("light", "denied"), [("falls", False), ("settles", True)])
-def test_light_that_falls_to_both_ends_is_no_decay_from_them(light: str, denied: bool) -> None:
+@pytest.mark.parametrize("length", [0.0, 3.0, 9.0, 16.0])
+def test_light_that_falls_to_both_ends_is_no_decay_from_them(length: float) -> None:
     """cos^4 from the middle, whose ends two long decays follow; or lines that settle at one end."""
-    rng, u = np.random.default_rng(3), np.linspace(-1, 1, SHAPE[0])
-    settles = np.exp(-np.arange(SHAPE[0]) / 3.0)
-    means = 4.0 * (1 + u**2 / 3) ** -2 if light == "falls" else 4.0 * settles
+    rng, u, denied = np.random.default_rng(3), np.linspace(-1, 1, SHAPE[0]), length > 0
+    settles = np.exp(-np.arange(SHAPE[0]) / length) if denied else 0.0
+    means = 4.0 * settles if denied else 4.0 * (1 + u**2 / 3) ** -2
     state = _state(means, rng)
     state.mismatches = [Stub(statistic="fixed_edge")]
     assert (edged(state, "shading") is not None) == denied

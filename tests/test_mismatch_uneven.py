@@ -224,16 +224,22 @@ def test_a_glow_that_has_no_word_stays_unexplained() -> None:
     assert any(m.statistic.startswith("fixed_smooth") for m in found.unexplained)
 
 
+@pytest.mark.parametrize("hot", [0.0, 200.0])
 @pytest.mark.parametrize(("tail", "denied"), [(False, False), (True, True)])
 def test_a_glow_that_is_named_may_have_a_tail_where_the_map_has_one(
-    tail: bool, denied: bool
+    tail: bool, denied: bool, hot: float
 ) -> None:
-    """An exponential glow of 60 DN/s beside a dark current of 4, or 1 / r without one."""
+    """An exponential glow of 60 DN/s beside a dark current of 4, or 1 / r without one.
+
+    Hot pixels, which are no glow, say nothing of it.
+    """
     y, x = np.arange(64)[:, None], np.arange(96)
     distance = np.hypot(y, x) / (0.08 * 96)
     shape = 1 / (1 + distance) if tail else np.exp(-distance)
     glow = registry()["amp_glow"](dn_per_s=60.0, place="top_left", extent=0.08)
-    said = uneven(_state(60.0 * TIME_S * shape, "time", glow), DARK_CURRENT)
+    rng = np.random.default_rng(9)
+    spots = np.where(rng.random(shape.shape) < 0.003, rng.exponential(hot, shape.shape), 0.0)
+    said = uneven(_state(60.0 * TIME_S * shape + spots, "time", glow), DARK_CURRENT)
     assert (said is not None) == denied
     if said is not None:
         assert "falls off more slowly" in said.why

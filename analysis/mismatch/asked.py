@@ -16,7 +16,7 @@ from dsis.effects.rts import Rts
 
 @dataclass(frozen=True)
 class FramesAsked:
-    """Frames that are asked once for each of these.
+    """Frames that are asked once for each of these: what `WholeFrames` begins with.
 
     Attributes
     ----------

@@ -1,12 +1,12 @@
 """Tails that are bursts: samples far from their mean that lie beside each other in a line."""
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from functools import partial
+from collections.abc import Iterator
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.mismatch.basefit import CLIPPED_SHARE
 from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.layout import Layout
 from analysis.mismatch.projections import FramesOf
@@ -15,6 +15,7 @@ Array = NDArray[np.float64]
 TAILS = frozenset({"heavy_tailed_read_noise", "impulse"})  # of every sample by itself
 _MOST = 0.5  # of an excess kurtosis, that lines of different noise may make
 _SURE = 4.0  # standard errors
+_LEAST_FRAMES = 3
 
 
 @dataclass(frozen=True)
@@ -24,7 +25,7 @@ class Bursts:
     Attributes
     ----------
     tails
-        Excess kurtosis of samples less their pixels' and frames' means.
+        Excess kurtosis of samples less the means of their pixels and lines.
     bursts, error
         What of it lines have whose squares are alike, and its standard error.
     """
@@ -43,56 +44,85 @@ class Bursts:
 
 
 def bursts_of(layout: Layout, frames_of: FramesOf) -> Bursts:
-    """Return the bursts of the darks and flats that have the surest tails.
+    """Return the bursts of the dark or flat that has the surest tails.
 
-    Noise whose variance v differs from line to line has the excess kurtosis 3 var(v) / mean(v)^2
-    where it is normal in each; var(v) is the mean product of squares of two samples of a line, less
-    that of all. Samples far out that lie anywhere have no such product, however far out they are.
-    Rows and columns are asked, of each colour by itself; the error is that of squares at random.
+    Noise whose variance v differs from line to line of each frame has the excess kurtosis
+    3 var(v) / mean(v)^2 where it is normal in each; var(v) is the mean product of squares of two
+    samples of a line in one frame, less that of its mean square over all frames: lines that are
+    always noisier are no bursts. Nor are lines whose means move: these are taken off. Samples far
+    out that lie anywhere have no such product, however far out they are. Rows and columns are
+    asked, of each colour by itself; the error is that of squares at random. None in a large
+    recording: nothing is asked.
     """
-    found = [
-        _bursts(partial(_plane, frames_of, exposure.name, place, len(layout.sites) > 1))
+    found = [] if layout.large else [
+        own
         for exposure in layout.uniform
-        for place in layout.sites.values()
-    ]
-    sure = [(own.tails / chance, own) for own, chance in found if chance]
-    return max(sure, key=lambda one: one[0], default=(0.0, Bursts(0.0, 0.0, np.inf)))[1]
+        for own in _of_exposure(layout, frames_of, exposure.name, len(exposure.numbers))
+    ]  # fmt: skip
+    return max(found, key=lambda one: one[0], default=(0.0, Bursts(0.0, 0.0, np.inf)))[1]
 
 
-def _plane(frames_of: FramesOf, name: str, place: tuple[int, int], mosaic: bool) -> Iterator[Array]:
-    """Yield the samples of one colour of each frame of an exposure."""
-    step = 2 if mosaic else 1
+def _of_exposure(
+    layout: Layout, frames_of: FramesOf, name: str, count: int
+) -> Iterator[tuple[float, Bursts]]:
+    """Yield how sure the tails of each colour of an exposure are, and its bursts.
+
+    Nothing of colours of which samples are clipped, and of a single frame.
+    """
+    if count < _LEAST_FRAMES:
+        return
+    step, sums = 1 if len(layout.sites) == 1 else 2, {at: _Sums() for at in layout.sites.values()}
+    total = np.zeros((layout.rows, layout.columns))
     for frame in frames_of(name):
-        yield np.asarray(frame[place[0] :: step, place[1] :: step], np.float64)
+        total += np.asarray(frame, np.float64) / count
+    for frame in frames_of(name):
+        for (y, x), own in sums.items():
+            plane = np.asarray(frame[y::step, x::step], np.float64)
+            own.clipped += float(((plane <= 0) | (plane >= layout.white_dn)).mean()) / count
+            own.add(plane - total[y::step, x::step])
+    for own in sums.values():
+        if own.clipped <= CLIPPED_SHARE:
+            yield from own.found()
 
 
-def _bursts(planes: Callable[[], Iterator[Array]]) -> tuple[Bursts, float]:
-    """Return the bursts of planes (row, column), and the error of their tails in normal noise."""
-    count, total = 0, np.zeros(1)
-    for plane in planes():
-        count, total = count + 1, total + plane
-    alike, squares, fourths = [0.0, 0.0], 0.0, 0.0
-    for plane in planes():
-        rest = plane - total / count
-        square = (rest - rest.mean()) ** 2
-        squares += float(square.mean()) / count
-        fourths += float((square**2).mean()) / count
+@dataclass
+class _Sums:
+    """Sums over the frames of a plane: of each axis, squares and products of each line."""
+
+    clipped: float = 0.0
+    frames: int = 0
+    squares: dict[int, Array] = field(default_factory=dict)
+    products: dict[int, Array] = field(default_factory=dict)
+    fourths: dict[int, float] = field(default_factory=dict)
+    samples: int = 0
+
+    def add(self, rest: Array) -> None:
+        """Take a plane (row, column) less its mean over all frames."""
+        self.frames += 1
+        self.samples += rest.size
         for axis in (0, 1):
-            alike[axis] += float(_products(square, axis).mean()) / count
-    if not squares > 0:
-        return Bursts(0.0, 0.0, np.inf), 0.0
-    spread = fourths / squares**2 - 1  # of a square that is 1 on average
-    found = []
-    for product, size in zip(alike, total.shape[::-1], strict=True):
-        error = spread * (2 / (count * total.size * (size - 1))) ** 0.5
-        found.append((product / squares**2 - 1, error))
-    most, error = max(found, key=lambda one: one[0] - _SURE * one[1])
-    chance = (24 / (count * total.size)) ** 0.5
-    return Bursts(spread - 2, 3 * most, 3 * error), chance
+            square = (rest - rest.mean(1 - axis, keepdims=True)) ** 2
+            size = square.shape[1 - axis]
+            fourth = (square**2).sum(1 - axis)
+            product = (square.sum(1 - axis) ** 2 - fourth) / (size * (size - 1))
+            self.squares[axis] = self.squares.get(axis, 0.0) + square.mean(1 - axis)
+            self.products[axis] = self.products.get(axis, 0.0) + product
+            self.fourths[axis] = self.fourths.get(axis, 0.0) + float(fourth.sum())
 
-
-def _products(square: Array, axis: int) -> Array:
-    """Return the mean product of two squares of each line across an axis."""
-    size = square.shape[1 - axis]
-    total, own = square.sum(1 - axis), (square**2).sum(1 - axis)
-    return np.asarray((total**2 - own) / (size * (size - 1)))
+    def found(self) -> Iterator[tuple[float, Bursts]]:
+        """Yield how sure the tails are, in errors of those of normal noise, and the bursts."""
+        along = []
+        for axis, total in self.squares.items():
+            lines = total / self.frames
+            mean = float(lines.mean())
+            if not mean > 0:
+                return
+            spread = self.fourths[axis] / self.samples / mean**2 - 1
+            size = self.samples / self.frames / lines.size
+            error = spread * (2 / (self.samples * (size - 1))) ** 0.5
+            alike = float((self.products[axis] / self.frames - lines**2).mean()) / mean**2
+            # Less their mean, frames share their variances, and the mean of these: of two all.
+            share = (1 - 2 / self.frames) ** 2 / (1 - 1 / self.frames)
+            along.append(Bursts(spread - 2, 3 * alike / share, 3 * error / share))
+        most = max(along, key=lambda one: one.bursts - _SURE * one.error)
+        yield most.tails / (24 / self.samples) ** 0.5, most

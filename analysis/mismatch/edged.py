@@ -25,12 +25,12 @@ def edged(state: State, kind: str) -> Denial | None:
 
     The few bright lines of an edge lean and bend the whole map, and part its halves. Where a decay
     is left unexplained, and tilts, bows and halves beside decays explain not half of what they
-    explain alone, there may be none; there are where they alone explain nearly all of what both do:
-    long decays from both ends make a bow.
+    explain alone, there may be none; there are where they alone explain nearly all of what both do,
+    and decays from one end do not: long decays from both make a bow.
     """
     if kind not in _MAPS or all(m.statistic != STATISTIC for m in state.mismatches):
         return None
-    alone, beside, both = 0.0, 0.0, 0.0
+    alone, beside, both, one_end = 0.0, 0.0, 0.0, 0.0
     images = state.setting.seen.images
     for (channel, name), (image, noise) in images.items():
         if name not in {one if (channel, f"{one} alone") not in images else f"{one} alone"
@@ -45,7 +45,10 @@ def edged(state: State, kind: str) -> Denial | None:
             alone += flat - _left(means, np.hstack([level, smooth]))
             beside += _left(means, edge) - rest
             both += flat - rest
-    if alone <= 0 or beside >= _MOST * alone or alone >= _NEARLY_ALL * both:
+            ends = np.split(decays(means.size).T, 2, axis=1)
+            one_end += min(_left(means, np.hstack([level, own])) for own in ends) - rest
+    bowed = alone >= _NEARLY_ALL * both and one_end >= _MOST * alone
+    if alone <= 0 or beside >= _MOST * alone or bowed:
         return None
     return Denial(beside / alone, "lines that decay from an edge make most of what it explains")
 

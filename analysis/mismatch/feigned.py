@@ -281,8 +281,10 @@ def _mostly_left(state: State, without: Array) -> bool:
         ]
     )
     own &= state.null.known & np.isfinite(without)
+    sd = state.null.sd[own]
     left = (state.vector.values - state.null.mean)[own]
-    return bool((left > _MOST * (state.vector.values - without)[own]).any())
+    there = (state.vector.values - without)[own]
+    return bool(((there > _CLEAR * sd) & (left > _CLEAR * sd) & (left > _MOST * there)).any())
 
 
 def side_by_side(state: State, kind: str) -> Denial | None:

@@ -24,6 +24,7 @@ _ALIKE = frozenset(
 )  # fmt: skip
 _MOST = 0.5  # of tails, that something else may feign
 _SCATTER = 1.84  # see `coded`
+_OF_PIXELS = frozenset({"variance_spread", "one_off_outliers"})
 _TAILS = TAILS | {"read_noise_spread", "rts"}
 _LIKELY = 2.0  # standard deviations that chance may well have
 _FEW_ELECTRONS = 1.0  # skewness of shot noise of one electron: read noise beside it lessens it
@@ -138,7 +139,7 @@ def clamped(state: State, kind: str, without: Array) -> Denial | None:
     own = np.array(
         [
             key.scope == "exposure"
-            and key.statistic in _SHAPES
+            and key.statistic in _SHAPES | _OF_PIXELS
             and (key.exposure, key.channel) not in cut
             for key in state.vector.keys
         ]
@@ -147,7 +148,8 @@ def clamped(state: State, kind: str, without: Array) -> Denial | None:
     size, shown = _shown(state, without, own)
     if shown >= max(CLEAR, _MOST * size):
         return None
-    return Denial(0.0, "noise is cut off at a code, and shows none where it is not")
+    where = "would hardly show" if size < CLEAR else "shows none"
+    return Denial(0.0, f"noise is cut off at a code, and {where} where it is not")
 
 
 def _shown(state: State, without: Array, own: NDArray[np.bool_]) -> tuple[float, float]:

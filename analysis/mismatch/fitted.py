@@ -52,7 +52,8 @@ class Fitted:
     rough
         Whether a strong effect was taken in since.
     beside_path
-        By the kinds of those taken in: whether a second path that was denied stands beside them.
+        By the kinds of those taken in, and the level below it: whether a second path that was
+        denied stands beside them.
     whole, of_whole
         All frames of a small recording: they say whether anything differs. The model of these that
         was asked last.
@@ -76,10 +77,14 @@ class Fitted:
     def settle(self, state: State) -> State:
         """Return the state with final parameters; their errors go into the effects named."""
         state = self._resized(state, self._called(state))
+        self.named = [
+            n if n.proposal is None else replace(n, proposal=of_any_shape(n.proposal))
+            for n in self.named
+        ]
         bare, mine = self._parts(state)
         if not mine:
             return state
-        camera = self._fitted(bare, *settled(state, bare, [of_any_shape(own) for own in mine]))
+        camera = self._fitted(bare, *settled(state, bare, mine))
         if camera is None:
             return state
         # Beside what is named now, the user's sizes may do.
@@ -242,6 +247,7 @@ class Fitted:
         kinds = tuple(sorted(one.kind for one in self.named))
         if found.gain < WEAK or MAKE_ALIKE.isdisjoint(kinds):
             return None
+        kinds = (*kinds, f"{found.gap[0]:.0f}")
         if kinds not in self.beside_path:
             kept = self.named, self.own, self.camera, self.polished, self.rough
             made = State.of(self.setting, found.camera, self.step, draft=True, near=state)

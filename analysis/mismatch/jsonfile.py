@@ -12,12 +12,14 @@ from analysis.mismatch.finding import (
     SCHEMA,
     Alternative,
     Finding,
+    FittedParameter,
     Mismatch,
     OmittedEffect,
     Proof,
 )
 
 Values = dict[str, Any]
+_ANYTHING = 1000.0  # of a size
 
 
 def finding_values(finding: Finding) -> Values:
@@ -66,12 +68,21 @@ def _unexplained(m: Mismatch) -> Values:
 def _omitted(effect: OmittedEffect) -> Values:
     return {
         "effect": effect.effect,
-        "parameters": {name: vars(fitted) for name, fitted in effect.parameters.items()},
+        "parameters": {name: _fitted(fitted) for name, fitted in effect.parameters.items()},
         "because": effect.because,
         "heldout_gain": vars(effect.heldout_gain),
         "alternatives": [_alternative(a) for a in effect.alternatives],
         **({"choices": dict(effect.choices)} if effect.choices else {}),
     }
+
+
+def _fitted(fitted: FittedParameter) -> Values:
+    """Return value and error; what may be anything has an error of a thousand times its size."""
+    known = math.isfinite(fitted.standard_error)
+    sizes = fitted.value if isinstance(fitted.value, tuple) else (fitted.value,)
+    most = max(abs(size) for size in sizes)
+    error = fitted.standard_error if known else _ANYTHING * most
+    return {"value": fitted.value, "standard_error": error}
 
 
 def _alternative(a: Alternative) -> Values:

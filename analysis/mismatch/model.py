@@ -88,7 +88,7 @@ class Model:
             camera = without_picture(self.camera) if picture else self.camera
             beyond = [(0, lines) for lines in layout.unseen]
             clean = (
-                np.pad(signal.astype(np.float32), beyond, mode="edge")
+                np.pad(signal.astype(np.float32), beyond, mode="reflect")  # of the same colours
                 if picture
                 else tiled(signal, grid)
             )

@@ -11,6 +11,7 @@ from dsis.effects.readout_memory import ReadoutMemory
 
 Array = NDArray[np.float64]
 _KIND = "readout_memory"
+_BESIDE = {"correlation_0_1": "rows", "correlation_1_0": "columns"}
 _NEIGHBOURS = frozenset({"adc_memory", "crosstalk", "readout_memory", "spatial_filtering"})
 _STATISTIC = "line_correlation"
 _CLEAR = 4.0  # standard deviations, from which a lag stands out
@@ -64,28 +65,31 @@ def _alternating(state: State, kind: str, mean: Array, without: Array) -> Denial
     """Return how what makes neighbours alike is denied by lines that alternate; None: it is not.
 
     A line of n samples that alternates by noise of its own has that power, beside white noise's 1,
-    in one of n waves: neighbours are unlike by 1 / n of it, at all odd lags. Where that is half of
-    what the effect explains, or more, that may be all there is.
+    in one of n waves: neighbours are unlike by 1 / n of it, at all odd lags. Where the effect makes
+    them unlike along that axis, and by no more than twice as much, that may be all there is.
     """
     if kind not in _NEIGHBOURS or all(m.statistic != ALTERNATING for m in state.mismatches):
         return None
-    layout, keys = state.setting.layout, state.vector.keys
-    for axis, statistic, count in (
-        ("rows", "correlation_0_1", layout.columns),
-        ("columns", "correlation_1_0", layout.rows),
+    layout = state.setting.layout
+    size = {"rows": layout.columns, "columns": layout.rows}
+    power, unlike = dict.fromkeys(size, 0.0), dict.fromkeys(size, 0.0)
+    changed = 0.0
+    for i, key in enumerate(state.vector.keys):
+        if not (state.null.known[i] and np.isfinite(mean[i]) and np.isfinite(without[i])):
+            continue
+        if key.statistic == ALTERNATING:
+            left = (state.vector.values[i] - mean[i]) / state.null.sd[i]
+            beyond = state.vector.values[i] ** 3 - mean[i] ** 3
+            power[key.detail] = max(power.get(key.detail, 0.0), beyond if left > _CLEAR else 0.0)
+        elif key.statistic in _BESIDE and key.scope == "exposure":
+            change, axis = float(mean[i] - without[i]), _BESIDE[key.statistic]
+            unlike[axis] = max(unlike[axis], -change)
+            changed = max(changed, abs(change))
+    if any(
+        unlike[axis] >= _LEAST * changed > 0 and power[axis] / size[axis] > _LEAST * unlike[axis]
+        for axis in size
     ):
-        power = most = 0.0
-        for i, key in enumerate(keys):
-            if not (state.null.known[i] and np.isfinite(mean[i])):
-                continue
-            if key.statistic == ALTERNATING and key.detail == axis:
-                left = (state.vector.values[i] - mean[i]) / state.null.sd[i]
-                beyond = state.vector.values[i] ** 3 - mean[i] ** 3
-                power = max(power, float(beyond) if left > _CLEAR else 0.0)
-            elif key.statistic == statistic and key.scope == "exposure":
-                most = max(most, abs(float(mean[i] - without[i])))
-        if most > 0 and power / count > _LEAST * most:
-            return Denial(0.0, "lines alternate by noise of their own, and neighbours with them")
+        return Denial(0.0, "lines alternate by noise of their own, and neighbours with them")
     return None
 
 

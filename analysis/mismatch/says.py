@@ -31,7 +31,7 @@ _WORDS = {
     "carry_over": "a sample follows the code of the one read before it, in periods",
     "line_correlation": "the noise is correlated over some distance along a line",
     "alternation_variance": "the noise alternates from pixel to pixel, or from line to line",
-    "line_alternation": "along each line the noise alternates, by as much as in no other",
+    "line_alternation": "along each line the noise alternates, by an amount of its own",
     "patch_variance": "patches of pixels move together from frame to frame",
     "spectral_peak": "the noise has a periodic component",
     "row_spectrum_peak": "row means have a periodic component",

@@ -80,7 +80,8 @@ def settled(
         corrected = effects
     for (i, name, signed), half in zip(free, reach, strict=True):
         value = abs(float(getattr(corrected[i], name)))
-        own = half if signed else value * np.sinh(min(half, _FARTHEST))
+        far = value * np.sinh(half) if half < _FARTHEST else np.inf
+        own = half if signed else far
         errors[i][name] = float(own) / _NORMAL
     return corrected, errors
 
@@ -133,7 +134,7 @@ def _slopes(
 
 
 def _slope(predictor: Predictor, both: Sequence[tuple[Camera | None, float]], size: int) -> Array:
-    """Return the slope between the cameras that there are, one of them the state's own if not."""
+    """Return the slope from below to above; where a camera is not allowed, from the state's own."""
     there = [(predictor.changes(other), by) for other, by in both if other is not None]
     if not there:
         return np.zeros(size)

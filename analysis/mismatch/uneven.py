@@ -6,6 +6,7 @@ from math import log
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import median_filter
 from scipy.special import logsumexp
 
 from analysis.mismatch.bank.robust import drawn_in, typical_square
@@ -21,6 +22,7 @@ from dsis.effects.dark_current import DarkCurrent
 from dsis.effects.hot_pixels import HotPixels
 
 Array = NDArray[np.float64]
+_AROUND, _FAR_OUT = 3, 5.0  # pixels; standard deviations
 _PARTS = 4  # along each side
 _LEAST_SHARE = 0.5  # of a dark current, that every part of the sensor must show
 _SURE = 3.0  # standard errors: the least of sixteen
@@ -133,8 +135,8 @@ def _behind_powers(state: State, effect: DarkCurrent, glow: AmpGlow) -> float:
     layout = state.setting.layout
     images = {c: own for (c, name), own in state.setting.seen.images.items() if name == "time"}
     maps = {
-        # The brightest pixels, which are far out, tell most.
-        c: replace(_Map.of(image, noise, min(len(images), 2)), image=image - image.mean())
+        # Where a glow is brightest, which is far out, it tells most; not so single pixels.
+        c: _Map.of(image, noise, min(len(images), 2)).of_smoother(image)
         for c, (image, noise) in images.items()
     }
 
@@ -218,6 +220,13 @@ class _Map:
             seen = typical_square(beyond_smooth(drawn.mean(axis))) * image.shape[axis]
             lines.append(pixel + alike * max(seen - pixel, 0.0))
         return cls(drawn, pixel, *lines)
+
+    def of_smoother(self, image: Array) -> "_Map":
+        """Return this with an image without pixels that stand out of those around them."""
+        around = median_filter(image, _AROUND, mode="nearest")
+        far = np.abs(image - around) > _FAR_OUT * self.pixel_dn2**0.5
+        plain = np.where(far, around, image)
+        return replace(self, image=np.asarray(plain - plain.mean()))
 
     @property
     def mean_dn2(self) -> float:

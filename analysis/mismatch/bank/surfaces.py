@@ -17,6 +17,7 @@ LOW = "low order"
 _OF_LOW = f"fixed_smooth_variance of {LOW}"
 _BOWED, _OF_RING = 2, 4  # degree of surfaces that bow, and of a ring
 RING = "fixed_smooth_ring"
+_ROUNDED = 1e-9
 
 
 def surfaces(
@@ -120,6 +121,7 @@ def _ringed(rows: int, columns: int) -> Array:
     found = Smooth.of(rows, columns).coefficients(s * (1 - s))
     order = np.add.outer(np.arange(len(found)), np.arange(len(found)))
     own = np.where((order > _BOWED) & (order <= _OF_RING), found, 0.0)
+    own[np.abs(own) < _ROUNDED * np.abs(found).max()] = 0.0
     own.flags.writeable = False
     return own
 

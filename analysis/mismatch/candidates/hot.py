@@ -23,7 +23,7 @@ _SEEN = 2  # frames: of more there are variances
 def _hot(clues: Clues) -> Sequence[Proposal]:
     """Return the likeliest laws of the map's pixels, where they gain more than their parameters.
 
-    None where the likeliest makes more of them hot than few: all pixels' dark currents differ.
+    None of which more pixels are hot than few: where all are, dark currents differ everywhere.
     """
     grown = _grown(clues)
     if grown is None:
@@ -34,8 +34,7 @@ def _hot(clues: Clues) -> Sequence[Proposal]:
     pixels = clues.layout.rows * clues.layout.columns
     normal = Counted(clues.vector.keys, pixels).normal(clues.null.mean)
     found: list[Proposal] = []
-    laws = hot_laws(images, noisy)
-    for law in laws if laws and laws[0].share <= _FEW else ():
+    for law in (own for own in hot_laws(images, noisy) if own.share <= _FEW):
         if law.gain < len(_NUMBERS):
             continue
         values = dict(zip(_NUMBERS, (law.share, law.mean / scale), strict=True))

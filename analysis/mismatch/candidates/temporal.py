@@ -125,7 +125,7 @@ def _line_flicker(clues: Clues) -> Sequence[Proposal]:
         depth_percent=100 * depth,
         cycles_per_frame=_cycles(clues, channel, peak),
     )
-    error = _PARABOLA * sqrt(6 / (excess * frames)) / (2 * pi)
+    error = _PARABOLA * sqrt(6 / (excess * frames)) / (2 * pi) / clues.layout.seen_cycles(1.0)
     return [replace(one, errors={"cycles_per_frame": error}) for one in made]
 
 

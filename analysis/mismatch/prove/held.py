@@ -80,7 +80,7 @@ class Held:
     exposures
         With locked frames or without.
     grid
-        The window that is looked at: the whole sensor unless it is large.
+        The window that is looked at: the whole sensor unless it is large, or an odd mosaic.
     black_dn, white_code
         Nominal black level, largest code.
     left_out

@@ -150,7 +150,11 @@ def test_light_that_falls_with_the_fourth_power_of_the_cosine_has_a_ring() -> No
     )
     np.testing.assert_allclose(image, (1 + tangent_square) ** -2, atol=0.004)
     one_colour = np.ones((301, 401, 3))
-    colours = apply(effect("shading", falloff_percent=fall, ring_percent=-0.43 * fall), one_colour)
+    colours = apply(
+        effect("shading", falloff_percent=fall, ring_percent=-0.43 * fall),
+        one_colour,
+        grid=PixelGrid(301, 401, None),
+    )
     np.testing.assert_allclose(colours[..., 1], image, atol=1e-6)
 
 

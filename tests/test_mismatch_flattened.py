@@ -128,7 +128,10 @@ def _state(null: Any) -> Any:
 @pytest.mark.parametrize(("rate", "denied"), [(0.01, True), (0.03, False)])
 def test_a_glow_may_reach_all_of_the_sensor(rate: float, denied: bool) -> None:
     glow = registry()["amp_glow"](dn_per_s=0.06, place="right", extent=0.2)
-    state: Any = SimpleNamespace(camera=SimpleNamespace(effect=(glow,)))
+    seen = SimpleNamespace(images={})  # no map tells
+    state: Any = SimpleNamespace(
+        camera=SimpleNamespace(effect=(glow,)), setting=SimpleNamespace(seen=seen, layout=None)
+    )
     found = uneven(state, registry()["dark_current"](dn_per_s=rate))
     assert (found is not None) is denied
     # A glow of 1 / r has so much where it is least, of 0.06 at its edge and 0.2 of the sensor.

@@ -44,6 +44,7 @@ def _frames(jumping: float, spread: float) -> WholeFrames:
         (15.0, -9.0, "rts", 25.0),
         (15.0, 80.0, "rts", 38.0),  # both are sure: numbers keep their say
         (-1.0, 2.0, "rts", 38.0),  # neither is
+        (5.0, 13.0, "rts", 38.0),  # one is, and odds of 150 are for the other
     ],
 )
 def test_frames_break_the_tie_that_numbers_leave(

@@ -11,6 +11,7 @@ from scipy import fft
 from analysis.mismatch.likepatches import as_patches
 from dsis.cfa import Cfa
 from dsis.effects import registry
+from dsis.grid import PixelGrid
 from mismatch_recordings import camera
 
 ROWS, COLUMNS = 92, 172
@@ -27,7 +28,14 @@ def _state(gain: Array, cfa: Cfa, seed: int) -> Any:
         own = gain[y::step, x::step]
         images[name] = (own + rng.normal(0, NOISE[name], own.shape), NOISE[name])
     clues = SimpleNamespace(
-        layout=SimpleNamespace(sites=sites, rows=ROWS, columns=COLUMNS, cfa=cfa),
+        layout=SimpleNamespace(
+            sites=sites,
+            rows=ROWS,
+            columns=COLUMNS,
+            cfa=cfa,
+            grid=PixelGrid(ROWS, COLUMNS, cfa),
+            seen=lambda frame: frame,
+        ),
         image=lambda _: images,
         scale=lambda *_: 100.0,
         camera=camera(cfa=cfa.value),

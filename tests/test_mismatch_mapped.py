@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from analysis.mismatch.candidates import Proposal
-from analysis.mismatch.layout import sites
+from analysis.mismatch.layout import Layout
 from analysis.mismatch.mapped import as_maps_show
 from analysis.mismatch.polish import Polished
 from analysis.mismatch.rank import Ranked
@@ -25,9 +25,7 @@ HALVES = Proposal(TapMismatch(gain_percent=0.1), ("gain_percent",), frozenset())
 
 def _state(image: Any) -> Any:
     """Return a state whose only map is `image`; both effects change one of its two numbers."""
-    layout = SimpleNamespace(
-        rows=ROWS, columns=COLUMNS, cfa=Cfa.MONO, sites=sites(Cfa.MONO), channels=("MONO",)
-    )
+    layout = Layout((), ROWS, COLUMNS, Cfa.MONO, 0.0, 4095.0, {}, {})
     clues = SimpleNamespace(
         layout=layout,
         camera=camera(),

@@ -25,7 +25,7 @@ def _state(own: float, others: float, axis: str) -> tuple[Any, np.ndarray, np.nd
     mean[details.index("rows 7")] = own
     null = SimpleNamespace(known=np.ones(len(keys), bool), sd=np.ones(len(keys)), mean=without)
     vector = SimpleNamespace(keys=keys, values=seen)
-    return SimpleNamespace(vector=vector, null=null), mean, without
+    return SimpleNamespace(vector=vector, null=null, mismatches=()), mean, without
 
 
 @pytest.mark.parametrize(

@@ -32,6 +32,7 @@ ONLY = {
         "line_correlation",
         "alternation_variance",
         "patch_variance",
+        "line_alternation",
         "fixed_spectral_peak",
     },
     NEIGHBOURS: {

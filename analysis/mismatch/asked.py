@@ -7,6 +7,7 @@ from analysis.mismatch.burst import Bursts, bursts_of
 from analysis.mismatch.layout import Layout
 from analysis.mismatch.paired import Pairs, pairs_of
 from analysis.mismatch.projections import FramesOf
+from analysis.mismatch.rank import TOLD_APART
 from analysis.mismatch.rowlaw import RowLaw
 from analysis.mismatch.rowpower import Size, row_powers
 from analysis.mismatch.telegraph import Telegraph
@@ -40,10 +41,12 @@ class FramesAsked:
     def spread_rather(self, sure: float) -> float:
         """Return by how much frames prefer read noises that spread to pixels that jump, nats.
 
-        What one gains that is `sure` where the other is not, negative of jumps; else 0.
+        What one gains that is `sure` where the other is not told, negative of jumps; else 0.
         """
         seen = self.telegraph
-        if seen is None or (seen.spread > sure) == (seen.jumping > sure):
+        if seen is None or min(seen.spread, seen.jumping) > TOLD_APART:
+            return 0.0
+        if max(seen.spread, seen.jumping) <= sure:
             return 0.0
         return seen.spread if seen.spread > sure else -seen.jumping
 

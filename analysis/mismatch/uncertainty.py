@@ -113,10 +113,12 @@ def _slopes(
 ) -> Array:
     """Return how numbers move with each parameter: (replicate, number, parameter).
 
-    From below it to above it: numbers that go with its square rise by an eighth more above it.
+    From below it to above it: numbers that go with its square rise by an eighth more above it. Of a
+    large recording, where a simulation takes long, above it alone.
     """
     alike = [state.setting.alike(effects[i]) for i, _, _ in free]
-    ways = [list(shifted(bare, effects, free, way)) for way in (1, -1)]
+    sides = (1,) if state.setting.large else (1, -1)
+    ways = [list(shifted(bare, effects, free, way)) for way in sides]
     asked = {same: state.predictor(1 if same else replicates) for same in set(alike)}
     for same, predictor in asked.items():
         predictor.ready(

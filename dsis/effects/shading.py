@@ -95,8 +95,7 @@ class Shading(Effect):
 def _light(effect: Shading, grid: PixelGrid) -> tuple[Line, Line, bool]:
     """Return the light of rows and of columns, to be added, and whether it ends somewhere."""
     rows, columns = grid.sensor_shape
-    y = grid.row_numbers() - (rows - 1) / 2
-    x = grid.column_numbers() - (columns - 1) / 2
+    y, x = _from_centre(grid)
     fall = effect.falloff_percent / 100 / ((rows / 2) ** 2 + (columns / 2) ** 2)
     v, u = y / (rows / 2), x / (columns / 2)
     down = 1 - fall * y**2 + effect.tilt_down_percent / 100 * v
@@ -121,7 +120,13 @@ def _uncut(effect: Shading, grid: PixelGrid) -> NDArray[np.float64]:
     """Return the light of every pixel as if it could be below nothing."""
     down, across, _ = _light(effect, grid)
     rows, columns = grid.sensor_shape
-    y = grid.row_numbers() - (rows - 1) / 2
-    x = grid.column_numbers() - (columns - 1) / 2
+    y, x = _from_centre(grid)
     s = (y**2 + x**2) / ((rows / 2) ** 2 + (columns / 2) ** 2)
     return np.asarray(down.astype(np.float64) + across + effect.ring_percent / 100 * s * (1 - s))
+
+
+def _from_centre(grid: PixelGrid) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return how far rows and columns are from the sensor's centre, pixels, to be added."""
+    rows, columns = grid.sensor_shape
+    y = np.asarray(grid.row_numbers() - (rows - 1) / 2, np.float64)
+    return y, np.asarray(grid.column_numbers() - (columns - 1) / 2, np.float64)

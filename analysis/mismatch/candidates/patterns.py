@@ -28,7 +28,7 @@ _RING = "ring_percent"
 _ROUND, _RINGED, _BOWED = (_FALL, *_TILTS), (_FALL, *_TILTS, _RING), (*_TILTS, *_BOWS)
 SURFACES = frozenset({*_RINGED, *_BOWED})
 _BOWS_DEGREE = 2
-_MOST_RING = 390.0  # per cent
+_MOST, _MOST_RING = 90.0, 390.0  # per cent
 _CLEAR = 3.0  # standard errors from which a tilt is worth a trial
 _JUMP = 0.15  # z of the step where halves meet, of that of their means: some 0.4 of two amplifiers
 _UNEVEN = ("shading", "line_settling", "tap_mismatch")
@@ -160,12 +160,10 @@ def _of_light(own: Mapping[str, float], names: Sequence[str]) -> list[Proposal]:
     """Return the proposal with some of the surfaces, none where a fall is a rise."""
     if not names or (_FALL in names and own[_FALL] <= 0):
         return []
-    most = {_RING: _MOST_RING}
-    start = {
-        _FALL: 0.0,
-        **{name: float(np.clip(own[name], -most.get(name, 90), most.get(name, 90)))
-           for name in names},
-    }  # fmt: skip
+    start = {_FALL: 0.0}
+    for name in names:
+        most = _MOST_RING if name == _RING else _MOST
+        start[name] = float(np.clip(own[name], -most, most))
     return proposals("shading", names, [n for n in names if n != _FALL], **start)
 
 

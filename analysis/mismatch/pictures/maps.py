@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from analysis.mismatch.bank.key import Key
 from analysis.mismatch.bank.maps import ALONE, MAPS
+from analysis.mismatch.bank.surfaces import RING
 from analysis.mismatch.evidence import Map, Shown
 from analysis.mismatch.layout import Layout
 from analysis.mismatch.observe import Observation
@@ -17,7 +18,7 @@ Array = NDArray[np.float64]
 NOISY = "variance"
 UNITS = {"offset": "DN", "gain": "%", "time": "DN/s", NOISY: "variance over its mean"}
 # What no single exposure shows by itself: channels together may be clear, where each is not.
-_MAPS_ALONE = ("fixed_smooth_tilt", "fixed_smooth_falloff", "fixed_smooth_ring", "half_seam",
+_MAPS_ALONE = ("fixed_smooth_tilt", "fixed_smooth_falloff", RING, "half_seam",
                "parity", "fixed_edge", "fixed_spectral_peak")  # fmt: skip
 KINDS = (*MAPS, *(f"{name} alone" for name in ALONE))
 

@@ -12,6 +12,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from analysis.figures import STYLE
+from analysis.mismatch.bank.coherent import ALTERNATING
 from analysis.mismatch.bank.motion import STATISTIC as MOTION
 from analysis.mismatch.bank.standing import NAME as FIXED_WAVE
 from analysis.mismatch.evidence import Array, Evidence, Histogram, Map, Shown
@@ -38,7 +39,7 @@ NOISY_PIXELS = frozenset(
     {"variance_spread", "variance_persistence", "noisy_pixels", "one_off_outliers"}
 )
 OFF_AXIS = frozenset({"spectral_peak", "phase", "alternation_variance", "patch_variance",
-                      "line_alternation"})  # fmt: skip
+                      ALTERNATING})  # fmt: skip
 OF_CODES = frozenset({"code_spacing", "code_imbalance"})
 _SURFACES = ("fixed_smooth_variance", "fixed_patch_variance", "outlying_patch")
 NOISY_PARTS = "smooth_variance_spread"

@@ -1,5 +1,6 @@
 """What whole frames say of pixels that jump, of pairs and rows of frames, and of bursts."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -8,6 +9,7 @@ from analysis.mismatch.layout import Layout
 from analysis.mismatch.paired import Pairs, pairs_of
 from analysis.mismatch.projections import FramesOf
 from analysis.mismatch.rank import TOLD_APART
+from analysis.mismatch.repeated import Repeated, repeats_of
 from analysis.mismatch.rowlaw import RowLaw
 from analysis.mismatch.rowpower import Size, row_powers
 from analysis.mismatch.telegraph import Telegraph
@@ -69,6 +71,11 @@ class FramesAsked:
     def bursts(self) -> Bursts:
         """How much of their tails lies in single lines."""
         return bursts_of(self.layout, self.frames_of)
+
+    @cached_property
+    def repeats(self) -> Mapping[str, Repeated]:
+        """How far offsets of a dark are repeated by other exposures, of each kind."""
+        return repeats_of(self.layout, self.frames_of)
 
     @cached_property
     def rows(self) -> RowLaw:

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.layout import Layout
-from analysis.mismatch.phaselaw import moving_on_in, of_exposures, there_in
-from analysis.mismatch.projections import LEAST, FramesOf, Power, projections
+from analysis.mismatch.phaselaw import moving_on_in, of_exposures, there_in, turns_of
+from analysis.mismatch.projections import LEAST, SURE, FramesOf, Power, projections
 
 Part = tuple[NDArray[np.float64], NDArray[np.float64]]
 """What one exposure adds to the log-likelihood of free phases and of steady ones."""
@@ -51,6 +51,28 @@ def gain_of_bands(layout: Layout, frames_of: FramesOf, cycles: float) -> float:
         return -np.inf
     share = min(np.sqrt(2 * np.pi) * bands.bins, 1.0)
     return bands.odds(bands.parts) - float(np.log(layout.rows / 2 / share))
+
+
+def turns_of_bands(
+    layout: Layout, frames_of: FramesOf, cycles: float
+) -> tuple[float, float] | None:
+    """Return the share of a turn by which bands move on in each frame, and its error; None: unsure.
+
+    Of the exposure that shows them best, where phases that move on steadily are likelier than free
+    ones. Of few frames free phases add up in the mean frame, which has their pattern then; steady
+    ones cancel, and single frames keep all of it: so bands would be taken for deeper than they are.
+    """
+    found = _found(layout, frames_of, cycles)
+    numbers = [np.array(e.numbers, np.float64) for e in layout.uniform]
+    bands = None if found is None else _bands(found, numbers)
+    if bands is None:
+        return None
+    free, steady = (of_exposures(own) for own in zip(*bands.parts, strict=True))
+    if steady - free < SURE:
+        return None
+    powers = [bands.power * weight for weight in bands.seen.weights]
+    best = int(np.argmax([p * n.size for p, n in zip(powers, numbers, strict=True)]))
+    return turns_of(bands.seen.found[best][:, 0], numbers[best], powers[best] ** 0.5)
 
 
 def place_of_bands(

@@ -248,7 +248,7 @@ def _searched(search: Search, source: Source) -> State:
     search.setting, search.base = whole, base
     some = search.named or search.own
     final = State.of(whole, camera, search.step, draft=True) if some else base
-    return search.resumed(final) if layout == whole.layout else _switched(search, final)
+    return search.resumed(final) if layout == whole.layout else _switched(search, search.lit(final))
 
 
 def _switched(search: Search, state: State) -> State:
@@ -332,6 +332,8 @@ def _omitted(named: Named, why: tuple[str, ...], gain: Gain) -> OmittedEffect:
         for name, value in effect.model_dump(exclude={"kind"}).items():
             if isinstance(value, str):
                 choices[name] = value
+            elif name == "field":
+                choices |= {name: "as measured"} if value else {}
             elif isinstance(value, tuple):
                 parameters[name] = FittedParameter(value, named.proposal.errors.get(name, 0.0))
             elif isinstance(value, (int, float)) and not isinstance(value, bool):

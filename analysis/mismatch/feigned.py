@@ -15,7 +15,7 @@ from analysis.mismatch.bank.standing import NAME as FIXED_WAVE
 from analysis.mismatch.contradicted import Denial, rival
 from analysis.mismatch.displaced import displaced
 from analysis.mismatch.edged import STATISTIC, edged, single
-from analysis.mismatch.feignedtails import clamped, coded, lopsided, placed
+from analysis.mismatch.feignedtails import clamped, coded, lopsided, placed, spiked
 from analysis.mismatch.fewfixed import of_few_that_stand_out
 from analysis.mismatch.flatcolumns import flat_columns
 from analysis.mismatch.grown import grown
@@ -25,6 +25,7 @@ from analysis.mismatch.jumped import jumped
 from analysis.mismatch.leftopen import warm_left
 from analysis.mismatch.movinglines import of_means
 from analysis.mismatch.nofield import no_field
+from analysis.mismatch.notfull import far_below
 from analysis.mismatch.persisting import persisting
 from analysis.mismatch.rivalled import rivalled
 from analysis.mismatch.state import State
@@ -47,7 +48,7 @@ _MAPS = {
 _AXES = {"row_fpn": "rows", "column_fpn": "columns", "row_prnu": "rows", "column_prnu": "columns"}
 _GROWING = frozenset({"row_prnu", "column_prnu"})
 _CLEAR = 5.0  # standard errors of what stands out
-_SURE = 4.0  # of what few frequencies make
+_SURE, _FEW = 4.0, 2.0  # of what few frequencies make; and by which the others show nothing
 _ALIKE_ROWS = frozenset({"row_correlation", "slow_row_variance"})
 _SHAPED = frozenset({"half_seam", "parity", STATISTIC})
 _NEIGHBOURS = frozenset({"fixed_correlation_0_1", "fixed_correlation_1_0", "fixed_patch_variance"})
@@ -87,6 +88,8 @@ def of_another(state: State, effect: Effect, without: Array) -> Denial | None:
         or uneven(state, effect)
         or coded(state, kind, without)
         or lopsided(state, kind)
+        or spiked(state, kind)
+        or far_below(state, effect)
         or placed(state, kind, without)
         or clamped(state, kind, without)
         or persisting(state, kind, without)
@@ -339,19 +342,22 @@ def coloured(state: State, kind: str) -> Denial | None:
     Where a wave is left unexplained, or that neighbours are alike, and half of the map's variance
     beyond noise, lines and smooth surfaces is of few frequencies, all pixels may be alike but for
     it: the median bin knows of the many. By chance it differs from the mean of all bins by what its
-    own error is beyond theirs.
+    own error is beyond theirs. Where it shows nothing that is beyond its error, nothing is left to
+    them either.
     """
     called = {m.statistic for m in state.mismatches} & {FIXED_WAVE, *_NEIGHBOURS}
     if kind not in _MAPS or not called:
         return None
-    plain, most, square = 0.0, 0.0, 0.0
+    plain, most, square, many = 0.0, 0.0, 0.0, 0.0
     for image, noise in _maps(state, kind):
         part = parts(image, noise)
         power = np.abs(np.fft.rfft2(part.pixels)[1:, 1:-1]) ** 2 / image.size
         plain += part.square - 1
         most += white_level(power, 1) - 1
         square += 2 / image.size * (1 / log(2) ** 2 - 1)
-    if plain <= 0 or most >= _MOST * plain or plain - most < _SURE * square**0.5:
+        many += 2 / image.size / log(2) ** 2
+    unseen = most < _FEW * many**0.5
+    if plain <= 0 or most >= _MOST * plain or not (unseen or plain - most >= _SURE * square**0.5):
         return None
     why = "a wave that stands still makes" if FIXED_WAVE in called else "neighbours have in common"
     return Denial(max(most / plain, 0.0), f"{why} most of what it would explain")

@@ -78,6 +78,20 @@ def coded(state: State, kind: str, without: Array) -> Denial | None:
     return Denial(1 - fake / whole, "codes are not equally wide, and feign tails")
 
 
+def spiked(state: State, kind: str) -> Denial | None:
+    """Return how unequal codes are denied by spikes; None: they are not.
+
+    Samples far out fill codes that noise does not reach, one here and one there. Where such are
+    left unexplained, and more than a few, they make codes uneven by themselves.
+    """
+    if kind != "adc_dnl":
+        return None
+    off = {m.statistic: abs(m.z) for m in state.mismatches}
+    least = min(off.get(name, 0.0) for name in ("one_off_outliers", "kurtosis"))
+    why = "samples far out are left unexplained, and make codes uneven"
+    return Denial(0.0, why) if least > FAR_OFF else None
+
+
 def lopsided(state: State, kind: str) -> Denial | None:
     """Return how heavy tails are denied by noise that leans to one side; None: they are not.
 

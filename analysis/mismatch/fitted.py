@@ -7,6 +7,7 @@ from analysis.mismatch.candidates import CANDIDATES, Proposal
 from analysis.mismatch.candidates.patterns import of_any_shape
 from analysis.mismatch.credited import given_back
 from analysis.mismatch.displaced import displaced
+from analysis.mismatch.lightfield import measured_light
 from analysis.mismatch.named import Named, camera_without, renewed
 from analysis.mismatch.own import Own, called, explained, refitted, resized, sizes, without_own
 from analysis.mismatch.polish import polish, with_effects
@@ -73,6 +74,23 @@ class Fitted:
     beside_path: dict[tuple[str, ...], bool] = field(default_factory=dict)
     whole: Setting | None = None
     of_whole: State | None = None
+
+    def lit(self, state: State) -> State:
+        """Return the state in the light that flats show, where no shape of few numbers has it.
+
+        What was measured in other frames before is measured again.
+        """
+        if "shading" not in self.vocabulary:
+            return state
+        before = [one for one in self.named if one.light is not None]
+        known = [one.light for one in before if one.light is not None]
+        bare = camera_without(state.camera, known, self.camera)
+        found = measured_light(replace(state.clues(), camera=bare))
+        camera = None if found is None else with_effects(bare, [found.proposal.effect])
+        if found is None or camera is None:
+            return state
+        self.named = [found, *(one for one in self.named if one not in before)]
+        return State.of(self.setting, camera, self.step, draft=True, near=state)
 
     def settle(self, state: State) -> State:
         """Return the state with final parameters; their errors go into the effects named."""

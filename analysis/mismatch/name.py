@@ -67,11 +67,12 @@ class Search(Fitted):
 
     def run(self) -> State:
         """Return the final state."""
-        return self.further(self.base)
+        state = self.lit(self.base)
+        return self.further(state, again=state is not self.base)
 
     def begun(self, state: State) -> State:
         """Return the state with what is strong: parameters are fitted, and all is judged, later."""
-        return self._sought(state, strong=True)
+        return self._sought(self.lit(state), strong=True)
 
     def resumed(self, state: State) -> State:
         """Return the final state of a search that goes on with more frames than before.
@@ -80,6 +81,7 @@ class Search(Fitted):
         frames tell better, is looked for once more, and everything fitted once more.
         """
         self.memory, self.refused, self.tied, self.sized = Memory(), {}, {}, set()
+        state = self.lit(state)
         for named in [n for n in self.named if n.kind in _CHOSEN]:
             self.named.remove(named)
             bare = self.without(state, named)

@@ -8,6 +8,7 @@ from analysis.mismatch.candidates import Proposal
 from analysis.mismatch.instance import LINES, instance
 from dsis.camera import Camera
 from dsis.effects import Effect
+from dsis.effects.shading import Shading
 
 _OF_FRAMES = LINES | {"rts"}
 _CLEAR = 3.0  # standard errors of an effect's size that is no chance
@@ -68,9 +69,16 @@ class Named:
 
     @property
     def measured(self) -> bool:
-        """Whether it is a line or a telegraph that frames show, with an amplitude of their own."""
+        """Whether frames show it by themselves: a line, a telegraph, or light of a measured shape."""
         own = self.proposal
-        return self.kind in _OF_FRAMES and own is not None and not own.free
+        shown = self.kind in _OF_FRAMES or self.light is not None
+        return shown and own is not None and not own.free
+
+    @property
+    def light(self) -> Shading | None:
+        """The light of flats as it was measured; None: it is none."""
+        effect = self.effect
+        return effect if isinstance(effect, Shading) and effect.field else None
 
     @property
     def of_pixels(self) -> bool:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from analysis.mismatch.aliases import aliases, strongest
 from analysis.mismatch.asked import FramesAsked
-from analysis.mismatch.bandgain import gain_of_bands, place_of_bands
+from analysis.mismatch.bandgain import gain_of_bands, place_of_bands, turns_of_bands
 from analysis.mismatch.instance import Frequency, frequency_of, same_line
 from analysis.mismatch.layout import Layout
 from analysis.mismatch.projections import LEAST, SURE, FramesOf, Power, projections
@@ -33,6 +33,7 @@ _BETWEEN = (-1 / 3, 0.0, 1 / 3)  # bins by which a frequency may be off
 _BESIDE = 4.0  # errors by which the top of a line lies beside a frequency of few pixels
 _CHANCE = 0.05  # of a line as strong among all frequencies
 _SLOWEST = 3.0  # waves of a frame, beside which noise may rise as 1 / f
+_FEWEST_WAVES = 1.5  # of a frame, that a pattern has
 _SHORTER = 5, 24  # waves of a frame, that say by how much
 _FEW = 32  # multiples of an eighth, at which patterns of few pixels lie
 _PHASE_WORDS = {
@@ -43,6 +44,7 @@ ABSENT = "the frames show nothing there that noise does not show at some frequen
 _BY_CHANCE = "it would be at a frequency of single pixels by chance only"
 _UNTOLD = "frames do not tell whether its phase is kept"
 _OF_LIGHT = "it grows with the light, as no pattern of the read-out does"
+_SMOOTH = "frames have less than a wave and a half of it, as of any smooth surface that moves"
 _BROAD = "frequencies beside it are raised as well: it is no line"
 
 
@@ -76,6 +78,8 @@ class WholeFrames(FramesAsked):
         frequency = frequency_of(effect)
         if frequency is None:
             return None
+        if effect.kind == "bistable_pattern" and self._waves(frequency) < _FEWEST_WAVES:
+            return _SMOOTH
         if frequency not in self._looks:
             self._looks[frequency] = look(self.layout, self.frames_of, frequency)
         seen = self._looks[frequency]
@@ -110,8 +114,11 @@ class WholeFrames(FramesAsked):
             share = self.layout.seen_cycles(1.0)
             cycles = effect.cycles_per_frame * share
             place = place_of_bands(self.layout, self.frames_of, cycles)
-            name = "cycles_per_frame"
-            return None if place is None else ({name: place[0] / share}, {name: place[1] / share})
+            turns = turns_of_bands(self.layout, self.frames_of, cycles)
+            told = [] if place is None else [("cycles_per_frame", [own / share for own in place])]
+            told += [] if turns is None else [("turns_per_frame", list(turns))]
+            known = {name: own for name, (own, _) in told}, {name: own for name, (_, own) in told}
+            return known if told else None
         line = self.line(effect)
         return None if line is None else (line.values, line.errors)
 
@@ -174,6 +181,11 @@ class WholeFrames(FramesAsked):
         anywhere = float(np.log(self.layout.rows * self.layout.columns / 2 / share))
         chosen = float(np.log(_FEW)) if kept and self._looks[frequency].exact else anywhere
         return line.there(power, kept=kept, real=real) - chosen
+
+    def _waves(self, frequency: Frequency) -> float:
+        """Return how many waves of a line lie in a frame, along the axis that has more."""
+        across, down = frequency
+        return max(abs(across) * self.layout.columns, abs(down) * self.layout.rows)
 
     @property
     def _size(self) -> tuple[int, int]:

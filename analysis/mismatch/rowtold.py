@@ -15,6 +15,7 @@ from analysis.mismatch.paired import STEADY
 from analysis.mismatch.phase import WholeFrames
 from analysis.mismatch.polish import with_effects
 from analysis.mismatch.rank import LEAST_GAIN, TOLD_APART, Ranked, alike, replicates_for
+from analysis.mismatch.repeated import OFFSETS
 from analysis.mismatch.state import State
 from dsis.effects import Effect
 from dsis.effects.pink_noise import PinkNoise
@@ -64,6 +65,9 @@ def unlike_frames(
         return paired
     if best.kind in TAILS and frames is not None and (burst := frames.bursts.denial(best.kind)):
         return burst
+    if best.kind in OFFSETS and frames is not None and (own := frames.repeats.get(best.kind)):
+        if (new := own.denial) is not None:
+            return new
     if best.kind in PIXELS:
         return unlike_pixels(state.camera, frames, best, others, partial(_explained, state))
     if (denial := no_field(state, best.polished.effects[0])) is not None:

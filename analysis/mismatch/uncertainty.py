@@ -33,6 +33,7 @@ Array = NDArray[np.float64]
 _LARGEST = 0.7  # correction of a logarithm
 _CLEAR = 0.9  # share of what slopes show that is theirs: more sensors are not needed
 _LEAST = 0.05  # of it, from which on errors are said as if it were that much
+_BY_CHANCE = 3.0  # standard deviations of a mean square, that chance makes
 _LEAST_SENSORS = 2  # that show a scatter
 _NORMAL = 1.96
 _FARTHEST = 7.0  # end of a logarithm's interval: beyond a factor of 1000 nothing is known
@@ -44,7 +45,8 @@ def settled(
     """Return effects and standard errors of their free parameters.
 
     1.96 errors are half the 95 % interval: by Student's law, for the variance is known from few
-    simulations, and of a parameter whose logarithm is fitted as long as its own interval.
+    simulations, and of a parameter whose logarithm is fitted as long as its own interval. Numbers
+    that tell a parameter and are off by far more than chance make its error larger, see `_misfit`.
 
     Parameters
     ----------
@@ -61,7 +63,7 @@ def settled(
     if not free:
         return effects, errors
     mean, known = state.null.mean, state.null.known
-    score, inverse = _information(state, bare, effects, free)
+    score, inverse, weights = _information(state, bare, effects, free)
     rest = np.where(known, state.vector.values - mean, 0.0)
     simulated = np.where(known, np.nan_to_num(state.simulated) - mean, 0.0) @ score.T
     count = len(simulated)
@@ -69,6 +71,9 @@ def settled(
     sandwich = inverse @ covariance @ inverse
     step = inverse @ (score @ rest)
     reach = float(scipy.stats.t.ppf(0.975, count - 1)) * np.sqrt(np.diag(sandwich))
+    _, sd, _ = state.predictor().weights(mean)
+    slopes = np.divide(score, weights, out=np.zeros_like(score), where=weights > 0).T
+    reach *= _misfit(slopes, sd, np.where(weights > 0, rest - slopes @ step, 0.0))
     corrected = effects
     for (i, name, signed), delta in zip(free, step, strict=True):
         limited = float(delta if signed else np.clip(delta, -_LARGEST, _LARGEST))
@@ -88,8 +93,8 @@ def settled(
 
 def _information(
     state: State, bare: Camera, effects: tuple[Effect, ...], free: Sequence[Free]
-) -> tuple[Array, Array]:
-    """Return the score's weights (parameter, number), and the inverse of its information.
+) -> tuple[Array, Array, Array]:
+    """Return the score's weights (parameter, number), the inverse of its information, precisions.
 
     Sensors are added until their scatter is little beside the slopes, or as many as of a null.
     """
@@ -104,8 +109,24 @@ def _information(
         score = (slopes.mean(0) * weights[:, None]).T
         inverse, share = inverse_information(slopes, weights)
         if share > _CLEAR or replicates >= most:
-            return score, inverse
+            return score, inverse, weights
         replicates = min(2 * replicates, most)
+
+
+def _misfit(slopes: Array, sd: Array, left: Array) -> Array:
+    """Return by how much errors of parameters are larger for numbers that do not fit: (parameter,).
+
+    The mean of the squares of what is left, in standard deviations, each number weighted by what it
+    tells of the parameter (Birge, Phys. Rev. 40, 1932): 1 for a law that holds. A full well, say,
+    where charge is limited by another law, is told by numbers that remain far off. What chance
+    makes of as many numbers counts as 1.
+    """
+    told = (slopes / sd[:, None]) ** 2
+    whole = np.maximum(told.sum(0), 1e-300)
+    birge = (left / sd) ** 2 @ told / whole
+    numbers = whole**2 / np.maximum((told**2).sum(0), 1e-300)
+    chance = 1 + _BY_CHANCE * np.sqrt(2 / numbers)
+    return np.sqrt(np.where(birge > chance, birge, 1.0))
 
 
 def _slopes(

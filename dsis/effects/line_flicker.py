@@ -11,18 +11,31 @@ from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, Stage
 from dsis.grid import PixelGrid
 
 _POINT = PixelGrid(1, 1, Cfa.MONO)
+_FRAMES = 2**32  # modulo which they are counted: those before the first come last
+
+
+def _free(turns: object) -> bool:
+    return turns is None
+
+
+def _counted(frame: int) -> int:
+    """Return the number of a frame, negative before the first one."""
+    return frame - _FRAMES if frame >= _FRAMES // 2 else frame
 
 
 class LineFlicker(Effect):
-    """Sinusoidal bands in proportion to the signal, their phase new in each frame.
+    """Sinusoidal bands in proportion to the signal, their phase another in each frame.
 
     S'(t, y, x) = S(y, x) (1 + d sin(2 pi c y / H + phi(t))): d the depth of modulation, (max - min)
     / (max + min), c cycles in the H rows of the sensor. Row means gain the variance (d S)^2 / 2.
+    The phase is drawn anew for each frame; or, where the lamp and the frames keep their rates, it
+    moves on by a share of a turn from frame to frame, from one that is drawn for each exposure.
     """
 
     kind: Literal["line_flicker"] = "line_flicker"
     depth_percent: Annotated[float, Field(ge=0, le=100, examples=[0.5])]
     cycles_per_frame: Annotated[float, Field(gt=0, examples=[3.3])]
+    turns_per_frame: Annotated[float | None, Field(ge=0, lt=1, exclude_if=_free)] = None
 
     stage: ClassVar[Stage] = Stage.LIGHT
     reference: ClassVar[str] = (
@@ -38,9 +51,12 @@ class LineFlicker(Effect):
 
     def apply(self, image: Image, exposure: Exposure) -> Image:
         """Multiply each row by its light."""
-        turn = exposure.temporal.uniform("line_flicker", _POINT, exposure.frame)[0, 0]
+        number = exposure.frame if self.turns_per_frame is None else 0
+        turn = float(exposure.temporal.uniform("line_flicker", _POINT, number)[0, 0])
+        if self.turns_per_frame is not None:
+            turn += self.turns_per_frame * _counted(exposure.frame)
         height = exposure.grid.sensor_shape[0]
-        phase = self.cycles_per_frame / height * exposure.grid.row_numbers() + float(turn)
+        phase = self.cycles_per_frame / height * exposure.grid.row_numbers() + turn
         gain = 1 + self.depth_percent / 100 * np.sin(2 * np.pi * phase)
         made: Image = image * gain.astype(np.float32)
         return made

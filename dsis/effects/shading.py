@@ -2,16 +2,21 @@
 
 from collections.abc import Mapping
 from functools import lru_cache
-from typing import Annotated, ClassVar, Literal
+from operator import not_
+from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
+from pydantic import Field, model_validator
 
-from dsis.cfa import Cfa
-from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, Stage
+from dsis.cfa import BLUE, RED, Cfa, pattern
+from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, ReadOut, Stage
 from dsis.grid import PixelGrid
 from dsis.lines import Line, lit
+
+
+Surface = tuple[tuple[float, ...], ...]
+_CHANNELS = ("R", "Gr", "Gb", "B")
 
 
 class Shading(Effect):
@@ -27,6 +32,10 @@ class Shading(Effect):
     shade the corners alone; it moves the mean by e (1/3 - mean of s^2), some 0.18 e. A lamp beside
     the axis gives a fall and a tilt, and so does a part of a sensor, whose centre is another; an
     integrating sphere or a lamp behind a slit, bows.
+
+    Light of no such shape has a `field` besides, as it was measured: 100 g(k, l) are the
+    coefficients that follow, by which sum_kl g(k, l) L_k(v) L_l(u) is added, L the polynomials of
+    Legendre. Of each colour its own: of a mosaic R, Gr, Gb and B, in this order.
     """
 
     kind: Literal["shading"] = "shading"
@@ -36,6 +45,7 @@ class Shading(Effect):
     bow_down_percent: Annotated[float, Field(ge=-100, le=100)] = 0.0
     bow_right_percent: Annotated[float, Field(ge=-100, le=100)] = 0.0
     ring_percent: Annotated[float, Field(ge=-400, le=400)] = 0.0
+    field: Annotated[tuple[Surface, ...], Field(exclude_if=not_)] = ()
 
     stage: ClassVar[Stage] = Stage.LIGHT
     draws: ClassVar[bool] = False
@@ -54,8 +64,25 @@ class Shading(Effect):
         "in darkness."
     )
 
+    @model_validator(mode="after")
+    def _possible(self) -> Self:
+        if len(self.field) not in (0, 1, len(_CHANNELS)):
+            raise ValueError(f"field has {len(self.field)} surfaces, must have 1, or 4 of a mosaic")
+        if any(len({len(row) for row in own}) != 1 or not own[0] for own in self.field):
+            raise ValueError("field must hold rows of equally many coefficients")
+        return self
+
+    def unfit_for(self, read_out: ReadOut) -> str:
+        """Refuse fields of other colours than the camera's."""
+        count = 1 if read_out.cfa is Cfa.MONO else len(_CHANNELS)
+        if len(self.field) in (0, count):
+            return ""
+        return f"has a field of {len(self.field)} surfaces, but cfa {read_out.cfa} has {count}"
+
     def apply(self, image: Image, exposure: Exposure) -> Image:
         """Multiply by the light that reaches each pixel."""
+        if self.field:
+            return np.asarray(image * _coloured(self, exposure.grid, exposure.read_out.cfa))
         if self.ring_percent:
             return np.asarray(image * _whole(self, exposure.grid))
         down, across, ends = _light(self, exposure.grid)
@@ -67,8 +94,10 @@ class Shading(Effect):
 
     def contributions(self, point: OperatingPoint) -> Mapping[str, float]:
         """Return what mean and shot noise lose, and the variance of the whole sensor's light."""
-        if self.ring_percent:
+        if self.ring_percent or self.field:
             whole = _uncut(self, PixelGrid(point.rows, point.columns, Cfa.MONO))
+            if self.field:
+                whole = whole + np.mean([_surface(own, whole.shape) for own in self.field], axis=0)
             gained = float(whole.mean()) - 1
             return {
                 "level": gained * point.signal_dn,
@@ -123,6 +152,52 @@ def _uncut(effect: Shading, grid: PixelGrid) -> NDArray[np.float64]:
     y, x = _from_centre(grid)
     s = (y**2 + x**2) / ((rows / 2) ** 2 + (columns / 2) ** 2)
     return np.asarray(down.astype(np.float64) + across + effect.ring_percent / 100 * s * (1 - s))
+
+
+@lru_cache(maxsize=2)
+def _coloured(effect: Shading, grid: PixelGrid, cfa: Cfa) -> Image:
+    """Return the light of every pixel of each colour: (row, column), or (row, column, colour)."""
+    even = _uncut(effect, grid)
+    rows, columns = grid.row_numbers().ravel(), grid.column_numbers().ravel()
+    shape = grid.sensor_shape
+    even = even.reshape(grid.rows, grid.columns)
+    planes = [even + _at(own, shape, rows, columns) for own in effect.field]
+    if grid.cfa is None:
+        red, first, second, blue = planes if len(planes) > 1 else planes * len(_CHANNELS)
+        light = np.stack([red, (first + second) / 2, blue], 2)
+    elif len(planes) == 1:
+        light = planes[0]
+    else:
+        light = np.empty(grid.shape)
+        for own, (y, x) in zip(planes, _sites(cfa), strict=True):
+            some = np.ix_(rows % 2 == y, columns % 2 == x)
+            light[some] = own[some]
+    made = np.maximum(light, 0).astype(np.float32)
+    made.flags.writeable = False
+    return made
+
+
+def _sites(cfa: Cfa) -> list[tuple[int, int]]:
+    """Return the first row and column of R, Gr, Gb and B."""
+    colours = pattern(cfa)
+    (red,), (blue,) = (np.argwhere(colours == one).tolist() for one in (RED, BLUE))
+    return [tuple(red), (red[0], blue[1]), (blue[0], red[1]), tuple(blue)]
+
+
+def _surface(own: Surface, shape: tuple[int, ...]) -> NDArray[np.float64]:
+    return _at(own, (shape[0], shape[1]), np.arange(shape[0]), np.arange(shape[1]))
+
+
+def _at(
+    own: Surface, shape: tuple[int, int], rows: NDArray[np.integer], columns: NDArray[np.integer]
+) -> NDArray[np.float64]:
+    """Return what a field adds to the light of some rows and columns of a sensor."""
+    made = np.asarray(own, np.float64) / 100
+    down, across = (
+        np.polynomial.legendre.legvander((at - (size - 1) / 2) / (size / 2), count - 1)
+        for at, size, count in zip((rows, columns), shape, made.shape, strict=True)
+    )
+    return np.asarray(down @ made @ across.T)
 
 
 def _from_centre(grid: PixelGrid) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -144,6 +144,12 @@ def had(clues: Clues, channel: str) -> Array:
 
     Those of uneven light, and those whose lines feign it: (pixel,).
     """
+    gain = 100 * made_of_light(clues, channel)
+    return np.asarray(gain - gain.mean())
+
+
+def made_of_light(clues: Clues, channel: str) -> Array:
+    """Return what these make of a unit of even light: (pixel,)."""
     layout, uneven = clues.layout, [e for e in clues.camera.effect if e.kind in _UNEVEN]
     y, x = layout.sites[channel]
     step = 1 if len(layout.sites) == 1 else 2
@@ -152,8 +158,7 @@ def had(clues: Clues, channel: str) -> Array:
         layout.seen(mean_frame(np.full(grid.shape, light, np.float32), uneven, grid, read_out, 0.0))
         for light in (0.0, _LIGHT_DN)
     )
-    gain = 100 * (lit.astype(np.float64) - dark)[y::step, x::step].ravel() / _LIGHT_DN
-    return np.asarray(gain - gain.mean())
+    return np.asarray((lit.astype(np.float64) - dark)[y::step, x::step].ravel() / _LIGHT_DN)
 
 
 def _of_light(own: Mapping[str, float], names: Sequence[str]) -> list[Proposal]:

@@ -1,0 +1,36 @@
+"""A soft full well that no level comes near: levels bend, as of any response."""
+
+import numpy as np
+from scipy.special import expit
+
+from analysis.mismatch.contradicted import Denial
+from analysis.mismatch.state import State
+from dsis.effects import Effect
+from dsis.effects.saturation import Saturation
+
+_BENT = 0.9  # of charge that comes, that a pixel still keeps where a limit is near
+
+
+def far_below(state: State, effect: Effect) -> Denial | None:
+    """Return how a soft full well is denied by levels that all lie far below it; None: they do not.
+
+    A pixel that fills up collects less and less of what comes: k softly, 1 / (1 + exp((Q - full
+    well) / k)) of it. Where even the brightest pixels keep nine tenths, levels bend, as those of any
+    response may, and nothing shows that they have a limit.
+    """
+    if not isinstance(effect, Saturation) or not effect.softness_dn:
+        return None
+    levels = state.setting.seen.levels
+    flats = {e.name for e in state.setting.layout.uniform if e.kind == "flat"}
+    most = max(
+        (
+            max(state.setting.layout.signal_dn[place], 0.0) + max(own.variance_dn2, 0.0) ** 0.5
+            for place, own in levels.items()
+            if place[0] in flats
+        ),
+        default=np.inf,
+    )
+    kept = float(expit((effect.full_well_dn - most) / effect.softness_dn))
+    if kept < _BENT:
+        return None
+    return Denial(1 - kept, "no level is near the full well: levels bend as of any response")

@@ -24,6 +24,7 @@ _DEGREE = 14  # of a polynomial, in both directions together
 _HIGHEST = 12  # that is kept; what is higher tells whether its coefficients end
 _LEAST = 10.0  # standard errors of a coefficient in the mean, beyond shapes of few numbers
 _ENDS = 0.03  # of the coefficients of low degrees, that those of high ones have
+_BY_CHANCE = 2.0  # standard deviations of their mean square
 _NOISE = 2.0  # mean square of coefficients, in their errors, that is none but noise
 _CLIPPED = 5.0  # standard deviations of a pixel
 _KIND = "shading"
@@ -38,7 +39,8 @@ def measured_light(clues: Clues) -> Named | None:
     The gain's map of each colour, over what the camera's own effects make of even light, is a sum
     of products of Legendre polynomials beside steps of halves, by least squares; of as many as rise
     beyond noise. It is light where many coefficients with both directions in them do, which lines
-    and halves have not, and where these end, which those of gains that neighbours share do not.
+    and halves have not, and where these end, which those of gains that neighbours share do not. And
+    where the camera has uneven light of its own, but not as much, or not there.
     """
     images = clues.image("gain")
     if set(images) != set(clues.layout.sites):
@@ -48,7 +50,10 @@ def measured_light(clues: Clues) -> Named | None:
         return None
     planes = [own for own in fitted if own is not None]
     strength = np.mean([own.strength for own in planes])
-    if strength < _LEAST**2 or any(own.open_ended for own in planes):
+    light = strength >= _LEAST**2 and not any(own.open_ended for own in planes)
+    if any(own.kind == _KIND for own in clues.camera.effect):
+        light = light or np.mean([own.surfaces for own in planes]) >= _LEAST**2
+    if not light:
         return None
     return _named(planes, clues.layout.grid.sensor_shape)
 
@@ -61,6 +66,8 @@ class _Plane:
     ----------
     strength
         Mean square of coefficients in their errors, beyond shapes of few numbers.
+    surfaces
+        Of those of the first two degrees.
     open_ended
         Whether coefficients of high degree are as large as those of low ones, nearly.
     """
@@ -68,6 +75,7 @@ class _Plane:
     found: Array
     errors: Array
     strength: float
+    surfaces: float
     open_ended: bool
 
     @property
@@ -112,9 +120,14 @@ def _fitted(clues: Clues, channel: str, image: Array, noise: float) -> _Plane | 
     beyond = found - _of_few(fit, image.shape, found, errors)
     low, high = both & (order >= _OWN) & (order <= 2 * _OWN), both & (order > _HIGHEST)
     high &= order <= _DEGREE
-    above = max(float(np.mean(found[high] ** 2 - errors[high] ** 2)), 0.0)
+    noise_square = float(np.mean(errors[high] ** 2))
+    chance = 1 + _BY_CHANCE * (2 / np.count_nonzero(high)) ** 0.5
+    above = float(np.mean(found[high] ** 2)) - chance * noise_square
     ends = above <= _ENDS**2 * float(np.mean(beyond[low] ** 2))
-    return _Plane(found, errors, float(np.mean((beyond[low] / errors[low]) ** 2)), not ends)
+    squares = (found / errors) ** 2
+    first = (order > 0) & (order < _OWN)
+    strength = float(np.mean((beyond[low] / errors[low]) ** 2))
+    return _Plane(found, errors, strength, float(np.mean(squares[first])), not ends)
 
 
 @dataclass(frozen=True)

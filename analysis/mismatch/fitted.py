@@ -86,7 +86,8 @@ class Fitted:
         known = [one.light for one in before if one.light is not None]
         bare = camera_without(state.camera, known, self.camera)
         found = measured_light(replace(state.clues(), camera=bare))
-        camera = None if found is None else with_effects(bare, [found.proposal.effect])
+        light = None if found is None else found.light
+        camera = None if light is None else with_effects(bare, [light])
         if found is None or camera is None:
             return state
         self.named = [found, *(one for one in self.named if one not in before)]

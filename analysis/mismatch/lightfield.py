@@ -60,7 +60,7 @@ def measured_light(clues: Clues) -> Named | None:
 
 @dataclass(frozen=True)
 class _Plane:
-    """The light of a colour, 1 in the mean of the sensor: coefficients (down, across) and their errors.
+    """A colour's light, 1 in the mean of the sensor: coefficients (down, across), their errors.
 
     Attributes
     ----------
@@ -117,7 +117,7 @@ def _fitted(clues: Clues, channel: str, image: Array, noise: float) -> _Plane | 
     found, errors = found[:-1, :-1] / found[0, 0], errors[:-1, :-1] / found[0, 0]
     order = _orders(found.shape)
     both = np.minimum(*np.indices(found.shape)) > 0
-    beyond = found - _of_few(fit, image.shape, found, errors)
+    beyond = found - _of_few(fit, image.shape, found, np.where(both, errors, np.inf))
     low, high = both & (order >= _OWN) & (order <= 2 * _OWN), both & (order > _HIGHEST)
     high &= order <= _DEGREE
     noise_square = float(np.mean(errors[high] ** 2))
@@ -167,7 +167,7 @@ class _Fit:
         pairs = np.vstack([np.argwhere(order <= _DEGREE), [(last, 0), (0, last)]])
         k, m = pairs.T
         square = (down.T @ down)[np.ix_(k, k)] * (across.T @ across)[np.ix_(m, m)]
-        return cls(down, across, pairs, np.linalg.inv(square))
+        return cls(down, across, pairs, np.asarray(np.linalg.inv(square), np.float64))
 
     def __call__(self, plane: Array) -> Array:
         """Return the coefficients of a plane, 0 of what is no pair."""
@@ -197,7 +197,7 @@ def _along(places: NDArray[np.integer], size: int) -> Array:
 
 
 def _of_few(fit: _Fit, shape: tuple[int, ...], found: Array, errors: Array) -> Array:
-    """Return what of coefficients shapes of few numbers have."""
+    """Return what of coefficients, those without errors apart, shapes of few numbers have."""
     some = surfaces(shape, sorted(SURFACES)).reshape(-1, *shape)
     made = np.stack([fit(one)[:-1, :-1] for one in (np.ones(shape), *some)])
     design = (made / errors).reshape(len(made), -1).T
@@ -216,9 +216,7 @@ def _named(planes: Sequence[_Plane], shape: tuple[int, int]) -> Named:
     size = max(degree, 2) + 1
     kept = np.where(_orders((size, size)) <= degree, 1.0, 0.0)
     centre = [own.at(0.0, 0.0) for own in planes]
-    corners = [
-        np.mean([own.at(y, x) for y in (-1.0, 1.0) for x in (-1.0, 1.0)]) for own in planes
-    ]
+    corners = [np.mean([own.at(y, x) for y in (-1.0, 1.0) for x in (-1.0, 1.0)]) for own in planes]
     falls = 1 - np.array(corners) / np.array(centre)
     fall = float(np.clip(falls.mean(), 0, 1))
     tilts = [float(np.mean([own.found[at] for own in planes])) for at in ((1, 0), (0, 1))]

@@ -67,8 +67,7 @@ class Search(Fitted):
 
     def run(self) -> State:
         """Return the final state."""
-        state = self.lit(self.base)
-        return self.further(state, again=state is not self.base)
+        return self.further(self.lit(self.base), again=bool(self.named))
 
     def begun(self, state: State) -> State:
         """Return the state with what is strong: parameters are fitted, and all is judged, later."""

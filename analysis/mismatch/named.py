@@ -69,7 +69,7 @@ class Named:
 
     @property
     def measured(self) -> bool:
-        """Whether frames show it by themselves: a line, a telegraph, or light of a measured shape."""
+        """Whether frames show it by themselves: lines, telegraphs, light of a measured shape."""
         own = self.proposal
         shown = self.kind in _OF_FRAMES or self.light is not None
         return shown and own is not None and not own.free

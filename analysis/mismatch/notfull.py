@@ -14,9 +14,9 @@ _BENT = 0.9  # of charge that comes, that a pixel still keeps where a limit is n
 def far_below(state: State, effect: Effect) -> Denial | None:
     """Return how a soft full well is denied by levels that all lie far below it; None: they do not.
 
-    A pixel that fills up collects less and less of what comes: k softly, 1 / (1 + exp((Q - full
-    well) / k)) of it. Where even the brightest pixels keep nine tenths, levels bend, as those of any
-    response may, and nothing shows that they have a limit.
+    A pixel that fills up collects less and less of what comes: with a softness k the share
+    1 / (1 + exp((Q - full well) / k)) of it. Where even the brightest pixels keep nine tenths,
+    levels bend, as those of any response may, and nothing shows that they have a limit.
     """
     if not isinstance(effect, Saturation) or not effect.softness_dn:
         return None

@@ -80,7 +80,7 @@ class _Mean:
 
 def _mean(layout: Layout, frames_of: FramesOf, exposure: Taken) -> _Mean:
     total = np.zeros((layout.rows, layout.columns))
-    square = 0.0
+    square = np.zeros_like(total)
     for frame in frames_of(exposure.name):
         own = np.asarray(frame, np.float64)
         total += own
@@ -95,11 +95,9 @@ def _repeated(
     layout: Layout, kind: str, means: Mapping[str, _Mean], first: Taken
 ) -> Repeated | None:
     step = 1 if len(layout.sites) == 1 else 2
-    pattern = shared = error = weight = 0.0
+    pattern = shared = weight = 0.0
     for y, x in layout.sites.values():
-        own = {
-            name: _beyond(kind, one.image[y::step, x::step]) for name, one in means.items()
-        }
+        own = {name: _beyond(kind, one.image[y::step, x::step]) for name, one in means.items()}
         ours = own.pop(first.name)
         near = np.abs(ours) <= _FAR_OUT * _NORMAL * np.median(np.abs(ours))
         size = int(near.sum())
@@ -127,4 +125,4 @@ def _beyond(kind: str, plane: Array) -> Array:
     if (across := _ACROSS.get(kind)) is not None:
         return beyond_smooth(plane.mean(across))
     rest = plane - plane.mean(1, keepdims=True)
-    return rest - rest.mean(0, keepdims=True)
+    return np.asarray(rest - rest.mean(0, keepdims=True))

@@ -61,13 +61,8 @@ def unlike_frames(
     None: they do not. Frames do where the other of both, which was not fitted or has no word, is as
     likely.
     """
-    if best.kind in STEADY and frames is not None and (paired := frames.pairs.denial(best.kind)):
-        return paired
-    if best.kind in TAILS and frames is not None and (burst := frames.bursts.denial(best.kind)):
-        return burst
-    if best.kind in OFFSETS and frames is not None and (own := frames.repeats.get(best.kind)):
-        if (new := own.denial) is not None:
-            return new
+    if frames is not None and (denial := _of_frames(frames, best.kind)) is not None:
+        return denial
     if best.kind in PIXELS:
         return unlike_pixels(state.camera, frames, best, others, partial(_explained, state))
     if (denial := no_field(state, best.polished.effects[0])) is not None:
@@ -76,6 +71,16 @@ def unlike_frames(
     if odds is None or odds > TOLD_APART or _any(others, _OTHER[best.kind]):
         return None
     return rival(-odds, f"{AS_WELL} {_WORDS[_OTHER[best.kind]]}")
+
+
+def _of_frames(frames: WholeFrames, kind: str) -> Denial | None:
+    """Return how frames deny what lasts, tails, or offsets that are fixed; None: they do not."""
+    if kind in STEADY:
+        return frames.pairs.denial(kind)
+    if kind in TAILS:
+        return frames.bursts.denial(kind)
+    own = frames.repeats.get(kind) if kind in OFFSETS else None
+    return None if own is None else own.denial
 
 
 def _explained(state: State, effect: Effect) -> float:

@@ -16,6 +16,7 @@ import scipy.stats
 from numpy.typing import NDArray
 
 from analysis.mismatch.candidates import Proposal
+from analysis.mismatch.formerror import form_of
 from analysis.mismatch.polish import (
     Free,
     free_of,
@@ -87,7 +88,8 @@ def settled(
         value = abs(float(getattr(corrected[i], name)))
         far = value * np.sinh(half) if half < _FARTHEST else np.inf
         own = half if signed else far
-        errors[i][name] = float(own) / _NORMAL
+        form = value * form_of(corrected[i], name, state.setting.layout)
+        errors[i][name] = float(np.hypot(own / _NORMAL, form))
     return corrected, errors
 
 

@@ -14,7 +14,6 @@ from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, ReadOut
 from dsis.grid import PixelGrid
 from dsis.lines import Line, lit
 
-
 Surface = tuple[tuple[float, ...], ...]
 _CHANNELS = ("R", "Gr", "Gb", "B")
 
@@ -67,7 +66,8 @@ class Shading(Effect):
     @model_validator(mode="after")
     def _possible(self) -> Self:
         if len(self.field) not in (0, 1, len(_CHANNELS)):
-            raise ValueError(f"field has {len(self.field)} surfaces, must have 1, or 4 of a mosaic")
+            fact = f"field has {len(self.field)} surfaces, must have 1, or 4 of a mosaic"
+            raise ValueError(fact)
         if any(len({len(row) for row in own}) != 1 or not own[0] for own in self.field):
             raise ValueError("field must hold rows of equally many coefficients")
         return self
@@ -97,7 +97,9 @@ class Shading(Effect):
         if self.ring_percent or self.field:
             whole = _uncut(self, PixelGrid(point.rows, point.columns, Cfa.MONO))
             if self.field:
-                whole = whole + np.mean([_surface(own, whole.shape) for own in self.field], axis=0)
+                whole = whole + np.mean(
+                    [_surface(own, point.rows, point.columns) for own in self.field], axis=0
+                )
             gained = float(whole.mean()) - 1
             return {
                 "level": gained * point.signal_dn,
@@ -180,12 +182,14 @@ def _coloured(effect: Shading, grid: PixelGrid, cfa: Cfa) -> Image:
 def _sites(cfa: Cfa) -> list[tuple[int, int]]:
     """Return the first row and column of R, Gr, Gb and B."""
     colours = pattern(cfa)
-    (red,), (blue,) = (np.argwhere(colours == one).tolist() for one in (RED, BLUE))
-    return [tuple(red), (red[0], blue[1]), (blue[0], red[1]), tuple(blue)]
+    (red_y, red_x), (blue_y, blue_x) = (
+        np.argwhere(colours == one)[0].tolist() for one in (RED, BLUE)
+    )
+    return [(red_y, red_x), (red_y, blue_x), (blue_y, red_x), (blue_y, blue_x)]
 
 
-def _surface(own: Surface, shape: tuple[int, ...]) -> NDArray[np.float64]:
-    return _at(own, (shape[0], shape[1]), np.arange(shape[0]), np.arange(shape[1]))
+def _surface(own: Surface, rows: int, columns: int) -> NDArray[np.float64]:
+    return _at(own, (rows, columns), np.arange(rows), np.arange(columns))
 
 
 def _at(

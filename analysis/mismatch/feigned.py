@@ -48,7 +48,7 @@ _MAPS = {
 _AXES = {"row_fpn": "rows", "column_fpn": "columns", "row_prnu": "rows", "column_prnu": "columns"}
 _GROWING = frozenset({"row_prnu", "column_prnu"})
 _CLEAR = 5.0  # standard errors of what stands out
-_SURE, _FEW = 4.0, 2.0  # of what few frequencies make; and by which the others show nothing
+_SURE = 4.0  # of what few frequencies make
 _ALIKE_ROWS = frozenset({"row_correlation", "slow_row_variance"})
 _SHAPED = frozenset({"half_seam", "parity", STATISTIC})
 _NEIGHBOURS = frozenset({"fixed_correlation_0_1", "fixed_correlation_1_0", "fixed_patch_variance"})
@@ -342,22 +342,19 @@ def coloured(state: State, kind: str) -> Denial | None:
     Where a wave is left unexplained, or that neighbours are alike, and half of the map's variance
     beyond noise, lines and smooth surfaces is of few frequencies, all pixels may be alike but for
     it: the median bin knows of the many. By chance it differs from the mean of all bins by what its
-    own error is beyond theirs. Where it shows nothing that is beyond its error, nothing is left to
-    them either.
+    own error is beyond theirs.
     """
     called = {m.statistic for m in state.mismatches} & {FIXED_WAVE, *_NEIGHBOURS}
     if kind not in _MAPS or not called:
         return None
-    plain, most, square, many = 0.0, 0.0, 0.0, 0.0
+    plain, most, square = 0.0, 0.0, 0.0
     for image, noise in _maps(state, kind):
         part = parts(image, noise)
         power = np.abs(np.fft.rfft2(part.pixels)[1:, 1:-1]) ** 2 / image.size
         plain += part.square - 1
         most += white_level(power, 1) - 1
         square += 2 / image.size * (1 / log(2) ** 2 - 1)
-        many += 2 / image.size / log(2) ** 2
-    unseen = most < _FEW * many**0.5
-    if plain <= 0 or most >= _MOST * plain or not (unseen or plain - most >= _SURE * square**0.5):
+    if plain <= 0 or most >= _MOST * plain or plain - most < _SURE * square**0.5:
         return None
     why = "a wave that stands still makes" if FIXED_WAVE in called else "neighbours have in common"
     return Denial(max(most / plain, 0.0), f"{why} most of what it would explain")

@@ -61,7 +61,7 @@ def _state(recording: InMemory, model: Camera) -> State:
 
 def _measured(light: Array, cfa: Cfa = Cfa.MONO, *own: Shading) -> Named | None:
     model = camera(*own, cfa=cfa.name)
-    return measured_light(_state(_recording(light, cfa), model).clues())
+    return measured_light(_state(_recording(light, cfa), model).clues(), beside=bool(own))
 
 
 def _named(found: Finding) -> dict[str, dict[str, tuple[float, float]]]:

@@ -1,6 +1,7 @@
 """Errors of numbers that do not fit, or whose law has a form that is not told; bands that move on.
 
-And what may not be named: codes that spikes fill, limits no level is near, waves longer than frames.
+And what may not be named: codes that spikes fill, limits that no level is near, waves longer than
+frames.
 """
 
 from collections.abc import Iterator

@@ -49,7 +49,7 @@ def undenied_by_all(
         denied = denied_by_rest(search, everything, whole)
         if denied is None:
             return final, gains, everything
-        final = search.further(search.drop(final, *denied))
+        final = search.fitted_anew(search.further(search.drop(final, *denied)))
         final, gains = proven(search, search.settle(final), trial, judged=False)
     return final, gains, None
 
@@ -107,7 +107,7 @@ def _without(search: Search, final: State, which: tuple[Named, str], *, judged: 
     known = [*search.named, *search.own]
     least = search.least
     search.least = max(least, which[0].gain)
-    final = search.further(final)
+    final = search.fitted_anew(search.further(final))
     search.least = least
     return search.settle(final) if known != [*search.named, *search.own] else final
 

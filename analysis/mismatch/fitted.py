@@ -23,6 +23,7 @@ from dsis.effects import Effect
 Step = Callable[[], None]
 WEAK = 30.0  # gain below which an effect may be what others, fitted one by one, left over
 _POLISHES = 3  # of what is strong
+_LIGHT = "shading"
 MAKE_ALIKE = frozenset({"brighter_fatter", "crosstalk", "readout_memory", "spatial_filtering"})
 
 
@@ -78,14 +79,16 @@ class Fitted:
     def lit(self, state: State) -> State:
         """Return the state in the light that flats show, where no shape of few numbers has it.
 
-        What was measured in other frames before is measured again.
+        What was measured in other frames before is measured again, and what was a shape of few
+        numbers makes way for it.
         """
-        if "shading" not in self.vocabulary:
+        if _LIGHT not in self.vocabulary:
             return state
-        before = [one for one in self.named if one.light is not None]
-        known = [one.light for one in before if one.light is not None]
+        before = [one for one in self.named if one.kind == _LIGHT]
+        known = [one.effect for one in before if one.effect is not None]
         bare = camera_without(state.camera, known, self.camera)
-        found = measured_light(replace(state.clues(), camera=bare))
+        users = any(own.kind == _LIGHT for own in self.camera.effect)
+        found = measured_light(replace(state.clues(), camera=bare), beside=users)
         light = None if found is None else found.light
         camera = None if light is None else with_effects(bare, [light])
         if found is None or camera is None:
@@ -275,6 +278,13 @@ class Fitted:
             denial = displaced(made, found.kind, made.null.mean, state.null.mean)
             self.beside_path[kinds] = denial is None
         return found if self.beside_path[kinds] else None
+
+    def fitted_anew(self, state: State) -> State:
+        """Return the state with all parameters fitted once more, where what calls for any departs.
+
+        What was dropped may have had a part of what others explain.
+        """
+        return self._polished(state) if self._depart(state) else state
 
     def _depart(self, state: State, least: float = 0.0) -> bool:
         """Return whether statistics differ for certain that call for effects taken in.

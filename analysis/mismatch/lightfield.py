@@ -33,14 +33,14 @@ _NORMAL = 1.4826  # standard deviations of a median absolute deviation
 _FALL, _TILTS = "falloff_percent", ("tilt_down_percent", "tilt_right_percent")
 
 
-def measured_light(clues: Clues) -> Named | None:
+def measured_light(clues: Clues, *, beside: bool = False) -> Named | None:
     """Return the light as the flats show it; None: none, or shapes of few numbers have it.
 
     The gain's map of each colour, over what the camera's own effects make of even light, is a sum
     of products of Legendre polynomials beside steps of halves, by least squares; of as many as rise
     beyond noise. It is light where many coefficients with both directions in them do, which lines
     and halves have not, and where these end, which those of gains that neighbours share do not. And
-    where the camera has uneven light of its own, but not as much, or not there.
+    where it is `beside` uneven light of the user's camera, which is not as much, or not there.
     """
     images = clues.image("gain")
     if set(images) != set(clues.layout.sites):
@@ -51,7 +51,7 @@ def measured_light(clues: Clues) -> Named | None:
     planes = [own for own in fitted if own is not None]
     strength = np.mean([own.strength for own in planes])
     light = strength >= _LEAST**2 and not any(own.open_ended for own in planes)
-    if any(own.kind == _KIND for own in clues.camera.effect):
+    if beside:
         light = light or np.mean([own.surfaces for own in planes]) >= _LEAST**2
     if not light:
         return None

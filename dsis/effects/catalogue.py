@@ -83,6 +83,8 @@ def _allowed(field: FieldInfo) -> str:
     choices: tuple[Any, ...] = getattr(field.annotation, "__args__", ())
     if choices and all(isinstance(choice, str) for choice in choices):
         return ", ".join(f"`{choice}`" for choice in choices)
+    if Ellipsis in choices:
+        return "rows of numbers, of each colour"
     if type(None) in choices:  # may be left out
         return f"number, {_bounds(choices[0].__metadata__[0].metadata)}"
     if choices:

@@ -35,7 +35,9 @@ class LineFlicker(Effect):
     kind: Literal["line_flicker"] = "line_flicker"
     depth_percent: Annotated[float, Field(ge=0, le=100, examples=[0.5])]
     cycles_per_frame: Annotated[float, Field(gt=0, examples=[3.3])]
-    turns_per_frame: Annotated[float | None, Field(ge=0, lt=1, exclude_if=_free)] = None
+    turns_per_frame: Annotated[
+        Annotated[float, Field(ge=0, lt=1)] | None, Field(exclude_if=_free)
+    ] = None
 
     stage: ClassVar[Stage] = Stage.LIGHT
     reference: ClassVar[str] = (

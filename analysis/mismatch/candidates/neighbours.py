@@ -132,7 +132,9 @@ def _exchanged(clues: Clues) -> float:
 def _filtering(clues: Clues) -> Sequence[Proposal]:
     """Propose a kernel of four neighbours, of two where axes differ, and with the diagonals.
 
-    Of a mosaic no number says how alike diagonal neighbours of one colour are: there are none.
+    A pixel that has kept 1 - n f of itself is alike with each of n neighbours by 2 f / (1 - n f),
+    to first order: half of that is r, f = r / (1 + n r). Of a mosaic no number says how alike
+    diagonal neighbours of one colour are: there are none.
     """
     mono = clues.layout.channels == ("MONO",)
     names = (_ALONG_ROWS, _ALONG_COLUMNS) if mono else ("correlation_0_2", "correlation_2_0")
@@ -140,19 +142,21 @@ def _filtering(clues: Clues) -> Sequence[Proposal]:
     near = (across + down) / 4
     found: list[Proposal] = []
     if near > 0:
-        found += proposals("spatial_filtering", ["fraction"], fraction=min(near, 0.15))
+        own = near / (1 + 4 * near)
+        found += proposals("spatial_filtering", ["fraction"], fraction=min(own, 0.15))
     if abs(across - down) > _TOLD * np.hypot(error, other):
         along, more = ("rows", across) if across > down else ("columns", down)
-        share = min(more / 2, 0.15)
+        share = min(more / 2 / (1 + more), 0.15)
         found += proposals("spatial_filtering", ["fraction"], fraction=share, along=along)
     askew, error = clues.amplitude(_DIAGONAL, alike) if mono else (0.0, np.inf)
     askew -= 2 * near**2  # which the nearest neighbours have in common
     if near > 0 and askew > _CLEAR * error:
+        diagonal = min(askew / (2 * near), 1.0)
         found += proposals(
             "spatial_filtering",
             ["fraction", "diagonal"],
-            fraction=min(near, 0.1),
-            diagonal=min(askew / (2 * near), 1.0),
+            fraction=min(near / (1 + 4 * (1 + diagonal) * near), 0.1),
+            diagonal=diagonal,
         )
     return found
 

@@ -141,6 +141,32 @@ def test_light_that_a_camera_has_but_not_there_is_measured_beside_it() -> None:
     assert _measured(light) is None  # of a camera without it few numbers have it
 
 
+@pytest.mark.parametrize("fall", [0.10, 0.13])
+def test_light_of_the_users_camera_may_be_of_another_size_alone(fall: float) -> None:
+    square = np.linspace(-1, 1, ROWS)[:, None] ** 2 * ROWS**2 + (
+        np.linspace(-1, 1, COLUMNS) ** 2 * COLUMNS**2
+    )
+    light = 1 - fall * square / (ROWS**2 + COLUMNS**2)
+    model = camera(Shading(falloff_percent=12.0))
+    words = frozenset({"shading", "row_noise"})
+    found = find_mismatch(model, _recording(light, Cfa.MONO), seed=1, vocabulary=words)
+    assert not found.omitted_physics
+    assert not found.unexplained
+    (wrong,) = (one for one in found.parameter_errors if "shading" in one.parameter)
+    assert wrong.recorded == pytest.approx(100 * fall, abs=0.5)
+
+
+def test_two_amplifiers_behind_a_lens_are_told() -> None:
+    light = _lens(0.5, (9.0, -20.0))
+    light[:, COLUMNS // 2 :] *= 1.03
+    found = find_mismatch(camera(), _recording(light, Cfa.MONO), seed=1, vocabulary=WORDS)
+    named = _named(found)
+    assert sorted(named) == ["shading", "tap_mismatch"]
+    value, error = named["tap_mismatch"]["gain_percent"]
+    assert value == pytest.approx(2.96, abs=max(3 * error, 0.15))
+    assert not found.unexplained
+
+
 def test_without_a_word_for_it_nothing_is_measured() -> None:
     recording = _recording(_lens(0.5, (9.0, -20.0)), Cfa.MONO)
     found = find_mismatch(camera(), recording, seed=1, vocabulary=frozenset({"row_noise"}))

@@ -78,7 +78,8 @@ def _levels(top: float, variance: float) -> Any:
         uniform=[SimpleNamespace(name="flat", kind="flat")], signal_dn={place: top}
     )
     seen = SimpleNamespace(levels={place: SimpleNamespace(variance_dn2=variance)})
-    return SimpleNamespace(setting=SimpleNamespace(layout=layout, seen=seen))
+    even = SimpleNamespace(layout=SimpleNamespace(sites={}))
+    return SimpleNamespace(setting=SimpleNamespace(layout=layout, seen=seen), clues=lambda: even)
 
 
 def test_a_soft_limit_needs_a_level_near_it() -> None:
@@ -100,6 +101,7 @@ def test_spikes_that_are_left_make_codes_uneven() -> None:
     assert spiked(left(one_off_outliers=90.0, kurtosis=7000.0), "prnu") is None
     assert spiked(left(kurtosis=7000.0), "adc_dnl") is None
     assert spiked(left(one_off_outliers=5.0, kurtosis=6.0), "adc_dnl") is None
+    assert spiked(left(one_off_outliers=-90.0, kurtosis=-90.0), "adc_dnl") is None
 
 
 def test_a_pattern_has_more_than_a_wave_in_a_frame() -> None:

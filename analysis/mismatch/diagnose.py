@@ -334,6 +334,8 @@ def _omitted(named: Named, why: tuple[str, ...], gain: Gain) -> OmittedEffect:
                 choices[name] = value
             elif name == "field":
                 choices |= {name: "as measured"} if value else {}
+            elif named.light is not None and name not in named.proposal.errors:
+                continue  # the field has it
             elif isinstance(value, tuple):
                 parameters[name] = FittedParameter(value, named.proposal.errors.get(name, 0.0))
             elif isinstance(value, (int, float)) and not isinstance(value, bool):

@@ -86,7 +86,7 @@ def spiked(state: State, kind: str) -> Denial | None:
     """
     if kind != "adc_dnl":
         return None
-    off = {m.statistic: abs(m.z) for m in state.mismatches}
+    off = {m.statistic: m.z for m in state.mismatches}
     least = min(off.get(name, 0.0) for name in ("one_off_outliers", "kurtosis"))
     why = "samples far out are left unexplained, and make codes uneven"
     return Denial(0.0, why) if least > FAR_OFF else None

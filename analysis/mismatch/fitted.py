@@ -88,6 +88,9 @@ class Fitted:
         known = [one.effect for one in before if one.effect is not None]
         bare = camera_without(state.camera, known, self.camera)
         users = any(own.kind == _LIGHT for own in self.camera.effect)
+        if users and not before:  # of another size it may be all there is
+            state = self._resized(state, [o for o in self._sizes() if o.effect.kind == _LIGHT])
+            bare = state.camera
         found = measured_light(replace(state.clues(), camera=bare), beside=users)
         light = None if found is None else found.light
         camera = None if light is None else with_effects(bare, [light])
@@ -186,7 +189,10 @@ class Fitted:
     def _sizes(self) -> list[Own]:
         """Return the camera's own effects that have a size, as they are now."""
         fitted = {own.place: own for own in self.own}
-        return [fitted.get(own.place, own) for own in sizes(self.camera)]
+        found = [fitted.get(own.place, own) for own in sizes(self.camera)]
+        # Light that was measured beside the user's has all that this leaves.
+        lit = any(one.light is not None for one in self.named)
+        return [own for own in found if not (lit and own.effect.kind == _LIGHT)]
 
     def _called(self, state: State, *, less: bool = False) -> list[Own]:
         """Return own effects that mismatches call for, but those that tie with others.

@@ -25,8 +25,11 @@ _HIGHEST = 12  # that is kept; what is higher tells whether its coefficients end
 _LEAST = 10.0  # standard errors of a coefficient in the mean, beyond shapes of few numbers
 _ENDS = 0.03  # of the coefficients of low degrees, that those of high ones have
 _BY_CHANCE = 2.0  # standard deviations of their mean square
-_NOISE = 2.0  # mean square of coefficients, in their errors, that is none but noise
+_NOISE = 3.0  # and of those of one degree, three of which in a row are none but noise
 _CLIPPED = 5.0  # standard deviations of a pixel
+_STEPS = ((_DEGREE + 1, 0), (0, _DEGREE + 1))  # where coefficients of steps are: down, across
+_SURE = 3.0  # standard errors of a step
+_DARK = 0.05  # of the mean light, below which a camera's own shading leaves nothing to tell
 _KIND = "shading"
 _OWN = 3  # degree from which light has a shape of its own
 _NORMAL = 1.4826  # standard deviations of a median absolute deviation
@@ -82,11 +85,15 @@ class _Plane:
     def degree(self) -> int:
         """Up to which coefficients are more than noise."""
         order = _orders(self.found.shape)
-        for degree in range(_HIGHEST, 0, -1):
+        noise = 0
+        for degree in range(_OWN, _HIGHEST + 1):
             own = order == degree
-            if float(np.mean((self.found[own] / self.errors[own]) ** 2)) > _NOISE:
-                return degree
-        return 1
+            square = float(np.mean((self.found[own] / self.errors[own]) ** 2))
+            chance = 1 + _NOISE * (2 / np.count_nonzero(own)) ** 0.5
+            noise = 0 if square > chance else noise + 1
+            if noise == _OWN:
+                return degree - noise
+        return _HIGHEST - noise
 
     def at(self, down: float, across: float) -> float:
         """Return the light at a place, in halves of the sides from the centre."""
@@ -100,14 +107,15 @@ def _fitted(clues: Clues, channel: str, image: Array, noise: float) -> _Plane | 
         return None
     scale = clues.scale("gain", channel)
     had = made_of_light(clues, channel).reshape(image.shape)
+    if had.min() < _DARK * had.mean():
+        return None
     light = (1 + (image - image.mean()) / scale) * had.mean() / had
     fit = _Fit.of(clues.layout, channel)
-    found = fit(light)
-    rest = light - fit.made(found)
-    limit = _CLIPPED * _NORMAL * float(np.median(np.abs(rest)))
-    found += fit(np.clip(rest, -limit, limit))
-    rest = np.clip(light - fit.made(found), -limit, limit)
+    found, rest = _most_of(fit, light)
     sd = max(float(rest.std()), noise / scale)
+    if (np.abs(found[_STEPS]) < _SURE * sd * fit.errors[_STEPS]).all():  # none: odd degrees rule
+        fit = _Fit.of(clues.layout, channel, steps=False)
+        found, rest = _most_of(fit, light)
     errors = sd * fit.errors
     # What lines have in common, of which terms along one axis alone are means.
     for axis, at in ((1, np.s_[:, 0]), (0, np.s_[0, :])):
@@ -130,6 +138,15 @@ def _fitted(clues: Clues, channel: str, image: Array, noise: float) -> _Plane | 
     return _Plane(found, errors, strength, float(np.mean(squares[first])), not ends)
 
 
+def _most_of(fit: "_Fit", light: Array) -> tuple[Array, Array]:
+    """Return the coefficients of most pixels, and what they leave: far-out pixels count less."""
+    found = fit(light)
+    rest = light - fit.made(found)
+    limit = _CLIPPED * _NORMAL * float(np.median(np.abs(rest)))
+    found = found + fit(np.clip(rest, -limit, limit))
+    return found, np.clip(light - fit.made(found), -limit, limit)
+
+
 @dataclass(frozen=True)
 class _Fit:
     """Least squares of a plane by products of polynomials, and by steps of halves.
@@ -150,7 +167,7 @@ class _Fit:
     inverse: Array
 
     @classmethod
-    def of(cls, layout: Layout, channel: str) -> "_Fit":
+    def of(cls, layout: Layout, channel: str, *, steps: bool = True) -> "_Fit":
         """Return the fit of a channel, at the places its pixels have on the sensor."""
         step = 1 + (len(layout.sites) > 1)
         down, across = (
@@ -163,8 +180,8 @@ class _Fit:
             )
         )
         order = _orders((_DEGREE + 1, _DEGREE + 1))
-        last = _DEGREE + 1
-        pairs = np.vstack([np.argwhere(order <= _DEGREE), [(last, 0), (0, last)]])
+        pairs = np.argwhere(order <= _DEGREE)
+        pairs = np.vstack([pairs, np.transpose(_STEPS)]) if steps else pairs
         k, m = pairs.T
         square = (down.T @ down)[np.ix_(k, k)] * (across.T @ across)[np.ix_(m, m)]
         return cls(down, across, pairs, np.asarray(np.linalg.inv(square), np.float64))
@@ -229,7 +246,7 @@ def _named(planes: Sequence[_Plane], shape: tuple[int, int]) -> Named:
     effect = Shading.model_validate({"kind": _KIND, **known, "field": fields})
     spread = float(np.std(falls)) / max(len(planes) - 1, 1) ** 0.5
     noise = float(np.mean([np.linalg.norm(own.errors[:size, :size] * kept) for own in planes]))
-    errors = {_FALL: 100 * float(np.hypot(spread, noise))}
+    errors = {_FALL: 100 * float(np.hypot(spread, noise))} if falls.mean() > 0 else {}
     for name, at in zip(_TILTS, ((1, 0), (0, 1)), strict=True):
         own = [one.found[at] for one in planes]
         scatter = float(np.std(own)) / max(len(own) - 1, 1) ** 0.5

@@ -3,6 +3,7 @@
 import numpy as np
 from scipy.special import expit
 
+from analysis.mismatch.candidates.patterns import made_of_light
 from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.state import State
 from dsis.effects import Effect
@@ -20,11 +21,14 @@ def far_below(state: State, effect: Effect) -> Denial | None:
     """
     if not isinstance(effect, Saturation) or not effect.softness_dn:
         return None
-    levels = state.setting.seen.levels
+    levels, clues = state.setting.seen.levels, state.clues()
+    had = {channel: made_of_light(clues, channel) for channel in clues.layout.sites}
+    brightest = {channel: float(own.max() / own.mean()) for channel, own in had.items()}
     flats = {e.name for e in state.setting.layout.uniform if e.kind == "flat"}
     most = max(
         (
-            max(state.setting.layout.signal_dn[place], 0.0) + max(own.variance_dn2, 0.0) ** 0.5
+            max(state.setting.layout.signal_dn[place], 0.0) * brightest.get(place[1], 1.0)
+            + max(own.variance_dn2, 0.0) ** 0.5
             for place, own in levels.items()
             if place[0] in flats
         ),

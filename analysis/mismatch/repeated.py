@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.mismatch.bank.seams import beyond_smooth
+from analysis.mismatch.bank.seams import SMOOTH_DEGREE, beyond_smooth
 from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.layout import Layout, Taken
 from analysis.mismatch.projections import FramesOf
@@ -72,23 +72,39 @@ def repeats_of(layout: Layout, frames_of: FramesOf) -> Mapping[str, Repeated]:
 
 @dataclass(frozen=True)
 class _Mean:
-    """A mean frame (row, column), DN, and the variance of a pixel of it."""
+    """A mean frame (row, column), DN, and by kind and colour the variance of one of its offsets."""
 
     image: Array
-    variance: float
+    variance: Mapping[tuple[str, tuple[int, int]], float]
 
 
 def _mean(layout: Layout, frames_of: FramesOf, exposure: Taken) -> _Mean:
+    """Return the mean of an exposure's frames, and how its offsets scatter by these.
+
+    Of lines by what each has beside its frame: noise of lines is in it.
+    """
+    step = 1 if len(layout.sites) == 1 else 2
     total = np.zeros((layout.rows, layout.columns))
+    offsets: dict[tuple[str, tuple[int, int]], list[Array]] = {}
     square = np.zeros_like(total)
     for frame in frames_of(exposure.name):
         own = np.asarray(frame, np.float64)
         total += own
         square += own**2
+        for y, x in layout.sites.values():
+            plane = own[y::step, x::step]
+            for kind, across in _ACROSS.items():
+                offsets.setdefault((kind, (y, x)), []).append(plane.mean(across) - plane.mean())
     count = len(exposure.numbers)
     image = total / count
     spread = (square - count * image**2) / max(count - 1, 1)
-    return _Mean(image, float(spread.mean()) / count)
+    found = {
+        key: float(np.var(own, axis=0, ddof=1).mean()) / count if count > 1 else np.inf
+        for key, own in offsets.items()
+    }
+    for y, x in layout.sites.values():
+        found["dsnu", (y, x)] = float(spread[y::step, x::step].mean()) / count
+    return _Mean(image, found)
 
 
 def _repeated(
@@ -96,17 +112,21 @@ def _repeated(
 ) -> Repeated | None:
     step = 1 if len(layout.sites) == 1 else 2
     pattern = shared = weight = 0.0
-    for y, x in layout.sites.values():
-        own = {name: _beyond(kind, one.image[y::step, x::step]) for name, one in means.items()}
+    for channel, (y, x) in layout.sites.items():
+        own = {
+            name: _beyond(kind, one.image[y::step, x::step])
+            for name, one in means.items()
+            if name == first.name or (name, channel) not in layout.full | layout.still
+        }
         ours = own.pop(first.name)
         near = np.abs(ours) <= _FAR_OUT * _NORMAL * np.median(np.abs(ours))
         size = int(near.sum())
         if not own or not size:
             return None
         square = float((ours[near] ** 2).mean())
-        # Of a line's mean the noise is smaller by what it is the mean of.
-        pixels = means[first.name].image[y::step, x::step].size / ours.size
-        variance = square - means[first.name].variance / pixels
+        # Of lines less what a smooth curve has of their noise.
+        left = 1 - (SMOOTH_DEGREE + 1) / ours.size if kind in _ACROSS else 1.0
+        variance = square - left * means[first.name].variance[kind, (y, x)]
         products = [
             (float((ours * other)[near].mean()), square * float((other[near] ** 2).mean()) / size)
             for other in own.values()

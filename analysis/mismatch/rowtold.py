@@ -8,6 +8,7 @@ from math import isfinite
 from analysis.mismatch.burst import TAILS
 from analysis.mismatch.contradicted import Denial, rival
 from analysis.mismatch.forms import OTHER_LEVELS
+from analysis.mismatch.instance import LINES
 from analysis.mismatch.jumptold import PIXELS, as_pixels_show, unlike_pixels
 from analysis.mismatch.mapped import as_maps_show
 from analysis.mismatch.nofield import no_field
@@ -61,7 +62,7 @@ def unlike_frames(
     None: they do not. Frames do where the other of both, which was not fitted or has no word, is as
     likely.
     """
-    if frames is not None and (denial := _of_frames(frames, best.kind)) is not None:
+    if frames is not None and (denial := _of_frames(state, frames, best.kind)) is not None:
         return denial
     if best.kind in PIXELS:
         return unlike_pixels(state.camera, frames, best, others, partial(_explained, state))
@@ -73,13 +74,18 @@ def unlike_frames(
     return rival(-odds, f"{AS_WELL} {_WORDS[_OTHER[best.kind]]}")
 
 
-def _of_frames(frames: WholeFrames, kind: str) -> Denial | None:
-    """Return how frames deny what lasts, tails, or offsets that are fixed; None: they do not."""
+def _of_frames(state: State, frames: WholeFrames, kind: str) -> Denial | None:
+    """Return how frames deny what lasts, tails, or offsets that are fixed; None: they do not.
+
+    Of offsets nothing is said beside lines, which may last as long as an exposure does.
+    """
     if kind in STEADY:
         return frames.pairs.denial(kind)
     if kind in TAILS:
         return frames.bursts.denial(kind)
-    own = frames.repeats.get(kind) if kind in OFFSETS else None
+    lined = any(own.kind in LINES for own in state.camera.effect)
+    lined = lined or any("spectral_peak" in own.statistic for own in state.mismatches)
+    own = frames.repeats.get(kind) if kind in OFFSETS and not lined else None
     return None if own is None else own.denial
 
 

@@ -18,6 +18,7 @@ from analysis.mismatch.gainmap import mean_frame
 from analysis.mismatch.layout import Layout, Place
 from dsis.effects import Effect
 from dsis.effects.amp_glow import AmpGlow
+from dsis.effects.shading import Shading
 from dsis.measures.fixed_pattern import Smooth
 
 Array = NDArray[np.float64]
@@ -200,7 +201,7 @@ def _taps(clues: Clues) -> Sequence[Proposal]:
             )
             for part in ("", f", {WHOLE}")
         )
-        if statistic == "half_seam" and jump < _JUMP * whole:
+        if statistic == "half_seam" and jump < _JUMP * whole and not _as_measured(clues):
             continue  # halves that differ without a step where they meet: a tilt
         if max(jump, whole) < 3 and not (statistic == "parity" and len(clues.layout.channels) > 1):
             continue
@@ -229,13 +230,29 @@ def _step(clues: Clues, regions: str) -> float:
         row = int("R" in rows[1])  # of the green beside red
         odd = row if regions == "even_odd_rows" else rows[row].index("G")
         return ratio if odd else -ratio
-    for channel, (image, _) in clues.image("gain").items():
+    for channel, (whole, _) in clues.image("gain").items():
+        image = _in_its_light(clues, channel, whole)
         along = image.mean(0) if regions in ("left_right", "even_odd_columns") else image.mean(1)
         size = along.size
         second = np.arange(size) % 2 == 1 if regions.startswith("even_odd") else _upper(size)
         step = along[second].mean() - along[~second].mean()
         steps.append(float(step) / clues.scale("gain", channel))
     return float(np.mean(steps)) if steps else 0.0
+
+
+def _as_measured(clues: Clues) -> bool:
+    """Return whether the camera has light of a measured shape, beside which a step is little."""
+    return any(isinstance(own, Shading) and own.field for own in clues.camera.effect)
+
+
+def _in_its_light(clues: Clues, channel: str, image: Array) -> Array:
+    """Return a map of the gain over what the camera makes of even light, where this is uneven."""
+    if not _as_measured(clues):
+        return image
+    scale = clues.scale("gain", channel)
+    had = made_of_light(clues, channel).reshape(image.shape)
+    light = (1 + (image - image.mean()) / scale) * had.mean() / had
+    return np.asarray((light - 1) * scale)
 
 
 def _upper(size: int) -> NDArray[np.bool_]:

@@ -95,6 +95,7 @@ class Proving:
         self.setting, self.own, self.least = Stub(jobs=1), [], 2.0
         self.calls: list[str] = []
         self.bars: list[float] = []
+        self.given_back = False
 
     def fitted_without(self, *_: Any) -> None:
         return None
@@ -110,6 +111,11 @@ class Proving:
         self.bars.append(self.least)
         self.named = self.after
         self.calls.append("further")
+        return state
+
+    def fitted_anew(self, state: Any) -> Any:
+        if self.given_back:
+            self.named = [_named("kept", x=2.0)]
         return state
 
     def settle(self, state: Any) -> Any:
@@ -138,6 +144,19 @@ def test_numbers_are_settled_where_the_search_has_touched_them(
     trial: Any = gains
     proven(search, OPEN, trial, judged=False)
     assert search.calls == calls
+
+
+def test_numbers_are_settled_where_what_was_dropped_gave_them_its_part() -> None:
+    search: Any = Proving([_named("kept", x=1.0)])
+    search.given_back = True
+    trial: Any = Stub(
+        gains=lambda _state, without: {
+            name: Stub(certain=name != "weak", gain=Stub(nats_per_frame=1.0, ci95=(-2.0, 4.0)))
+            for name in without
+        }
+    )
+    proven(search, OPEN, trial, judged=False)
+    assert search.calls == ["further", "settle"]
 
 
 def test_what_is_found_only_without_an_effect_must_gain_more_than_that() -> None:

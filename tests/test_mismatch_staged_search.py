@@ -28,6 +28,9 @@ class Staged:
     def resumed(self, state: Any) -> Any:
         return self._looked("resumed", state)
 
+    def lit(self, state: Any) -> Any:
+        return state
+
     def _looked(self, how: str, state: Any) -> Any:
         self.how.append(how)
         self.asked.append((self.setting.layout.name, state.camera, self.least))

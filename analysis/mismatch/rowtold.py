@@ -83,9 +83,10 @@ def _of_frames(state: State, frames: WholeFrames, kind: str) -> Denial | None:
         return frames.pairs.denial(kind)
     if kind in TAILS:
         return frames.bursts.denial(kind)
-    lined = any(own.kind in LINES for own in state.camera.effect)
-    lined = lined or any("spectral_peak" in own.statistic for own in state.mismatches)
-    own = frames.repeats.get(kind) if kind in OFFSETS and not lined else None
+    if kind not in OFFSETS or any(own.kind in LINES for own in state.camera.effect):
+        return None
+    lined = any("spectral_peak" in own.statistic for own in state.mismatches)
+    own = None if lined else frames.repeats.get(kind)
     return None if own is None else own.denial
 
 

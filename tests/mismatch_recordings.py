@@ -114,6 +114,16 @@ def recorded(
     return InMemory(sensor, exposures, rows, columns, Path(), stacks)
 
 
+def state_of_all(recording: InMemory, model: Camera) -> State:
+    """Return the state of all frames beside a model, with the maps that they show."""
+    assert recording.stacks is not None
+    stacks = recording.stacks
+    numbers = {e.name: tuple(range(len(e.frames))) for e in recording.exposures}
+    layout = layout_of(recording, numbers, lambda name, which: stacks[name][list(which)])
+    seen = observe(layout, stacks.__getitem__, keep=True)
+    return State.of(Setting(layout, seen, None, 0, 1, 16, 16, 2, 2, 4), model, lambda: None)
+
+
 def responding(
     seed: int,
     levels: tuple[float, ...],

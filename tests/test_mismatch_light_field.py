@@ -13,13 +13,9 @@ from analysis.mismatch import find_mismatch
 from analysis.mismatch.finding import Finding
 from analysis.mismatch.lightfield import measured_light
 from analysis.mismatch.named import Named
-from analysis.mismatch.observe import observe
-from analysis.mismatch.state import Setting, State
-from analysis.mismatch.taking import layout_of
-from dsis.camera import Camera
 from dsis.cfa import Cfa
 from dsis.effects.shading import Shading
-from mismatch_recordings import InMemory, camera, recorded
+from mismatch_recordings import InMemory, camera, recorded, state_of_all
 
 ROWS, COLUMNS, FRAMES, LEVELS = 96, 128, 8, (400.0, 1200.0, 2800.0)
 SLOPE, INTERCEPT, BLACK = 0.5, 20.0, 64.0
@@ -50,18 +46,9 @@ def _recording(light: Array, cfa: Cfa, rows_by: float = 0.0, seed: int = 3) -> I
     return InMemory(like.sensor, like.exposures, ROWS, COLUMNS, like.folder, stacks)
 
 
-def _state(recording: InMemory, model: Camera) -> State:
-    assert recording.stacks is not None
-    stacks = recording.stacks
-    numbers = {e.name: tuple(range(len(e.frames))) for e in recording.exposures}
-    layout = layout_of(recording, numbers, lambda name, which: stacks[name][list(which)])
-    seen = observe(layout, stacks.__getitem__, keep=True)
-    return State.of(Setting(layout, seen, None, 0, 1, 16, 16, 2, 2, 4), model, lambda: None)
-
-
 def _measured(light: Array, cfa: Cfa = Cfa.MONO, *own: Shading) -> Named | None:
     model = camera(*own, cfa=cfa.name)
-    return measured_light(_state(_recording(light, cfa), model).clues(), beside=bool(own))
+    return measured_light(state_of_all(_recording(light, cfa), model).clues(), beside=bool(own))
 
 
 def _named(found: Finding) -> dict[str, dict[str, tuple[float, float]]]:

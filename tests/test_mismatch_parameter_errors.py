@@ -7,29 +7,21 @@ import numpy as np
 import pytest
 
 from analysis.mismatch.candidates import Proposal
-from analysis.mismatch.observe import observe
 from analysis.mismatch.polish import shifted
 from analysis.mismatch.segments import second_path
-from analysis.mismatch.state import Setting, State
-from analysis.mismatch.taking import layout_of
+from analysis.mismatch.state import State
 from analysis.mismatch.uncertainty import _slope, inverse_information, settled
 from dsis.camera import Camera
 from dsis.effects.dsnu import Dsnu
 from dsis.effects.hot_pixels import HotPixels
-from mismatch_recordings import COLUMNS, ROWS, camera, recorded
+from mismatch_recordings import COLUMNS, ROWS, camera, recorded, state_of_all
 
 NUMBERS = 100_000
 SURE = 5.0  # standard errors
 
 
 def _state(true: Camera, model: Camera, seed: int) -> State:
-    recording = recorded(true, seed)
-    assert recording.stacks is not None
-    stacks = recording.stacks
-    numbers = {e.name: tuple(range(len(e.frames))) for e in recording.exposures}
-    layout = layout_of(recording, numbers, lambda name, which: stacks[name][list(which)])
-    seen = observe(layout, stacks.__getitem__, keep=True)
-    return State.of(Setting(layout, seen, None, 0, 1, 16, 16, 2, 2, 4), model, lambda: None)
+    return state_of_all(recorded(true, seed), model)
 
 
 @pytest.mark.parametrize("scatter", [0.0, 1.0, 3.0])

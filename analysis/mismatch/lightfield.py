@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.candidates import Proposal
-from analysis.mismatch.candidates.patterns import SURFACES, made_of_light, surfaces
+from analysis.mismatch.candidates.patterns import SURFACES, light_over, made_of_light, surfaces
 from analysis.mismatch.clues import Clues
 from analysis.mismatch.layout import Layout
 from analysis.mismatch.named import Named
@@ -109,7 +109,7 @@ def _fitted(clues: Clues, channel: str, image: Array, noise: float) -> _Plane | 
     had = made_of_light(clues, channel).reshape(image.shape)
     if had.min() < _DARK * had.mean():
         return None
-    light = (1 + (image - image.mean()) / scale) * had.mean() / had
+    light = light_over(clues, channel, image, had)
     fit = _Fit.of(clues.layout, channel)
     found, rest = _most_of(fit, light)
     sd = max(float(rest.std()), noise / scale)

@@ -249,10 +249,14 @@ def _in_its_light(clues: Clues, channel: str, image: Array) -> Array:
     """Return a map of the gain over what the camera makes of even light, where this is uneven."""
     if not _as_measured(clues):
         return image
-    scale = clues.scale("gain", channel)
     had = made_of_light(clues, channel).reshape(image.shape)
-    light = (1 + (image - image.mean()) / scale) * had.mean() / had
-    return np.asarray((light - 1) * scale)
+    return (light_over(clues, channel, image, had) - 1) * clues.scale("gain", channel)
+
+
+def light_over(clues: Clues, channel: str, image: Array, had: Array) -> Array:
+    """Return the light that a map of the gain shows, over what a camera has of it."""
+    shown = 1 + (image - image.mean()) / clues.scale("gain", channel)
+    return np.asarray(shown * had.mean() / had)
 
 
 def _upper(size: int) -> NDArray[np.bool_]:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from analysis.mismatch.bank.key import Key
-from analysis.mismatch.candidates.hot import _noisy
+from analysis.mismatch.candidates.currents import _noisy
 from analysis.mismatch.contradicted import _alike_spread
 from analysis.mismatch.judge import Judge
 from analysis.mismatch.memory import Memory

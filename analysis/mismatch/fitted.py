@@ -13,7 +13,7 @@ from analysis.mismatch.own import Own, called, explained, refitted, resized, siz
 from analysis.mismatch.polish import polish, with_effects
 from analysis.mismatch.predict import Predictor
 from analysis.mismatch.rank import LEAST_GAIN, Ranked, replicates_for
-from analysis.mismatch.resolved import FAR_OFF
+from analysis.mismatch.resolved import FAR_OFF, calls_alone, explains
 from analysis.mismatch.segments import Path, second_path
 from analysis.mismatch.state import Setting, State
 from analysis.mismatch.uncertainty import settled
@@ -75,6 +75,7 @@ class Fitted:
     beside_path: dict[tuple[str, ...], bool] = field(default_factory=dict)
     whole: Setting | None = None
     of_whole: State | None = None
+    left: State | None = None  # by the user's effects of other sizes, as all frames say
 
     def lit(self, state: State) -> State:
         """Return the state in the light that flats show, where no shape of few numbers has it.
@@ -157,8 +158,22 @@ class Fitted:
 
     def _beside(self, named: Named) -> set[str]:
         """Return the kinds of the other effects named, and of the camera's own of other sizes."""
-        others = {n.kind for n in self.named if n is not named and n.proposal is not None}
-        return others | {one.effect.kind for one in self.own}
+        return self._named_beside(named) | {one.effect.kind for one in self.own}
+
+    def _named_beside(self, named: Named) -> set[str]:
+        return {n.kind for n in self.named if n is not named and n.proposal is not None}
+
+    def explained_by(self, named: Named, state: State, bare: State) -> bool:
+        """Return whether a state with an effect explains half of something that one without leaves.
+
+        Or what called for it alone: at first, or beside the user's effects of other sizes.
+        """
+        called = [(self.base, self._beside(named)), (self.left, self._named_beside(named))]
+        return any(
+            explains(state, bare, base, calls_alone(named.kind, beside))
+            for base, beside in called
+            if base is not None
+        )
 
     def fitted_without(self, state: State, named: Named) -> Camera:
         """Return the camera without one of the effects named, its base numbers fitted once more.
@@ -229,7 +244,8 @@ class Fitted:
                 break
         if state is before or self.named or self.whole is None:
             return state
-        return replace(state, mismatches=self.of_all(self.camera).mismatches)
+        self.left = replace(state, mismatches=self.of_all(self.camera).mismatches)
+        return self.left
 
     def _polished(self, state: State) -> State:
         """Fit the parameters of all effects together, and judge the result once more.

@@ -6,14 +6,16 @@ added in a share f of the pixels. Its density there is that of Grushka (1972),
 brightest pixels count most is chance; this is a closed form.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from math import log, pi, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 from scipy.special import log_ndtr, ndtri
+
+from analysis.currentlaw import BIN, Binned, Body, exponential
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -23,8 +25,8 @@ _AROUND = 5  # pixels: a glow is as bright beside a pixel
 # pi / (2 n + pi - 2), its covariance with each 1 / n.
 _PIXELS = _AROUND**2
 _BESIDE = sqrt(1 + pi / (2 * _PIXELS + pi - 2) - 2 / _PIXELS)
-_BIN = 0.05  # of noise, and beyond `_FAR` noises of a value's logarithm
-_FAR = 10.0
+_TABLE, _LEAST = 4000, 1e-300
+_ALIKE = Body()
 _SHARES = (1e-6, 0.4)
 _MEANS = (0.3, 1e5)  # in noises
 _WIDTHS = 8.0  # standard errors of the width of noise
@@ -58,35 +60,58 @@ class HotLaw:
 
 @dataclass(frozen=True)
 class _Pixels:
-    """Values of a channel's pixels in noises, how many there are of each, and the noise."""
+    """Values of a channel's pixels in noises, the noise, and the law of those that are not hot."""
 
-    values: Array
-    counts: Array
+    seen: Binned
     noise: float
+    body: Body
 
     def loglik(self, shares: Array, means: Array, widths: Array) -> Array:
         """Return the log-likelihood of laws: (share, mean, width); a share of 0 is noise alone.
 
-        Values count from their median, which hot pixels move: noise is centred below it. Of hot
-        pixels themselves, whose law is wider, that is left out.
+        Values count from their median, which hot pixels move: the others are centred below it. Of
+        hot pixels themselves, whose law is wider, that is left out.
         """
         width = widths[:, np.newaxis]
-        unit = self.values / width
-        scale = np.log(2 * np.pi) / 2 + np.log(width)
+        unit = self.seen.values / width
         rate = width * self.noise / means[:, np.newaxis, np.newaxis]
-        tail = np.log(rate) + rate**2 / 2 - rate * unit + log_ndtr(unit - rate) - np.log(width)
+        tail = exponential(unit, rate) - np.log(width)
         above = np.exp(rate**2 / 2 + log_ndtr(-rate))  # of hot pixels, beyond a half
+        others = self._others(widths)
         found = []
         for share in shares:
-            core = -((unit + share * above * np.sqrt(2 * np.pi)) ** 2) / 2 - scale
+            core = others(share * above)
             if share > 0:
                 core = np.logaddexp(core + np.log1p(-share), tail + np.log(share))
-            found.append(core @ self.counts)
+            found.append(core @ self.seen.counts)
         return np.stack(found)
+
+    def _others(self, widths: Array) -> Callable[[Array], Array]:
+        """Return the log-density of the others, (mean, width, value).
+
+        It is asked for what share of all the median is moved by: (mean, width, 1).
+        """
+        values, width = self.seen.values, widths[:, np.newaxis]
+        if not self.body:
+            scale = np.log(2 * np.pi) / 2 + np.log(width)
+            return lambda moved: -((values / width + moved * np.sqrt(2 * np.pi)) ** 2) / 2 - scale
+        ends = float(values.min()) - 1, float(values.max()) + 1
+        fine = np.unique(np.concatenate([values, np.linspace(*ends, _TABLE)]))
+        logs = np.log(np.maximum([self.body.density(fine, one) for one in widths.tolist()], _LEAST))
+        middle = np.exp([np.interp(0.0, fine, own) for own in logs])[:, np.newaxis]
+
+        def others(moved: Array) -> Array:
+            at = values + moved / middle
+            some = [np.interp(at[:, i], fine, own) for i, own in enumerate(logs)]
+            return np.stack(some, 1)
+
+        return others
 
 
 def hot_laws(
-    images: Mapping[str, tuple[Array, float]], left_out: Mapping[str, Mask]
+    images: Mapping[str, tuple[Array, float]],
+    left_out: Mapping[str, Mask],
+    current: Body = _ALIKE,
 ) -> list[HotLaw]:
     """Return the likeliest law of hot pixels in maps, and those at the ends of its interval.
 
@@ -98,16 +123,22 @@ def hot_laws(
         Of each channel a map (row, column) with its noise.
     left_out
         Pixels of it that say nothing.
+    current
+        Dark currents of the others, in the maps' unit.
     """
     pixels = [
-        _binned((image - _around(image))[~left_out[name]], noise)
+        _Pixels(
+            Binned.of((image - _around(image))[~left_out[name]], noise),
+            noise,
+            replace(current, mean=current.mean / noise),
+        )
         for name, (image, noise) in images.items()
         if not left_out[name].all()
     ]
     if not pixels or not _robust(pixels) > 0:
         return []
     noise = float(np.mean([own.noise for own in pixels]))
-    error = 1 / sqrt(2 * sum(float(own.counts.sum()) for own in pixels))
+    error = 1 / sqrt(2 * sum(float(own.seen.counts.sum()) for own in pixels))
     # Noise is known: what is narrower is not the map. What else differs makes it wider.
     known, most = log(_BESIDE), max(log(_robust(pixels)), log(_BESIDE))
     width = (known - error, most + _WIDTHS * error)
@@ -146,24 +177,16 @@ def _around(image: Array) -> Array:
     return np.asarray(median_filter(padded, _AROUND)[reach:-reach, reach:-reach])
 
 
-def _binned(image: Array, noise: float) -> _Pixels:
-    """Return the values of a map's pixels, those that are much the same as one."""
-    unit = ((image - np.median(image)) / noise).ravel()
-    size = np.maximum(np.abs(unit), _FAR)
-    far = np.sign(unit) * _FAR * np.exp(np.round(np.log(size / _FAR) / _BIN) * _BIN)
-    values = np.where(size > _FAR, far, np.round(unit / _BIN) * _BIN)
-    own, counts = np.unique(values, return_counts=True)
-    return _Pixels(own, counts.astype(np.float64), noise)
-
-
 def _robust(pixels: Sequence[_Pixels]) -> float:
     """Return the width of most pixels, in noises: from how many lie within one.
 
     0 where that says none: all pixels lie within one, or none does.
     """
-    within = sum(float(own.counts[np.abs(own.values) < 1 + _BIN / 2].sum()) for own in pixels)
-    share = within / sum(float(own.counts.sum()) for own in pixels)
-    return float((1 + _BIN / 2) / ndtri((1 + share) / 2)) if 0 < share < 1 else 0.0
+    within = sum(
+        float(own.seen.counts[np.abs(own.seen.values) < 1 + BIN / 2].sum()) for own in pixels
+    )
+    share = within / sum(float(own.seen.counts.sum()) for own in pixels)
+    return float((1 + BIN / 2) / ndtri((1 + share) / 2)) if 0 < share < 1 else 0.0
 
 
 def _ends(axis: Array, found: Array, which: int, least: float) -> tuple[float, float]:

@@ -33,7 +33,7 @@ from analysis.mismatch.rank import (
     ranked,
     replicates_for,
 )
-from analysis.mismatch.resolved import calls_alone, differ, explains, gained, opened
+from analysis.mismatch.resolved import differ, gained, opened
 from analysis.mismatch.rowtold import AS_WELL, as_shown, unlike_frames
 from analysis.mismatch.segments import Path, spiky
 from analysis.mismatch.state import State
@@ -388,7 +388,7 @@ class Search(Fitted):
     def _needed(self, state: State, bare: State, named: Named, why: str) -> bool:
         """Return whether a state without an effect shows that it is no needless one after all."""
         if why == NOTHING:
-            return explains(state, bare, self.base, calls_alone(named.kind, self._beside(named)))
+            return self.explained_by(named, state, bare)
         if why.startswith((NEEDLESS, INSTEAD)) and opened(state, bare):
             return True
         if why != NEEDLESS or (own := named.proposal) is None:

@@ -26,6 +26,8 @@ from dsis.camera import Camera
 Array = NDArray[np.float64]
 _OF_FRAMES = "frame_variance"
 _NU = 6.0  # degrees of freedom of the likelihood's tails
+_LIGHT = 15.0  # of a number whose scatter some 16 simulated recordings tell
+_FAR = 4.0  # standard deviations
 _FLOOR = 0.3  # of a cube root that is 1 in white noise: below it, chance
 _LEAST_ROOT = 1e-2  # frames that agree to their last digit are no surer than that
 _FORM = 0.08  # relative error of a predicted change
@@ -50,6 +52,12 @@ _FORMS = {
 def form_errors(keys: tuple[Key, ...]) -> Array:
     """Return the relative error of a predicted change of each number."""
     return np.array([_FORMS.get(key.statistic, _FORM) for key in keys])
+
+
+def _lighter(z: float) -> float:
+    """Return how much less likely a departure is by lighter tails than by the likelihood's."""
+    heavy, light = ((nu + 1) / 2 * float(np.log1p(z**2 / nu)) for nu in (_NU, _LIGHT))
+    return light - heavy
 
 
 @dataclass(frozen=True)
@@ -155,6 +163,22 @@ class Predictor:
             return gain
         counts = [self._of_counts(one, before, known) for one in (mean, before)]
         return gain - counts[0] + counts[1] + of_pixels
+
+    def alone(self, mean: Array) -> float:
+        """Return what is gained besides where one number alone is far off, nats; else nothing.
+
+        Tails are heavy since models have errors of their own, which other numbers show. Where none
+        does, the one departs as far as the simulated recordings tell how it scatters.
+        """
+        null = self.reference.null
+        rest, sd, known = self.weights(mean)
+        known &= ~self.few & ~self.counts.said
+        before = np.where(known, self.reference.vector.values - null.mean, 0.0) / null.sd
+        far = np.flatnonzero(np.abs(before) > _FAR)
+        if far.size != 1:
+            return 0.0
+        now = rest[far[0]] / sd[far[0]]
+        return max(_lighter(float(before[far[0]])) - _lighter(float(now)), 0.0)
 
     def worth(self, without: Array) -> float:
         """Return the log-likelihood that the reference gains over a prediction without an effect.

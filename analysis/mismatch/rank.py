@@ -178,7 +178,8 @@ def _in_order(state: State, found: Sequence[Fit], shown: Callable[[Effect], floa
     judged = ~_others(state, [own.mean for _, _, own in found])
     fitted = []
     for kind, start, own in found:
-        gain = predictor.gain(own.mean, start.of_pixels, judged) - start.price
+        gain = predictor.gain(own.mean, start.of_pixels, judged) + predictor.alone(own.mean)
+        gain -= start.price
         fitted.append(Ranked(max(gain, _gained(state, start, shown)), kind, start, own))
     return sorted(fitted, key=lambda one: -one.gain)
 

@@ -1,9 +1,9 @@
 """Every effect's way of being recognised: the vocabulary of the diagnosis."""
 
 from analysis.mismatch.candidates import (
+    currents,
     edges,
     fields,
-    hot,
     neighbours,
     patterns,
     pixels,
@@ -15,7 +15,7 @@ from analysis.mismatch.candidates.candidate import Candidate, Proposal, measured
 
 CANDIDATES: dict[str, Candidate] = {
     candidate.kind: candidate
-    for module in (temporal, rows, pixels, neighbours, patterns, hot, fields, edges, response)
+    for module in (temporal, rows, pixels, neighbours, patterns, currents, fields, edges, response)
     for candidate in module.CANDIDATES
 }
 

@@ -1,4 +1,4 @@
-"""What bends the mean level: dark current, non-linearity, saturation, paths that disagree."""
+"""What bends the mean level: non-linearity, saturation, paths that disagree."""
 
 from collections.abc import Sequence
 
@@ -20,23 +20,11 @@ _HARD, _TOLD_APART = 0.02, 3.0  # of noise: as good as hard; of log-likelihood: 
 _BEYOND = np.linspace(-1.0, 6.0, 22)
 _LEFT = 0.05  # of shot noise, at a full well that is far below the light
 _BELOW = np.linspace(1.0, 8.0, 71)  # standard deviations of a full well below the light
+_ROUNDING = 1 / 12  # of variance, DN^2
 _NU = 6.0  # of Student's t law, by which numbers depart
 _NODES, _WEIGHTS = np.polynomial.hermite_e.hermegauss(41)
 _WEIGHTS = _WEIGHTS / _WEIGHTS.sum()
 Array = NDArray[np.float64]
-
-
-def _dark_current(clues: Clues) -> Sequence[Proposal]:
-    darks = [e for e in clues.layout.exposures if e.kind == "dark"]
-    times = np.array([e.exposure_time_s for e in darks])
-    if len(set(times.tolist())) < 2:
-        return []
-    level = np.array(
-        [np.mean([clues.seen.levels[e.name, c].level_dn for c in clues.layout.channels])
-         for e in darks]
-    )  # fmt: skip
-    rate = float(np.polyfit(times, level, 1)[0])
-    return proposals("dark_current", ["dn_per_s"], dn_per_s=rate) if rate > 0 else []
 
 
 def _nonlinearity(clues: Clues) -> Sequence[Proposal]:
@@ -169,7 +157,8 @@ def _soft_limits(clues: Clues, top: Place, hard: float | None = None) -> list[Pr
         return []
     bent = off["level"]
     signal = np.array([clues.signal(at) - bent.get(at, (0.0, 0.0))[0] for at, *_ in rows])
-    sd = np.array([float(clues.fit.line_dn2(np.array([own]))[0]) ** 0.5 for own in signal])
+    line = [float(clues.fit.line_dn2(np.array([own]))[0]) for own in signal]
+    sd = np.sqrt(np.maximum(line, _ROUNDING))  # of light that is hardly there a line has none
     number, value, error = np.array([row[1:] for row in rows]).T
     free = np.stack([np.where(number == 0, signal / signal.max(), 0.0), number == 1], 1)
     free = free / error[:, np.newaxis]
@@ -252,7 +241,6 @@ def _gain_mismatch(clues: Clues) -> Sequence[Proposal]:
 
 
 CANDIDATES = (
-    Candidate("dark_current", ("level", "pixel_variance"), _dark_current),
     Candidate("nonlinearity", ("level", "pixel_variance", "skewness"), _nonlinearity),
     Candidate("saturation", ("level", "pixel_variance", "skewness", "kurtosis"), _saturation),
     Candidate("dual_gain_mismatch", ("level", "pixel_variance"), _gain_mismatch),

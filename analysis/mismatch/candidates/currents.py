@@ -1,4 +1,4 @@
-"""Hot pixels, measured of the map that grows with exposure time."""
+"""Dark currents, of all pixels and of hot ones, measured of the map that grows with exposure."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -7,17 +7,95 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import median_abs_deviation
 
+from analysis.currentlaw import Body, Spread, current_spread
 from analysis.mismatch.candidates.candidate import Candidate, Proposal, measured, proposals
 from analysis.mismatch.clues import Clues
 from analysis.mismatch.counted import Counted
 from analysis.mismatch.hotlaw import hot_laws
+from dsis.effects.dark_current import DarkCurrent
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 _NUMBERS = ("pixel_fraction", "mean_dn_per_s")
+_RATE, _SPREAD = "dn_per_s", "log_sigma"
+_TOLD = 3.0  # of log-likelihood: odds of 20
 _CLEAR = 5.0  # standard deviations of a pixel's summed variance
 _FEW = 0.1  # of all pixels
 _SEEN = 2  # frames: of more there are variances
+
+
+def _dark_current(clues: Clues) -> Sequence[Proposal]:
+    """Return the growth of the darks' level, alike in all pixels; and as far from it as they are.
+
+    Where single pixels show that, which has a number more.
+    """
+    darks = [e for e in clues.layout.exposures if e.kind == "dark"]
+    times = np.array([e.exposure_time_s for e in darks])
+    if len(set(times.tolist())) < 2:
+        return []
+    level = np.array(
+        [np.mean([clues.seen.levels[e.name, c].level_dn for c in clues.layout.channels])
+         for e in darks]
+    )  # fmt: skip
+    rate = float(np.polyfit(times, level, 1)[0])
+    if rate <= 0:
+        return []
+    found = proposals("dark_current", [_RATE], dn_per_s=rate)
+    spread = current_spread_of(clues, rate)
+    if spread is None:
+        return found
+    of_pixels = spread.gain if _normal(clues) else None
+    values, errors = {_SPREAD: spread.log_sigma}, {_SPREAD: spread.error}
+    return [*found, *(replace(measured(own, values, errors), of_pixels=of_pixels) for own in found)]
+
+
+def current_spread_of(clues: Clues, rate: float) -> Spread | None:
+    """Return how far pixels' dark currents lie from their mean, DN/s; None: they are alike."""
+    images = clues.image("time")
+    if not images:
+        return None
+    scale = clues.scale("time", next(iter(images)))
+    maps = [
+        (image, noise, _noisy(clues, name, image / scale))
+        for name, (image, noise) in images.items()
+    ]
+    spread = current_spread(maps, rate * scale, shot=_shot(clues, rate))
+    return spread if spread is not None and spread.gain > _TOLD else None
+
+
+def _normal(clues: Clues) -> bool:
+    """Return whether the camera expects no pixel that is far out of a map.
+
+    Laws are told from normal noise: where the camera's maps are another's, counts must do.
+    """
+    pixels = clues.layout.rows * clues.layout.columns
+    return Counted(clues.vector.keys, pixels).normal(clues.null.mean)
+
+
+def _body(clues: Clues, scale: float) -> Body:
+    """Return the law of the camera's dark currents, in a map's unit."""
+    own = [e for e in clues.camera.effect if isinstance(e, DarkCurrent) and e.log_sigma]
+    if len(own) != 1:
+        return Body()
+    rate = own[0].dn_per_s
+    return Body(rate * scale, own[0].log_sigma, _shot(clues, rate))
+
+
+def _shot(clues: Clues, rate: float) -> float:
+    """Return what share of the noise variance of a map of time is shot noise of a rate, DN/s.
+
+    Of exposures, each counts as it does for a slope against their times.
+    """
+    dark, lit = clues.fit.line_dn2(np.array([0.0, 1.0]))
+    share = total = 0.0
+    for own in clues.layout.uniform:
+        time = own.exposure_time_s
+        for channel in clues.layout.channels:
+            variance = clues.seen.levels[own.name, channel].variance_dn2
+            weight = time**2 * len(own.numbers) / variance**2 if variance > 0 else 0.0
+            share += weight * max(float(lit - dark), 0.0) * rate * time
+            total += weight * variance
+    return min(share / total, 1.0) if total > 0 else 0.0
 
 
 def _hot(clues: Clues) -> Sequence[Proposal]:
@@ -30,11 +108,10 @@ def _hot(clues: Clues) -> Sequence[Proposal]:
         return []
     images, scale = grown
     noisy = {name: _noisy(clues, name, image / scale) for name, (image, _) in images.items()}
-    # The law is told from normal noise: where the camera's maps are another's, counts must do.
-    pixels = clues.layout.rows * clues.layout.columns
-    normal = Counted(clues.vector.keys, pixels).normal(clues.null.mean)
+    body = _body(clues, scale)
+    normal = bool(body) or _normal(clues)
     found: list[Proposal] = []
-    for law in (own for own in hot_laws(images, noisy) if own.share <= _FEW):
+    for law in (own for own in hot_laws(images, noisy, body) if own.share <= _FEW):
         if law.gain < len(_NUMBERS):
             continue
         values = dict(zip(_NUMBERS, (law.share, law.mean / scale), strict=True))
@@ -86,5 +163,6 @@ def _noisy(clues: Clues, channel: str, rate: Array) -> Mask:
 
 
 CANDIDATES = (
+    Candidate("dark_current", ("level", "pixel_variance"), _dark_current),
     Candidate("hot_pixels", ("outlying_pixels", "one_off_outliers", "fixed_pixel_variance"), _hot),
 )

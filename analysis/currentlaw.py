@@ -40,7 +40,8 @@ class Spread:
     Attributes
     ----------
     log_sigma, error
-        Standard deviation of their logarithm, and its standard error.
+        Standard deviation of their logarithm about a mean that hot pixels have a part in, and its
+        standard error.
     gain
         Of log-likelihood beside equal dark currents, and noise up to a tenth larger, nats.
     """
@@ -48,6 +49,14 @@ class Spread:
     log_sigma: float
     error: float
     gain: float
+
+
+def of_all(sigma: float, ratio: float) -> float:
+    """Return the spread about another mean, of the same standard deviation.
+
+    `ratio` is that of the mean whose spread `sigma` is to the other.
+    """
+    return sqrt(np.log1p(np.expm1(sigma**2) * ratio**2))
 
 
 @dataclass(frozen=True)
@@ -217,7 +226,7 @@ def current_spread(
     brighter = [own.of_mean(own.equal.mean * away) for own in law]
     moved = _likeliest(brighter, best.sigma * np.geomspace(1 / away, away, _FINE)).sigma
     error = float(np.hypot(_error(law, best.sigma), moved - best.sigma))
-    return Spread(best.sigma, error, best.nats - equal)
+    return Spread(of_all(best.sigma, left), error, best.nats - equal)
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,8 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
+from analysis.currentlaw import Spread
+from analysis.mismatch.apart import as_far_apart, spread_of_users, with_spread
 from analysis.mismatch.candidates import CANDIDATES, Proposal
 from analysis.mismatch.candidates.patterns import of_any_shape
 from analysis.mismatch.credited import given_back
@@ -75,6 +77,7 @@ class Fitted:
     beside_path: dict[tuple[str, ...], bool] = field(default_factory=dict)
     whole: Setting | None = None
     of_whole: State | None = None
+    spread: Spread | None = None  # of dark currents that the user's camera has alike
     left: State | None = None  # by the user's effects of other sizes, as all frames say
 
     def lit(self, state: State) -> State:
@@ -83,6 +86,7 @@ class Fitted:
         What was measured in other frames before is measured again, and what was a shape of few
         numbers makes way for it.
         """
+        state = self._apart(state)
         if _LIGHT not in self.vocabulary:
             return state
         before = [one for one in self.named if one.kind == _LIGHT]
@@ -98,6 +102,16 @@ class Fitted:
         if found is None or camera is None:
             return state
         self.named = [found, *(one for one in self.named if one not in before)]
+        return State.of(self.setting, camera, self.step, draft=True, near=state)
+
+    def _apart(self, state: State) -> State:
+        """Return the state with the user's dark currents as far apart as pixels show."""
+        found = spread_of_users(state, self.camera, again=self.spread is not None)
+        if found is None:
+            return state
+        place, self.spread = found
+        self.camera = with_spread(self.camera, place, self.spread.log_sigma)
+        camera = with_spread(state.camera, place, self.spread.log_sigma)
         return State.of(self.setting, camera, self.step, draft=True, near=state)
 
     def settle(self, state: State) -> State:
@@ -135,6 +149,8 @@ class Fitted:
         self, bare: Camera, effects: Sequence[Effect], errors: Sequence[dict[str, float]]
     ) -> Camera | None:
         """Take in what was fitted, and return the camera with it; None: it cannot have them."""
+        mine = [*(own.effect for own in self.own), *(n.effect for n in self.named if n.proposal)]
+        effects = [as_far_apart(b, own) for b, own in zip(mine, effects, strict=True)]
         if with_effects(bare, effects) is None:
             return None
         fitted = iter(zip(effects, errors, strict=True))
@@ -146,8 +162,8 @@ class Fitted:
             n if n.proposal is None else renewed(n, n.proposal, *next(fitted)) for n in self.named
         ]
         self.camera = resized(self.camera, self.own)
-        mine = [named.proposal.effect for named in self.named if named.proposal is not None]
-        return bare.model_copy(update={"effect": (*self.camera.effect, *mine)})
+        some = [named.proposal.effect for named in self.named if named.proposal is not None]
+        return bare.model_copy(update={"effect": (*self.camera.effect, *some)})
 
     def without(self, state: State, named: Named) -> Camera:
         """Return a state's camera without one of the effects named."""
@@ -332,7 +348,7 @@ class Fitted:
 
         `whole` is what is asked whether anything differs: no physics is credited with better sizes.
         """
-        if not self.own:
+        if not self.own and self.spread is None:
             return whole
         whole = State.of(whole.setting, self.camera, self.step, near=whole)
         large = self.base.setting.large

@@ -8,6 +8,7 @@ from math import log
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.mismatch.apart import as_far_apart
 from analysis.mismatch.candidates import CANDIDATES, Proposal
 from analysis.mismatch.credited import joined, together
 from analysis.mismatch.instance import (
@@ -169,7 +170,11 @@ def _fitted(state: State, proposal: Proposal) -> Polished | None:
     rounds = 1 + len(proposal.free)
     if state.setting.large:  # of a large recording steps are long and sure
         rounds = min(rounds, _ROUNDS)
-    return polish(own, *together(state.camera, proposal, state.setting.given), rounds=rounds)
+    fitted = polish(own, *together(state.camera, proposal, state.setting.given), rounds=rounds)
+    if fitted is None:
+        return None
+    first, *others = fitted.effects
+    return replace(fitted, effects=(as_far_apart(proposal.effect, first), *others))
 
 
 def _in_order(state: State, found: Sequence[Fit], shown: Callable[[Effect], float]) -> list[Ranked]:

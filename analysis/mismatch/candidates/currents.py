@@ -29,16 +29,8 @@ def _dark_current(clues: Clues) -> Sequence[Proposal]:
 
     Where single pixels show that, which has a number more.
     """
-    darks = [e for e in clues.layout.exposures if e.kind == "dark"]
-    times = np.array([e.exposure_time_s for e in darks])
-    if len(set(times.tolist())) < 2:
-        return []
-    level = np.array(
-        [np.mean([clues.seen.levels[e.name, c].level_dn for c in clues.layout.channels])
-         for e in darks]
-    )  # fmt: skip
-    rate = float(np.polyfit(times, level, 1)[0])
-    if rate <= 0:
+    rate = dark_rate(clues)
+    if rate is None:
         return []
     found = proposals("dark_current", [_RATE], dn_per_s=rate)
     spread = current_spread_of(clues, rate)
@@ -49,8 +41,25 @@ def _dark_current(clues: Clues) -> Sequence[Proposal]:
     return [*found, *(replace(measured(own, values, errors), of_pixels=of_pixels) for own in found)]
 
 
+def dark_rate(clues: Clues) -> float | None:
+    """Return how fast the level of darks grows with exposure time, DN/s; None: it does not."""
+    darks = [e for e in clues.layout.exposures if e.kind == "dark"]
+    times = np.array([e.exposure_time_s for e in darks])
+    if len(set(times.tolist())) < 2:
+        return None
+    level = np.array(
+        [np.mean([clues.seen.levels[e.name, c].level_dn for c in clues.layout.channels])
+         for e in darks]
+    )  # fmt: skip
+    rate = float(np.polyfit(times, level, 1)[0])
+    return rate if rate > 0 else None
+
+
 def current_spread_of(clues: Clues, rate: float) -> Spread | None:
-    """Return how far pixels' dark currents lie from their mean, DN/s; None: they are alike."""
+    """Return how far pixels' dark currents lie from a mean rate, DN/s; None: they are alike.
+
+    The rate is that of all, hot ones too.
+    """
     images = clues.image("time")
     if not images:
         return None

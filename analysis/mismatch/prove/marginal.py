@@ -42,8 +42,8 @@ def with_variances(own: Residuals, base: Residuals, held: Held) -> Law:
             if e.kind == "scene":  # its base variance follows the scene
                 continue
             growth[site] = _growth(
-                square[:, *place] * plain[place],
-                pattern,
+                square[:, *place][:, many] * plain[place][many],
+                pattern[many],
                 factor[site] * float(law.variance_dn2[place].mean()),
             )
         laws[e.name] = replace(law, factor=factor, growth_dn=growth)
@@ -69,7 +69,10 @@ def _scale(squares: Image, other: Image) -> float:
 
 
 def _growth(squares: Image, pattern: Array, variance: float) -> float:
-    """Return the slope of squared residuals (frame, row, column) over the pattern."""
+    """Return the slope of squared residuals (frame, pixel) over the pattern.
+
+    Of few pixels far out the pattern is large, and squares are cut: those say nothing.
+    """
     size = float((pattern**2).sum())
     if not size:
         return 0.0

@@ -7,7 +7,7 @@ form: it is a mixture of normal laws, one for each k of a fine grid.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import exp, log, pi, sqrt
+from math import exp, hypot, log, pi, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,7 @@ from scipy.special import log_ndtr, ndtr
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 _AROUND = 15  # pixels: what is smooth is a glow, or light
+_LINES = 4.0  # standard deviations of the variance of lines' means
 _CLIPPED = 5.0  # robust standard deviations, beyond which a pixel is none of the many around
 BIN = 0.05  # of noise, and beyond `_FAR` noises of a value's logarithm
 _FAR = 10.0
@@ -150,14 +151,16 @@ class _Pixels:
     @classmethod
     def of(cls, image: Array, noise: float, out: Mask, mean: float, shot: float) -> "_Pixels":
         """Return the pixels of a map, from what is smooth there."""
-        middle = float(np.median(image))
-        limit = _CLIPPED * _robust(image - middle)
-        most = np.clip(image - middle, -limit, limit)
+        rest, scatter = image, 0.0
+        for axis in (1, 0):
+            rest, more = _without_lines(rest, axis)
+            scatter = hypot(scatter, more)
+        most = _most(rest)
         smooth = uniform_filter(most, _AROUND, mode="reflect")
         # Of n pixels the mean has a share of 1 / n of each, and the noise of the others.
         count = _AROUND**2
-        own = float(np.hypot(noise, most.std() / sqrt(count - 1)))
-        rest = (image - middle - smooth)[~out] * count / (count - 1)
+        own = hypot(noise, scatter, float(most.std()) / sqrt(count - 1))
+        rest = (rest - np.median(rest) - smooth)[~out] * count / (count - 1)
         seen = Binned.of(rest, own)
         size = np.abs(seen.values)
         # As often between 2 and 4 noises as between 20 and 40 (Jeffreys).
@@ -174,6 +177,26 @@ class _Pixels:
         """Return the pixels where those that are not hot lack what hot ones have of the mean."""
         rest = self.equal.mean - fit.share * float(self.means[fit.which])
         return self.of_mean(max(rest, _LEFT * self.equal.mean))
+
+
+def _most(image: Array) -> Array:
+    """Return a map about its median, what is far out drawn in."""
+    centred = image - np.median(image)
+    limit = _CLIPPED * _robust(centred)
+    return np.asarray(np.clip(centred, -limit, limit))
+
+
+def _without_lines(image: Array, axis: int) -> tuple[Array, float]:
+    """Return a map without what lines along an axis share, and the noise that comes by that.
+
+    Only where their means scatter by more than their pixels make them.
+    """
+    most = _most(image)
+    means, length = most.mean(axis, keepdims=True), image.shape[axis]
+    scatter = float(most.std()) / sqrt(length)
+    if length < 2 or float(means.var()) <= scatter**2 * (1 + _LINES * sqrt(2 / means.size)):
+        return image, 0.0
+    return (image - means) * length / (length - 1), float(most.std()) / sqrt(length - 1)
 
 
 def exponential(values: Array, rate: Array | float) -> Array:

@@ -44,6 +44,10 @@ STRONG: dict[str, tuple[dict[str, object], ...]] = {
     "bistable_pattern": ({"amplitude_dn": 30.0}, {"amplitude_dn": 30.0, "frequency": (0, 0.5)}),
     "brighter_fatter": ({"per_dn": 8e-5}, {"per_dn": 2e-4}, {"anisotropy": -1.0}),
     "crosstalk": ({"fraction": 0.2}, {"fraction": 0.04}),
+    "dark_current": (
+        {"dn_per_s": 4000.0, "log_sigma": 0.3},
+        {"dn_per_s": 4000.0, "log_sigma": 1.0},
+    ),
     "hot_pixels": ({"mean_dn_per_s": 3e4}, {"mean_dn_per_s": 3e4, "pixel_fraction": 0.5}),
     "impulse": ({"mean_dn": 3000.0},),
     "periodic_noise": ({"amplitude_dn": 30.0}, {"amplitude_dn": 30.0, "frequency": (0, 0.2)}),

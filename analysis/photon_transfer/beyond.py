@@ -1,17 +1,19 @@
 """Physics beyond the affine model that photon transfer measures anyway, as effects of a camera."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from pydantic import ValidationError
 
+from analysis.currentlaw import current_spread
 from analysis.photon_transfer.black import DarkLine
 from analysis.photon_transfer.parts import P_SEEN, Component
-from analysis.photon_transfer.patterns import FixedPatterns
+from analysis.photon_transfer.patterns import FixedPatterns, Growth
 from dsis.effects import Effect, registry
 from dsis.errors import InputError
 
+LEAST_GAIN = 4.5  # of log-likelihood: three standard errors
 LEAST_Z = 3.0  # standard errors from which a growth is taken for real
 
 
@@ -26,14 +28,17 @@ class FittedEffect:
     value, standard_error
         Over all channels; the error is 0 where the value is a count.
     beside
-        Further parameters, counts too.
+        Further parameters.
+    beside_error
+        The standard error of the last of them; 0 where they are counts.
     """
 
     kind: str
     parameter: str
     value: float
     standard_error: float
-    beside: Mapping[str, int] = field(default_factory=dict)
+    beside: Mapping[str, float] = field(default_factory=dict)
+    beside_error: float = 0.0
 
     @property
     def effect(self) -> Effect:
@@ -95,6 +100,27 @@ def pooled_current(darks: Mapping[str, DarkLine | None]) -> FittedEffect | None:
     if mean < LEAST_Z * mean_se:
         return None
     return FittedEffect("dark_current", "dn_per_s", mean, mean_se)
+
+
+def with_spread(current: FittedEffect | None, growth: Mapping[str, Growth]) -> FittedEffect | None:
+    """Return the dark current with how far it differs between pixels, where they show that."""
+    if current is None or not growth:
+        return current
+    maps = [
+        (own.dn_per_s, own.noise, np.zeros(own.dn_per_s.shape, bool)) for own in growth.values()
+    ]
+    shot = float(np.mean([own.shot for own in growth.values()]))
+    spread = current_spread(maps, current.value, current.standard_error, shot)
+    if spread is None or spread.gain < LEAST_GAIN:
+        return current
+    # This one sensor's mean is that of its pixels.
+    relative = np.expm1(spread.log_sigma**2) / sum(own.dn_per_s.size for own in growth.values())
+    return replace(
+        current,
+        standard_error=float(np.hypot(current.standard_error, current.value * relative**0.5)),
+        beside={"log_sigma": spread.log_sigma},
+        beside_error=spread.error,
+    )
 
 
 def _part(

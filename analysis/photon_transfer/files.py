@@ -79,7 +79,8 @@ def camera_text(fit: Fit, origin: str = "") -> str:
         )
     comments += [
         f"{e.kind}.{e.parameter} = {e.value:.6g} +- {e.standard_error:.2g}"
-        + "".join(f", {name} = {value}" for name, value in e.beside.items())
+        + "".join(f", {name} = {value:.6g}" for name, value in e.beside.items())
+        + (f" +- {e.beside_error:.2g}" if e.beside_error else "")
         for e in fit.effects
     ]
     comments += fit.remarks

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
-from analysis.photon_transfer.beyond import FittedEffect, effects_of, pooled_current
+from analysis.photon_transfer.beyond import FittedEffect, effects_of, pooled_current, with_spread
 from analysis.photon_transfer.black import DarkLine
 from analysis.photon_transfer.distribution import Distribution, noise_distribution
 from analysis.photon_transfer.emva1288 import figures_of_merit
@@ -202,8 +202,9 @@ def fit_camera(
     saturation = saturation_of(levels)
     levels = leave_out(levels, saturation, remarks)
     sums.without(recording, {v.statistics.exposure for v in levels if v.left_out})
-    current = pooled_current(darks)
-    patterns = sums.patterns(recording, levels, 0.0 if current is None else current.value)
+    current = with_spread(pooled_current(darks), sums.currents(recording, levels))
+    rate, apart = (current.value, bool(current.beside)) if current is not None else (0.0, False)
+    patterns = sums.patterns(recording, levels, rate, apart=apart)
     black = black_level(recording.sensor.black_level, darks, patterns.dark, remarks, patterns.why)
     points = points_of(levels)
     found = _fit(recording, levels, points, segments, black.noise_se_dn or 0.0)

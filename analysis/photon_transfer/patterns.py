@@ -1,7 +1,7 @@
 """Fixed pattern of the sensor, pixel by pixel: sums over darks and flats in whole numbers."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from threading import Lock
 from typing import Any
 
@@ -13,7 +13,7 @@ from analysis.photon_transfer.levels import FittedLevel
 from analysis.photon_transfer.parts import LEAST_LINES, Noise, Pattern
 from analysis.photon_transfer.recorded import Recorded, channel_names
 from analysis.photon_transfer.statistics import LevelStatistics
-from analysis.photon_transfer.sums import Ints
+from analysis.photon_transfer.sums import Floats, Ints
 from dsis.simulate.maps import SensorMaps
 
 LEAST_FRAMES = 4  # darks and flats each, below which a map would be noise
@@ -52,6 +52,7 @@ class PatternSums:
 
     def __init__(self) -> None:
         self._total: dict[str, Ints] = {}
+        self._timed: dict[str, Ints] = {}  # each times its exposure time in microseconds
         self.names: set[str] = set()
         self._lock = Lock()
 
@@ -60,6 +61,9 @@ class PatternSums:
         with self._lock:
             kept = self._total.setdefault(str(exposure.kind), np.zeros(total.shape, np.int64))
             kept += total
+            if str(exposure.kind) == "dark":
+                timed = self._timed.setdefault("dark", np.zeros(total.shape, np.int64))
+                timed += total.astype(np.int64) * _microseconds(exposure)
             self.names.add(str(exposure.name))
 
     def without(self, recording: Recorded, names: set[str]) -> None:
@@ -68,20 +72,28 @@ class PatternSums:
             if exposure.name in self.names & names:
                 for frame in recording.frames(exposure):
                     self._total[str(exposure.kind)] -= frame
+                    if str(exposure.kind) == "dark":
+                        self._timed["dark"] -= frame.astype(np.int64) * _microseconds(exposure)
         self.names -= names
 
     def patterns(
-        self, recording: Recorded, levels: Sequence[FittedLevel], dark_dn_per_s: float
+        self,
+        recording: Recorded,
+        levels: Sequence[FittedLevel],
+        dark_dn_per_s: float,
+        *,
+        apart: bool = False,
     ) -> FixedPatterns:
         """Return the patterns of the frames summed so far.
 
         offset = mean dark less its channel's mean; gain = (mean flat - mean dark) over its
         channel's mean: every flat counts by its level and frames, nearly by 1 / variance under shot
-        noise.
+        noise. Where dark currents are `apart`, each pixel's own line through the darks is taken in
+        place of their mean: the offset is that of no exposure time, the flat's dark that of its.
         """
-        of_use = [level.statistics for level in levels if level.statistics.exposure in self.names]
-        darks = _Stack.of([s for s in of_use if s.kind == "dark"])
-        flats = _Stack.of([s for s in of_use if s.kind == "flat"])
+        of_darks = self._of_use(levels, "dark")
+        darks = _Stack.of(of_darks)
+        flats = _Stack.of(self._of_use(levels, "flat"))
         sites = _sites(recording)
         if darks is None:
             why = "no dark is of use in all channels"
@@ -91,19 +103,24 @@ class PatternSums:
             why = f"a channel has {lines} rows or columns, {LEAST_LINES} are needed"
             return FixedPatterns({}, {}, None, None, 0, why)
         dark = self._total["dark"] / darks.frames
+        times = _Times.of(of_darks) if apart else None
+        slope: Floats | float = dark_dn_per_s
+        if times is not None:
+            slope = self._slope(times)
+            darks = replace(darks, time_s=0.0, noise=times.noise_at(0.0))
+            dark -= slope * times.mean_s
         parts = {name: Pattern.of(dark[site], darks.noise[name]) for name, site in sites.items()}
         if flats is None or min(darks.frames, flats.frames) < LEAST_FRAMES:
             return FixedPatterns(parts, {}, None, None, 0)
         light = self._total["flat"] / flats.frames - dark
-        light -= dark_dn_per_s * (flats.time_s - darks.time_s)
+        light -= slope * (flats.time_s - darks.time_s)
+        unlit = darks.noise if times is None else times.noise_at(flats.time_s)
         mean = {name: float(light[site].mean()) for name, site in sites.items()}
         if not min(mean.values()) > 0:
             return FixedPatterns(parts, {}, None, None, 0)
         planes = {name: light[site] / mean[name] for name, site in sites.items()}
         gains = {
-            name: Pattern.of(
-                plane, flats.noise[name].plus(darks.noise[name]).times(mean[name] ** -2)
-            )
+            name: Pattern.of(plane, flats.noise[name].plus(unlit[name]).times(mean[name] ** -2))
             for name, plane in planes.items()
         }
         fall = falloff(
@@ -112,9 +129,110 @@ class PatternSums:
         maps, dead = _maps(sites, parts, gains, dark.shape)
         return FixedPatterns(parts, gains, fall, maps, dead)
 
+    def currents(self, recording: Recorded, levels: Sequence[FittedLevel]) -> "dict[str, Growth]":
+        """Return by channel how fast each pixel's darks grow; empty: their times do not tell."""
+        darks = _Times.of(self._of_use(levels, "dark"))
+        if darks is None:
+            return {}
+        slope = self._slope(darks)
+        return {
+            name: Growth(slope[site], *darks.noise_of_slope(name))
+            for name, site in _sites(recording).items()
+        }
+
+    def _of_use(self, levels: Sequence[FittedLevel], kind: str) -> list[LevelStatistics]:
+        own = (level.statistics for level in levels if level.statistics.kind == kind)
+        return [s for s in own if s.exposure in self.names]
+
+    def _slope(self, darks: "_Times") -> Floats:
+        return (self._timed["dark"] * 1e-6 - darks.mean_s * self._total["dark"]) / darks.square_s2
+
     @property
     def _shape(self) -> tuple[int, ...]:
         return next(iter(self._total.values())).shape
+
+
+@dataclass(frozen=True)
+class Growth:
+    """How fast a channel's darks grow with exposure time.
+
+    Attributes
+    ----------
+    dn_per_s
+        Of each pixel, by least squares: (row, column).
+    noise
+        Of a pixel's, DN/s.
+    shot
+        The share of that noise's variance that has come with exposure time.
+    """
+
+    dn_per_s: Floats
+    noise: float
+    shot: float
+
+
+@dataclass(frozen=True)
+class _Times:
+    """Darks of several exposure times, as straight lines through them weigh them.
+
+    Attributes
+    ----------
+    darks
+        Of each exposure and channel.
+    frames, mean_s, square_s2
+        Number of frames, their mean exposure time, its squared deviations summed.
+    """
+
+    darks: Sequence[LevelStatistics]
+    frames: int
+    mean_s: float
+    square_s2: float
+
+    @classmethod
+    def of(cls, darks: Sequence[LevelStatistics]) -> "_Times | None":
+        """Return the darks; None where all have the same exposure time."""
+        each = {s.exposure: s for s in darks}.values()
+        frames = sum(s.frames for s in each)
+        if not frames or len({s.exposure_time_s for s in each}) < 2:
+            return None
+        mean = sum(s.frames * s.exposure_time_s for s in each) / frames
+        square = sum(s.frames * (s.exposure_time_s - mean) ** 2 for s in each)
+        return cls(darks, frames, mean, square)
+
+    def noise_at(self, time_s: float) -> dict[str, Noise]:
+        """Return the noise of each channel's lines at an exposure time."""
+        found = {}
+        for name in dict.fromkeys(s.channel for s in self.darks):
+            own = [s for s in self.darks if s.channel == name]
+            away = (time_s - self.mean_s) / self.square_s2
+            weights = [
+                s.frames * (1 / self.frames + away * (s.exposure_time_s - self.mean_s)) ** 2
+                for s in own
+            ]
+            row = sum(w * s.row_variance_dn2 for w, s in zip(weights, own, strict=True))
+            column = sum(w * s.column_variance_dn2 for w, s in zip(weights, own, strict=True))
+            all_of_it = [w * s.variance_dn2 for w, s in zip(weights, own, strict=True)]
+            error = sum(v**2 / (s.frames - 1) for v, s in zip(all_of_it, own, strict=True))
+            total = sum(all_of_it)
+            found[name] = Noise(total - row - column, row, column, total**2 / error)
+        return found
+
+    def noise_of_slope(self, name: str) -> tuple[float, float]:
+        """Return the noise of a pixel's slope, DN/s, and how much of its variance grows."""
+        own = [s for s in self.darks if s.channel == name]
+        weights = np.array([s.frames * (s.exposure_time_s - self.mean_s) ** 2 for s in own])
+        pixel = np.array([s.variance_dn2 - s.row_variance_dn2 - s.column_variance_dn2 for s in own])
+        total = float(weights @ np.maximum(pixel, 0.0))
+        if total <= 0:
+            return 0.0, 0.0
+        shortest = own[int(np.argmin([s.exposure_time_s for s in own]))]
+        rest = shortest.variance_dn2 - shortest.row_variance_dn2 - shortest.column_variance_dn2
+        grown = float(weights @ np.maximum(pixel - rest, 0.0))
+        return total**0.5 / self.square_s2, min(grown / total, 1.0)
+
+
+def _microseconds(exposure: Any) -> int:
+    return round(float(exposure.exposure_time_s) * 1e6)
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, Stage
 
-_OF_PIXELS = frozenset({"fixed_pixel_variance", "variance_spread", "kurtosis", "code_imbalance"})
+_OF_PIXELS = frozenset({"fixed_pixel_variance", "variance_spread", "kurtosis"})
 
 
 class DarkCurrent(Effect):

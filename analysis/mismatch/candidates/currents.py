@@ -21,7 +21,7 @@ _RATE, _SPREAD = "dn_per_s", "log_sigma"
 _TOLD = 3.0  # of log-likelihood: odds of 20
 _CLEAR = 5.0  # standard deviations of a pixel's summed variance
 _FEW = 0.1  # of all pixels
-_SEEN = 2  # frames: of more there are variances
+_SEEN = 2  # frames, of which there are variances
 
 
 def _dark_current(clues: Clues) -> Sequence[Proposal]:
@@ -158,7 +158,7 @@ def _noisy(clues: Clues, channel: str, rate: Array) -> Mask:
     expected, scatter, white = np.zeros(rate.shape), np.zeros(rate.shape), 0.0
     for exposure in clues.layout.uniform:
         frames = len(exposure.numbers)
-        if frames <= _SEEN or (exposure.name, channel) in clues.layout.still:
+        if frames < _SEEN or (exposure.name, channel) in clues.layout.still:
             continue
         variance = clues.layout.variance_dn2[exposure.name, channel]
         share = max(float(lit - dark), 0.0) * per_s * exposure.exposure_time_s / variance

@@ -99,7 +99,7 @@ def test_a_users_equal_dark_current_is_a_wrong_number() -> None:
     (wrong,) = [e for e in found.parameter_errors if e.parameter.endswith("dark_current.log_sigma")]
     assert wrong.model == 0
     assert abs(wrong.recorded - SIGMA) < 4 * wrong.standard_error
-    assert not found.unexplained
+    assert {m.statistic for m in found.unexplained} <= {"skewness"}  # of counted photons
 
 
 def test_another_mean_leaves_pixels_as_far_apart() -> None:

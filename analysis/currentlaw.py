@@ -7,7 +7,7 @@ form: it is a mixture of normal laws, one for each k of a fine grid.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import exp, hypot, log, pi, sqrt
+from math import exp, hypot, inf, log, pi, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,7 @@ _NODES, _END = 400, 6.0  # of the grid of k
 _SIGMAS = np.geomspace(0.02, 3.0, 48)
 _SPANS, _FINE = (1.12, 1.12, 1.02), 15  # of finer grids, and their points
 _LEFT = 0.1  # of a mean, that others than hot pixels have
+_FARTHEST = 0.5  # of a logarithm, to either side of the likeliest
 _LEAST = 1e-300
 _STRAY = np.array([0.0, 1e-4, 1e-3, 1e-2])  # shares of pixels of no such law
 _HOT = np.concatenate([[0.0], np.geomspace(1e-4, 0.4, 12)])  # and of hot ones
@@ -277,19 +278,16 @@ def _likeliest(pixels: Sequence[_Pixels], sigmas: Array, hot: Array = _HOT) -> _
 
 
 def _error(pixels: Sequence[_Pixels], sigma: float) -> float:
-    """Return the standard error, by the curvature of the log-likelihood."""
-    step = 0.02
+    """Return the standard error, by the curvature of the log-likelihood; infinite where flat."""
+    step, relative = 0.02, inf
     for _ in range(20):  # until half a nat is lost or so
         here, below, above = (_loglik(pixels, sigma * exp(x)).nats for x in (0.0, -step, step))
         bent = (2 * here - below - above) / step**2
-        if bent <= 0:
-            step *= 2
-            continue
-        wanted = sqrt(2 * _INTERVAL / bent)
-        if 0.5 * step < wanted < 2 * step:
+        relative = sqrt(2 * _INTERVAL / bent) if bent > 0 else inf
+        if 0.5 * step < relative < 2 * step or (relative > step >= _FARTHEST):
             break
-        step = float(np.clip(wanted, step / 8, step * 8))
-    return sigma * sqrt(2 * _INTERVAL / bent) if bent > 0 else float("inf")
+        step = min(max(relative, step / 8), step * 8, _FARTHEST)
+    return sigma * relative
 
 
 def _loglik(

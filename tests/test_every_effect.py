@@ -69,6 +69,8 @@ STRONG: dict[str, tuple[dict[str, object], ...]] = {
     ),
     "row_banding": ({"sigma_dn": 20.0}, {"sigma_dn": 20.0, "length_rows": 20.0}),
     "rts": (
+        {"amplitude_dn": 80.0, "pixel_fraction": 0.2, "heights": "equal"},
+        {"amplitude_dn": 80.0, "pixel_fraction": 0.2, "heights": "equal", "levels": "above"},
         {"amplitude_dn": 60.0, "pixel_fraction": 0.5, "switch_probability": 0.02},
         {"amplitude_dn": 110.0, "pixel_fraction": 0.5, "switch_probability": 0.02},
         {"amplitude_dn": 60.0, "pixel_fraction": 0.3, "levels": "above"},

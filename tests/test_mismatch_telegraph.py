@@ -76,7 +76,9 @@ def _recorded(seed: int, kind: str, **how: float) -> Telegraph | None:
     taken = []
     height = np.zeros(pixels)
     some = rng.random(pixels) < how.get("share", 0.0)
-    height[some] = rng.exponential(how.get("amplitude", 0.0), int(some.sum()))
+    height[some] = how.get("amplitude", 0.0)
+    if kind != "equal":
+        height[some] *= rng.exponential(size=int(some.sum()))
     spread = np.exp(how.get("log_sigma", 0.0) * rng.normal(size=pixels))
     for i, sd in enumerate(NOISE):
         shot = np.sqrt(sd**2 - NOISE[0] ** 2)
@@ -110,6 +112,7 @@ def test_a_population_that_jumps_is_told_with_its_numbers(seed: int) -> None:
     told = _recorded(seed, "telegraph", **how)
     assert told is not None
     assert told.gain > 10
+    assert not told.equal
     assert abs(told.share - how["share"]) < 3.5 * told.share_error
     assert abs(told.amplitude_dn - how["amplitude"]) < 3.5 * told.amplitude_error_dn
     assert abs(told.switching - how["switching"]) < 3.5 * told.switching_error
@@ -117,6 +120,19 @@ def test_a_population_that_jumps_is_told_with_its_numbers(seed: int) -> None:
     assert told.amplitude_error_dn < how["amplitude"] / 2
     assert told.spread < SURE
     assert told.jumping > SURE
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_jumps_of_one_height_are_told_from_exponential_ones(seed: int) -> None:
+    """Numbers of the other law would be three times the share, and half the height."""
+    how = {"share": 0.008, "amplitude": 12.0, "switching": 0.3}
+    told = _recorded(seed, "equal", **how)
+    assert told is not None
+    assert told.equal
+    assert told.values["heights"] == "equal"
+    assert abs(told.share - how["share"]) < 3.5 * told.share_error
+    assert abs(told.amplitude_dn - how["amplitude"]) < 3.5 * told.amplitude_error_dn
+    assert abs(told.switching - how["switching"]) < 3.5 * told.switching_error
 
 
 @pytest.mark.parametrize(

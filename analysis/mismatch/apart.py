@@ -22,6 +22,16 @@ def as_far_apart(before: Effect | None, after: Effect) -> Effect:
     return after.model_copy(update={"log_sigma": min(sigma, _MOST)})
 
 
+def known_at_once(effect: Effect) -> bool:
+    """Return whether a proposal is as good as a fit until base numbers are fitted beside it.
+
+    Of a dark current with a spread levels and pixels say all. Numbers fitted without it have a
+    black level and variances between those of darks: beside them another mean may be likelier,
+    from which, far from what levels say once they are fitted anew, no step leads back.
+    """
+    return isinstance(effect, DarkCurrent) and effect.log_sigma > 0
+
+
 def spread_of_users(state: State, users: Camera, *, again: bool) -> tuple[int, Spread] | None:
     """Return how far apart the dark currents are that a user's camera has alike, and its place.
 

@@ -8,7 +8,7 @@ from math import log
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.mismatch.apart import as_far_apart
+from analysis.mismatch.apart import as_far_apart, known_at_once
 from analysis.mismatch.candidates import CANDIDATES, Proposal
 from analysis.mismatch.credited import joined, together
 from analysis.mismatch.instance import (
@@ -167,7 +167,7 @@ def _unsure(state: State, fitted: Sequence[Ranked]) -> bool:
 def _fitted(state: State, proposal: Proposal) -> Polished | None:
     """Return an effect fitted beside the camera's; None: it is no camera."""
     own = state.predictor(replicates_for(state.setting, [proposal.effect]))
-    rounds = 1 + len(proposal.free)
+    rounds = 0 if known_at_once(proposal.effect) else 1 + len(proposal.free)
     if state.setting.large:  # of a large recording steps are long and sure
         rounds = min(rounds, _ROUNDS)
     fitted = polish(own, *together(state.camera, proposal, state.setting.given), rounds=rounds)

@@ -1,13 +1,14 @@
 """Pixels that jump between two levels, told by their own frames from pixels noisy otherwise.
 
-Some pixels are random telegraphs, whose jumps are exponentially distributed over the pixels. All
+Some pixels are random telegraphs, whose jumps are exponentially distributed over the pixels, or all
+of one height. All
 others have one of the laws that noise of single pixels may have besides: alike, of variances that
 spread, that grow with time, or with noisier frames now and then. What telegraphs gain is counted
 from the best of these laws, and beside the best of them.
 """
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import reduce
 from math import exp, inf, isfinite, log, sqrt
 
@@ -22,6 +23,7 @@ from analysis.mismatch.projections import FramesOf
 from dsis.recording.ahead import in_order
 
 Array = NDArray[np.float64]
+_TOLD_APART = 3.0  # of log-likelihood: odds of 20
 _LEAST_FRAMES = 3  # of which a median pixel tells the noise
 _COARSE = 1.0  # step between codes, in standard deviations, from which on codes jump by themselves
 _MOST_LINES = 160
@@ -60,6 +62,8 @@ class Telegraph:
     jumping
         The same of jumps, few or many, but not of most pixels. Rivals are also pixels as noisy that
         do not jump, and most pixels, whose noise another cause may make alike in time.
+    equal
+        Whether all jumps are of one height.
     """
 
     share: float
@@ -71,6 +75,7 @@ class Telegraph:
     gain: float
     spread: float
     jumping: float
+    equal: bool = False
 
     @property
     def known(self) -> bool:
@@ -84,7 +89,7 @@ class Telegraph:
             "pixel_fraction": self.share,
             "amplitude_dn": self.amplitude_dn,
             "switch_probability": self.switching,
-        }
+        } | ({"heights": "equal"} if self.equal else {})
 
     @property
     def errors(self) -> Mapping[str, float]:
@@ -291,8 +296,18 @@ def _fitted(jumps: Array, others: _Others, weight: Array, heights: Array) -> Tel
         max(own for there, own in spreading if there == kind) for kind in (True, False)
     )
     # A mixture of laws takes some of the jumps; so sizes are those beside the best single law.
-    sizes = max(found[:-1], key=np.max)
-    return _told(sizes, amplitudes, (gain, spread - other, max(many) - max(rivals)))
+    single = max(range(len(found) - 1), key=lambda i: float(np.max(found[i])))
+    sizes, gains = found[single], (gain, spread - other, max(many) - max(rivals))
+    beside = [own for own, _ in others.laws(top, weight)][single]
+    equal = np.array(
+        [[_of_shares(_of_height(jumping[:, :, w], heights, a), beside, weight, _PARTS)
+          for a in amplitudes] for w in range(_SWITCHING.size)]
+    )  # fmt: skip
+    more = _mean(equal) - _mean(sizes)
+    if more > _TOLD_APART:
+        told = _told(equal, amplitudes, (gain + more, gains[1], gains[2]))
+        return None if told is None else replace(told, equal=True)
+    return _told(sizes, amplitudes, gains)
 
 
 def _mean(likely: Array) -> float:
@@ -312,7 +327,7 @@ def _told(likely: Array, amplitudes: Array, gains: tuple[float, float, float]) -
     All three are as likely beforehand in their logarithms, and so are means; errors are the root
     mean squares about them. `gains` are `gain`, `spread` and `jumping`.
     """
-    gain, *others = gains
+    gain, spread, jumping = gains
     if not isfinite(gain):
         return None
     chance = np.exp(likely - logsumexp(likely))
@@ -326,7 +341,8 @@ def _told(likely: Array, amplitudes: Array, gains: tuple[float, float, float]) -
         step = mean * float(np.diff(np.log(places)).mean())
         found.append((mean, sqrt(float(own @ (places - mean) ** 2) + step**2 / 12)))
     (switching, a), (amplitude, b), (share, c) = found
-    return Telegraph(share, c, amplitude, b, switching, a, -inf if many else gain, *others)
+    gain = -inf if many else gain
+    return Telegraph(share, c, amplitude, b, switching, a, gain, spread, jumping)
 
 
 def _of_heights(jumping: Array, heights: Array, amplitude: float) -> Array:
@@ -336,6 +352,14 @@ def _of_heights(jumping: Array, heights: Array, amplitude: float) -> Array:
     """
     edges = np.concatenate([[0.0], np.sqrt(heights[1:] * heights[:-1]), [np.inf]])
     return np.asarray(jumping @ -np.diff(np.exp(-edges / amplitude)))
+
+
+def _of_height(jumping: Array, heights: Array, amplitude: float) -> Array:
+    """Return the likelihood of jumps of one height, by its neighbours' logarithms: (pixel,)."""
+    at = float(np.interp(log(amplitude), np.log(heights), np.arange(heights.size)))
+    low = min(int(at), heights.size - 2)
+    ends = np.log(np.maximum(jumping[:, low : low + 2], 1e-300))
+    return np.asarray(np.exp(ends @ np.array([low + 1 - at, at - low])))
 
 
 def _shares(classes: Array, weight: Array) -> Array:

@@ -11,6 +11,7 @@ from scipy.special import ndtr, ndtri
 from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, Stage
 
 _ABOUT: Literal["about"] = "about"
+_DRAWN: Literal["exponential"] = "exponential"
 
 
 class Rts(Effect):
@@ -20,7 +21,8 @@ class Rts(Effect):
     chain of 0 and 1 that switches with probability w per frame: variance a^2 / 4, correlation
     (1 - 2 w)^k over k frames. So where the `levels` lie about the signal. Else a pixel whose trap
     is empty is as any other, and jumps are all `above` it, S + a b, or `either`, above or below,
-    as it is drawn for each pixel: then these pixels stand out of fixed patterns by a / 2.
+    as it is drawn for each pixel: then these pixels stand out of fixed patterns by a / 2. Where
+    `heights` are `equal`, a is the amplitude in each of these pixels.
     """
 
     kind: Literal["rts"] = "rts"
@@ -28,6 +30,8 @@ class Rts(Effect):
     amplitude_dn: Annotated[float, Field(ge=0, examples=[8.0])]
     switch_probability: Annotated[float, Field(gt=0, le=0.5)] = 0.2
     levels: Annotated[Literal["about", "above", "either"], Field(exclude_if=_ABOUT.__eq__)] = _ABOUT
+
+    heights: Annotated[Literal["exponential", "equal"], Field(exclude_if=_DRAWN.__eq__)] = _DRAWN
 
     stage: ClassVar[Stage] = Stage.READ_OUT
     reference: ClassVar[str] = (
@@ -63,10 +67,11 @@ class Rts(Effect):
             return image
         deviates = exposure.sensor.fixed("rts", exposure.grid, threads=exposure.threads)
         places = np.nonzero(deviates < ndtri(self.pixel_fraction))
-        # Below the threshold the normal law's tail is uniform: it gives the height as well.
-        tail = ndtr(deviates[places].astype(np.float64)) / self.pixel_fraction
         filled = self._filled(places, exposure)
-        height = -self.amplitude_dn * np.log(tail)
+        height = np.full(filled.size, self.amplitude_dn)
+        if self.heights == _DRAWN:
+            # Below the threshold the normal law's tail is uniform: it gives the height as well.
+            height *= -np.log(ndtr(deviates[places].astype(np.float64)) / self.pixel_fraction)
         if self.levels == "either":
             signs = exposure.sensor.fixed("rts signs", exposure.grid, threads=exposure.threads)
             height *= np.where(signs[places] < 0, -1, 1)
@@ -95,12 +100,13 @@ class Rts(Effect):
         return filled
 
     def contributions(self, point: OperatingPoint) -> Mapping[str, float]:
-        """Return q a^2 / 2; what correlated frames have in common goes to the fixed pattern.
+        """Return q a^2 / 2, or half of it; what correlated frames share goes to the fixed pattern.
 
-        As much goes there of levels that do not lie about the signal, less the square of their mean
-        where all lie above.
+        Half of it where heights are equal. As much goes to that pattern of levels that do not lie
+        about the signal, less the square of their mean where all lie above.
         """
-        variance = self.pixel_fraction * self.amplitude_dn**2 / 2
+        mean_square = self.amplitude_dn**2 * (2 if self.heights == _DRAWN else 1)
+        variance = self.pixel_fraction * mean_square / 4
         rho, frames = 1 - 2 * self.switch_probability, point.frames
         k = np.arange(1, frames)
         pairs = 2 * float(((frames - k) * rho**k).sum()) / (frames * (frames - 1))

@@ -42,7 +42,7 @@ def test_hot_pixels_whose_heights_are_lognormal_are_hot_pixels() -> None:
 
 
 def test_dark_current_that_differs_from_pixel_to_pixel_is_no_few_hot_pixels() -> None:
-    """Lognormal over all pixels, within a factor of e^0.5: its mean is named, its spread left."""
+    """Lognormal over all pixels, within a factor of e^0.5: its mean is named, and its spread."""
     rng, recording = np.random.default_rng(5), recorded(camera(), 5, levels=FEW_LEVELS)
     spread = np.exp(0.5 * rng.standard_normal((recording.rows, recording.columns)))
     rate = 200.0 * spread / spread.mean()
@@ -52,7 +52,10 @@ def test_dark_current_that_differs_from_pixel_to_pixel_is_no_few_hot_pixels() ->
     mean = named.parameters["dn_per_s"]
     assert isinstance(mean.value, float)
     assert abs(mean.value - 200.0) < 3.5 * mean.standard_error
-    assert "fixed_pixel_variance" in {left.statistic for left in found.unexplained}
+    apart = named.parameters["log_sigma"]
+    assert isinstance(apart.value, float)
+    assert abs(apart.value - 0.5) < 3.5 * apart.standard_error
+    assert not found.unexplained
 
 
 def test_a_kink_is_seen_beside_one_flat_below_it() -> None:

@@ -8,6 +8,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.stats import binom, exponnorm, norm
 
+from analysis.currentlaw import Binned, Body
 from analysis.mismatch.bank.key import Key
 from analysis.mismatch.bank.parts import STANDING_OUT, rooted
 from analysis.mismatch.bank.together import TOGETHER
@@ -40,7 +41,8 @@ def test_the_density_is_that_of_a_normal_variate_and_an_exponential_one(
     share: float, mean: float
 ) -> None:
     values = np.linspace(-4, 12, 33)
-    pixels = (_Pixels(values[i : i + 1], np.ones(1), NOISE_DN) for i in range(values.size))
+    each = (Binned(values[i : i + 1], np.ones(1)) for i in range(values.size))
+    pixels = (_Pixels(one, NOISE_DN, Body()) for one in each)
     width = 1.1
     ones = [np.array([one]) for one in (share, mean * NOISE_DN, width)]
     found = np.array([own.loglik(*ones).item() for own in pixels])
@@ -123,6 +125,7 @@ def _clues(
     return SimpleNamespace(
         image=lambda own: images.get(own, {}),
         scale=lambda _name, _channel: 0.5,
+        camera=SimpleNamespace(effect=()),
         fit=SimpleNamespace(line_dn2=lambda signal: variance + 0.1 * signal),
         vector=SimpleNamespace(keys=KEYS),
         null=SimpleNamespace(mean=np.full(len(KEYS), rooted(far_out))),

@@ -27,12 +27,14 @@ _FAR = 10.0
 _NODES, _END = 400, 6.0  # of the grid of k
 _SIGMAS = np.geomspace(0.03, 3.0, 16)
 _LEFT = np.array([0.95, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3])  # of the mean, beside hot ones
+_TOLD = 3.0  # of log-likelihood: odds of 20
 _ALMOST = 0.999
 _CHANCES = (-2.0, -1.0, 0.0, 1.0, 2.0)  # standard deviations of a mean
 _SPANS, _FINE = ((1.36, 0.1), (1.12, 0.03), (1.04, 0.01)), 7  # of finer grids, and their points
 _STRAY = np.array([0.0, 1e-4, 1e-3, 1e-2])  # shares of pixels of no such law
 _HOT = np.geomspace(1e-4, 0.1, 13)  # and of hot ones: they are few
 _MANY, _NUMBERS = 20.0, 5  # pixels of a bin by which a law is judged; numbers of the law
+_PARTS = (np.arange(5) + 0.5) / 5  # of a bin, where a law is asked
 _FARTHEST = 0.5  # of a logarithm, to either side of the likeliest
 _LEAST = 1e-300
 _WIDER = np.linspace(1.0, 1.1, 6)  # noise that is known to a tenth
@@ -350,7 +352,7 @@ def _likeliest(pixels: Sequence[_Pixels], known: float, sigmas: Array) -> _Fit:
 
 
 def _beside_hot(pixels: Sequence[_Pixels], sigmas: Array, lefts: Array) -> _Fit:
-    """Return the likeliest law where hot pixels have a part of the mean.
+    """Return the likeliest law where hot pixels have a part of the mean, at odds of 20.
 
     Both at once: a tail of the law is no hot pixels, whose mean another spread would have.
     """
@@ -358,7 +360,8 @@ def _beside_hot(pixels: Sequence[_Pixels], sigmas: Array, lefts: Array) -> _Fit:
     for left in lefts.tolist():
         law = [own.beside_hot(left) for own in pixels]
         fits += [replace(_loglik(law, sigma), left=left) for sigma in sigmas.tolist()]
-    return max(fits, key=lambda fit: fit.nats)
+    best = max(fits, key=lambda fit: fit.nats)
+    return replace(best, nats=best.nats - _TOLD)
 
 
 def _equal(pixels: Sequence[_Pixels], lefts: Array) -> float:
@@ -370,13 +373,14 @@ def _equal(pixels: Sequence[_Pixels], lefts: Array) -> float:
 def _misfit(pixels: Sequence[_Pixels], fit: _Fit) -> float:
     """Return the factor by which pixels scatter about their law more than chance does (Birge)."""
     chi2, bins = 0.0, 0
-    grid = np.asarray(BIN * np.arange(-round(_FAR / BIN), round(_FAR / BIN) + 1), np.float64)
     for own in pixels:
-        near = np.abs(own.seen.values) < _FAR + BIN / 2
-        places = np.rint((own.seen.values[near] + grid[-1]) / BIN).astype(np.intp)
-        seen = np.bincount(places, own.seen.counts[near], grid.size)
-        law = own.mixed(grid, fit)
-        expected = law * BIN * own.seen.counts.sum()
+        edges = _edges(own.seen.values)
+        near = (own.seen.values > edges[0]) & (own.seen.values < edges[-1])
+        places = np.searchsorted(edges, own.seen.values[near]) - 1
+        seen = np.bincount(places, own.seen.counts[near], edges.size - 1)
+        between = (edges[:-1, np.newaxis] + np.diff(edges)[:, np.newaxis] * _PARTS).ravel()
+        law = own.mixed(between, fit).reshape(-1, _PARTS.size).mean(1)
+        expected = law * np.diff(edges) * own.seen.counts.sum()
         groups = np.floor(np.cumsum(expected) / _MANY)
         starts = np.flatnonzero(np.diff(groups, prepend=-1.0) > 0)
         one, other = (np.add.reduceat(values, starts) for values in (seen, expected))
@@ -384,6 +388,17 @@ def _misfit(pixels: Sequence[_Pixels], fit: _Fit) -> float:
         chi2 += float(((one - other)[full] ** 2 / other[full]).sum())
         bins += int(full.sum())
     return sqrt(chi2 / (bins - _NUMBERS)) if bins > 2 * _NUMBERS else 1.0
+
+
+def _edges(values: Array) -> Array:
+    """Return the edges of bins into which values were rounded, see `Binned`, up to the farthest."""
+    steps = round(_FAR / BIN)
+    linear = BIN * (np.arange(-steps, steps) + 0.5)
+    farthest = np.log(np.maximum(np.abs([values.min(), values.max()]), _FAR) / _FAR) / BIN
+    low, high = (
+        _FAR * np.exp(BIN * (np.arange(round(count) + 1) + 0.5)) for count in farthest.tolist()
+    )
+    return np.concatenate([-low[::-1], linear, high])
 
 
 def _error(pixels: Sequence[_Pixels], sigma: float) -> float:

@@ -15,9 +15,11 @@ from dsis.cfa import Cfa
 from dsis.draw import Draw
 from dsis.effects.dark_current import DarkCurrent
 from dsis.effects.effect import Exposure, ReadOut
+from dsis.errors import InputError
 from dsis.grid import PixelGrid
 from dsis.noise import Segments
 from dsis.recording import read_recording
+from dsis.simulate.maps import SensorMaps, read_maps, with_maps, write_maps
 
 ROWS, COLUMNS = 96, 128
 NOTHING = np.zeros((ROWS, COLUMNS), bool)
@@ -91,10 +93,15 @@ def test_lines_and_glows_are_no_spread() -> None:
     assert found.log_sigma == pytest.approx(0.4, abs=0.03)
 
 
-def test_hot_pixels_alone_are_no_spread_and_beside_one_leave_it() -> None:
-    """An exponential few: of all pixels' law nothing is said, or what it is without them."""
+@pytest.mark.parametrize(("share", "mean"), [(0.01, 60), (0.005, 500), (0.002, 1000)])
+def test_hot_pixels_alone_are_no_spread_and_beside_one_leave_it(share: float, mean: float) -> None:
+    """An exponential few: of all pixels' law nothing is said, or what it is without them.
+
+    Though they have up to a quarter of the mean of all.
+    """
     law = np.random.default_rng(7)
-    hot = np.where(law.random((ROWS, COLUMNS)) < 0.01, law.exponential(60, (ROWS, COLUMNS)), 0)
+    few = law.random((ROWS, COLUMNS)) < share
+    hot = np.where(few, law.exponential(mean, (ROWS, COLUMNS)), 0)
     noise = law.standard_normal((ROWS, COLUMNS))
     found = current_spread([(5 + hot + noise, 1.0, NOTHING)], 5 + float(hot.mean()))
     assert found is None or found.gain < 3
@@ -104,6 +111,21 @@ def test_hot_pixels_alone_are_no_spread_and_beside_one_leave_it() -> None:
     # About the mean of all: the others' spread is as many DN.
     expected = of_all(0.5, 8.0 / float(image.mean()))
     assert found.log_sigma == pytest.approx(expected, abs=4 * found.error)
+
+
+def test_errors_know_that_the_law_is_another() -> None:
+    """Normal currents, 30 % of the mean apart: an error three times as large, and nearly that."""
+    law = np.random.default_rng(9)
+    image = 40 * (1 + 0.3 * law.standard_normal((ROWS, COLUMNS)))
+    own = currents(40.0, 0.294, 9)
+    noise = law.standard_normal((ROWS, COLUMNS))
+    found = [
+        current_spread([(one + noise, 1.0, NOTHING)], float(one.mean())) for one in (image, own)
+    ]
+    assert found[0] is not None
+    assert found[1] is not None
+    assert found[0].error > 2 * found[1].error
+    assert found[0].log_sigma == pytest.approx(0.294, rel=0.2)
 
 
 def test_no_map_says_nothing() -> None:
@@ -171,6 +193,44 @@ def test_camera_fit_tells_offsets_and_gains_from_dark_currents(
     assert found["dsnu"].value == pytest.approx(0.6, abs=0.04)
     assert found["prnu"].value == pytest.approx(0.6, abs=0.03)
     assert ("log_sigma" in current.beside) == bool(sigma)
+
+
+def test_the_same_sensor_has_its_own_dark_currents(tmp_path: Path) -> None:
+    """Maps beside the camera hold them: simulated again, long darks are as they were recorded."""
+    recording = read_recording(recorded(tmp_path, 0.7))
+    fit = fit_camera(recording)
+    assert fit.maps is not None
+    current = fit.maps.dark_current_dn_per_s
+    assert current is not None
+    assert np.corrcoef(current.ravel(), currents(40.0, 0.7, 12).ravel())[0, 1] > 0.98
+    (tmp_path / "fit").mkdir()
+    file = tmp_path / "fit" / "camera.toml"
+    write_maps(fit.maps, file)
+    again = read_maps(file)
+    assert again.dark_current_dn_per_s is not None
+    np.testing.assert_array_equal(again.dark_current_dn_per_s, current)
+    grid = PixelGrid(ROWS, COLUMNS, Cfa.MONO)
+    same = with_maps(fit.camera, again, grid)
+    assert "dark_current" not in {effect.kind for effect in same.effect}
+    dark = np.zeros((ROWS, COLUMNS), np.float32)
+    frames = [same.expose(dark, Draw(1), Draw(2), t, grid, exposure_time_s=0.4) for t in range(6)]
+    exposure = next(e for e in recording.exposures if e.name == "dark-2")
+    seen = np.mean([recording.frame(exposure, t) for t in range(6)], 0)
+    assert np.corrcoef(np.mean(frames, 0).ravel(), seen.ravel())[0, 1] > 0.97
+    assert np.mean(frames) == pytest.approx(seen.mean() - fit.black_dn, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("array", "says"),
+    [(np.full((2, 3), -1.0), "holds a current < 0"), (np.ones((3, 3)), "must be \\(2, 3\\)")],
+)
+def test_a_map_that_is_no_dark_current_is_refused(
+    tmp_path: Path, array: np.ndarray, says: str
+) -> None:
+    ones = np.ones((2, 3), np.float32)
+    write_maps(SensorMaps(ones, ones, 0.0, 0.0, array), tmp_path / "camera.toml")
+    with pytest.raises(InputError, match=says):
+        read_maps(tmp_path / "camera.toml")
 
 
 def test_a_camera_file_holds_the_spread(tmp_path: Path) -> None:

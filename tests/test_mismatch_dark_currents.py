@@ -91,15 +91,23 @@ def test_equal_dark_currents_have_no_spread() -> None:
     assert "hot_pixels" in found
 
 
-def test_a_users_equal_dark_current_is_a_wrong_number() -> None:
-    """Nothing is omitted but counted photons: the model has the current, alike in all pixels."""
-    model = camera(DarkCurrent(dn_per_s=MEAN))
+@pytest.mark.parametrize("users", [0.0, 0.3])
+def test_a_users_other_spread_is_a_wrong_number(users: float) -> None:
+    """Nothing is omitted but counted photons: the model has the current, otherwise apart."""
+    model = camera(DarkCurrent(dn_per_s=MEAN, log_sigma=users))
     found = find_mismatch(model, recording(SIGMA, 0.0), vocabulary=WORDS)
     assert {one.effect for one in found.omitted_physics} <= {"poisson_shot_noise"}
     (wrong,) = [e for e in found.parameter_errors if e.parameter.endswith("dark_current.log_sigma")]
-    assert wrong.model == 0
+    assert wrong.model == users
     assert abs(wrong.recorded - SIGMA) < 4 * wrong.standard_error
     assert {m.statistic for m in found.unexplained} <= {"skewness"}  # of counted photons
+
+
+def test_dark_currents_far_apart_have_a_median_far_below_their_mean() -> None:
+    """Most pixels grow by a quarter of the mean, and that is as the law has it."""
+    found = numbers(find_mismatch(camera(), recording(1.6, 0.0), vocabulary=WORDS))
+    value, error = found["dark_current"]["log_sigma"]
+    assert abs(value - 1.6) < 4 * error + 0.05 * 1.6
 
 
 def test_another_mean_leaves_pixels_as_far_apart() -> None:

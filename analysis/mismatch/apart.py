@@ -1,6 +1,8 @@
 """How far apart dark currents are: by their standard deviation, which pixels show."""
 
-from analysis.currentlaw import Spread, of_all
+from dataclasses import dataclass
+
+from analysis.currentlaw import of_all
 from analysis.mismatch.candidates.currents import current_spread_of, dark_rate
 from analysis.mismatch.finding import ParameterError
 from analysis.mismatch.state import State
@@ -9,6 +11,7 @@ from dsis.effects import Effect
 from dsis.effects.dark_current import DarkCurrent
 
 _MOST = 3.0  # that the effect allows
+_CLEAR = 3.0  # standard errors between two sizes that no chance sets apart
 _CALLS = frozenset({"fixed_pixel_variance", "outlying_pixels"})
 
 
@@ -32,32 +35,56 @@ def known_at_once(effect: Effect) -> bool:
     return isinstance(effect, DarkCurrent) and effect.log_sigma > 0
 
 
-def spread_of_users(state: State, users: Camera, *, again: bool) -> tuple[int, Spread] | None:
-    """Return how far apart the dark currents are that a user's camera has alike, and its place.
+@dataclass(frozen=True)
+class Apart:
+    """How far apart dark currents of a user's camera are.
 
-    None: it has none, or has them apart itself, or nothing that grows with time calls for it.
-    `again`: what was measured before is measured once more.
+    Attributes
+    ----------
+    place
+        Which of the camera's effects they are.
+    model, recorded, error
+        Standard deviation of their logarithm: the user's, and as recorded, with its error.
+    """
+
+    place: int
+    model: float
+    recorded: float
+    error: float
+
+
+def apart_of_users(state: State, users: Camera, before: Apart | None) -> Apart | None:
+    """Return how far apart the dark currents of a user's camera are; None: as the user says.
+
+    Or it has none, or nothing that grows with time calls for it. What was measured `before` is
+    measured once more.
     """
     own = [(i, e) for i, e in enumerate(users.effect) if isinstance(e, DarkCurrent)]
     called = {m.statistic for m in state.mismatches} & _CALLS
-    if len(own) != 1 or not called or (own[0][1].log_sigma and not again):
+    if len(own) != 1 or not called or not own[0][1].dn_per_s:
         return None
-    clues = state.clues()
+    (place, effect), clues = own[0], state.clues()
     rate = dark_rate(clues)
     spread = None if rate is None else current_spread_of(clues, rate)
-    return None if spread is None else (own[0][0], spread)
+    if rate is None or spread is None:
+        return None
+    sigma = min(of_all(spread.log_sigma, rate / effect.dn_per_s), _MOST)
+    error = sigma * spread.error / spread.log_sigma
+    model = effect.log_sigma if before is None else before.model
+    return Apart(place, model, sigma, error) if abs(sigma - model) > _CLEAR * error else None
 
 
-def with_spread(camera: Camera, place: int, sigma: float) -> Camera:
-    """Return a camera one of whose dark currents is so far apart."""
+def with_apart(camera: Camera, apart: Apart) -> Camera:
+    """Return a camera whose dark currents are as far apart as was recorded."""
     effects = list(camera.effect)
-    effects[place] = effects[place].model_copy(update={"log_sigma": sigma})
+    own = effects[apart.place]
+    effects[apart.place] = own.model_copy(update={"log_sigma": apart.recorded})
     return camera.model_copy(update={"effect": tuple(effects)})
 
 
-def wrong_spreads(spread: Spread | None) -> tuple[ParameterError, ...]:
-    """Return that dark currents differ which a user's camera has alike."""
-    if spread is None:
+def wrong_spread(apart: Apart | None) -> tuple[ParameterError, ...]:
+    """Return that dark currents are otherwise apart than a user's camera has them."""
+    if apart is None:
         return ()
     name = "effect.dark_current.log_sigma"
-    return (ParameterError(name, 0.0, spread.log_sigma, spread.error),)
+    return (ParameterError(name, apart.model, apart.recorded, apart.error),)

@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.mismatch.apart import wrong_spreads
+from analysis.mismatch.apart import wrong_spread
 from analysis.mismatch.candidates import CANDIDATES
 from analysis.mismatch.confirmed import denied_by_rest, proven, undenied, undenied_by_all
 from analysis.mismatch.evidence import Evidence
@@ -283,7 +283,7 @@ def _finding(
 ) -> Finding:
     """Return the finding; `known` are changes by effect asked for before all was settled."""
     errors = parameter_errors(camera, final.calibrated, final.setting.layout, final.replicates.fits)
-    errors += wrong_sizes(search.own) + wrong_spreads(search.spread)
+    errors += wrong_sizes(search.own) + wrong_spread(search.unlike)
     missing = [named for named in search.named if named.name not in known]
     more = changes(base, final, missing, partial(search.without, final))
     own = {**known, **more}

@@ -3,8 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
-from analysis.currentlaw import Spread
-from analysis.mismatch.apart import as_far_apart, spread_of_users, with_spread
+from analysis.mismatch.apart import Apart, apart_of_users, as_far_apart, with_apart
 from analysis.mismatch.candidates import CANDIDATES, Proposal
 from analysis.mismatch.candidates.patterns import of_any_shape
 from analysis.mismatch.credited import given_back
@@ -77,7 +76,7 @@ class Fitted:
     beside_path: dict[tuple[str, ...], bool] = field(default_factory=dict)
     whole: Setting | None = None
     of_whole: State | None = None
-    spread: Spread | None = None  # of dark currents that the user's camera has alike
+    unlike: Apart | None = None  # dark currents of the user's camera, otherwise than it has them
     left: State | None = None  # by the user's effects of other sizes, as all frames say
 
     def lit(self, state: State) -> State:
@@ -106,12 +105,12 @@ class Fitted:
 
     def _apart(self, state: State) -> State:
         """Return the state with the user's dark currents as far apart as pixels show."""
-        found = spread_of_users(state, self.camera, again=self.spread is not None)
+        found = apart_of_users(state, self.camera, self.unlike)
         if found is None:
             return state
-        place, self.spread = found
-        self.camera = with_spread(self.camera, place, self.spread.log_sigma)
-        camera = with_spread(state.camera, place, self.spread.log_sigma)
+        self.unlike = found
+        self.camera = with_apart(self.camera, found)
+        camera = with_apart(state.camera, found)
         return State.of(self.setting, camera, self.step, draft=True, near=state)
 
     def settle(self, state: State) -> State:
@@ -348,7 +347,7 @@ class Fitted:
 
         `whole` is what is asked whether anything differs: no physics is credited with better sizes.
         """
-        if not self.own and self.spread is None:
+        if not self.own and self.unlike is None:
             return whole
         whole = State.of(whole.setting, self.camera, self.step, near=whole)
         large = self.base.setting.large

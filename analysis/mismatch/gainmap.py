@@ -75,7 +75,7 @@ def _some(layout: Layout) -> Sequence[Taken]:
 
 def _moves(effect: Effect) -> bool:
     """Return whether an effect may make something of even light that has an expected shape."""
-    return not effect.draws and effect.stage is not Stage.CODE
+    return not effect.drawn and effect.stage is not Stage.CODE
 
 
 def mean_frame(

@@ -83,7 +83,7 @@ class Setting:
 
         In a large recording, what draws nothing at random moves them alike on every sensor.
         """
-        return self.large and not effect.draws
+        return self.large and not effect.drawn
 
     def calibrated(self, camera: Camera, near: Calibrated | None = None) -> Calibrated:
         """Return the model with base numbers fitted to what was observed; see `calibrate`."""

@@ -130,5 +130,5 @@ def _changed(names: Iterable[str], effects: Sequence[Effect]) -> set[str]:
     may: set[str] = set()
     for effect in effects:
         own = {name for name in names if effect.changes & _FOLLOWS.get(name, frozenset({name}))}
-        may |= own - _SIDED if effect.draws else own
+        may |= own - _SIDED if effect.drawn else own
     return may

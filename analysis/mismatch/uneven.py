@@ -82,7 +82,8 @@ def _of_few(state: State, effect: DarkCurrent) -> Denial | None:
     """Return how a dark current is denied by pixels most of which do not grow; None: they do.
 
     Beside their mean, which levels tell, the median of all pixels' growth is that of the dark
-    current alone, whatever few of them add: the mean is, too, that of the hot ones. A glow, which
+    current alone, whatever few of them add: the mean is, too, that of the hot ones. Where dark
+    currents differ log-normally, the median is a share of the mean. A glow, which
     most pixels have some of, says nothing of it. Where pixels that stand out with exposure time are
     left unexplained, which may make all of the mean, most must grow for certain.
     """
@@ -101,8 +102,9 @@ def _of_few(state: State, effect: DarkCurrent) -> Denial | None:
         errors.append((np.pi / 2 / image.size) ** 0.5 * wide / unit)
     if not shares:
         return None
-    share = float(np.mean(shares))
-    error = float(np.sqrt(np.mean(np.square(errors)) / len(errors)))
+    median = float(np.exp(-(effect.log_sigma**2) / 2))
+    share = float(np.mean(shares)) / median
+    error = float(np.sqrt(np.mean(np.square(errors)) / len(errors))) / median
     sure = not warm_left(state) or share - _SURE * error > 0
     if sure and share + _SURE * error >= _LEAST_SHARE:
         return None

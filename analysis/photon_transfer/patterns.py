@@ -14,8 +14,10 @@ from analysis.photon_transfer.parts import LEAST_LINES, Noise, Pattern
 from analysis.photon_transfer.recorded import Recorded, channel_names
 from analysis.photon_transfer.statistics import LevelStatistics
 from analysis.photon_transfer.sums import Floats, Ints
+from dsis.effects import Image
 from dsis.simulate.maps import SensorMaps
 
+Sites = dict[str, tuple[slice, slice]]
 LEAST_FRAMES = 4  # darks and flats each, below which a map would be noise
 LEAST_GAIN = 1e-3  # maps hold gains above 0: a dead pixel's
 
@@ -127,6 +129,8 @@ class PatternSums:
             [(planes[name], gains[name]) for name in sites], list(sites.values()), dark.shape
         )
         maps, dead = _maps(sites, parts, gains, dark.shape)
+        if times is not None:
+            maps = replace(maps, dark_current_dn_per_s=self._current_map(times, sites))
         return FixedPatterns(parts, gains, fall, maps, dead)
 
     def currents(self, recording: Recorded, levels: Sequence[FittedLevel]) -> "dict[str, Growth]":
@@ -139,6 +143,16 @@ class PatternSums:
             name: Growth(slope[site], *darks.noise_of_slope(name))
             for name, site in _sites(recording).items()
         }
+
+    def _current_map(self, darks: "_Times", sites: Sites) -> Image:
+        """Return the best linear estimate of each pixel's dark current, DN/s, about its mean."""
+        found = self._slope(darks)
+        for name, site in sites.items():
+            own, (noise, _) = found[site], darks.noise_of_slope(name)
+            mean, variance = float(own.mean()), float(own.var())
+            kept = max(1 - noise**2 / variance, 0.0) if variance > 0 else 0.0
+            found[site] = np.maximum(mean + kept * (own - mean), 0.0)
+        return found.astype(np.float32)
 
     def _of_use(self, levels: Sequence[FittedLevel], kind: str) -> list[LevelStatistics]:
         own = (level.statistics for level in levels if level.statistics.kind == kind)
@@ -193,10 +207,10 @@ class _Times:
         """Return the darks; None where all have the same exposure time."""
         each = {s.exposure: s for s in darks}.values()
         frames = sum(s.frames for s in each)
-        if not frames or len({s.exposure_time_s for s in each}) < 2:
+        if not frames or len({_seconds(s) for s in each}) < 2:
             return None
-        mean = sum(s.frames * s.exposure_time_s for s in each) / frames
-        square = sum(s.frames * (s.exposure_time_s - mean) ** 2 for s in each)
+        mean = sum(s.frames * _seconds(s) for s in each) / frames
+        square = sum(s.frames * (_seconds(s) - mean) ** 2 for s in each)
         return cls(darks, frames, mean, square)
 
     def noise_at(self, time_s: float) -> dict[str, Noise]:
@@ -206,8 +220,7 @@ class _Times:
             own = [s for s in self.darks if s.channel == name]
             away = (time_s - self.mean_s) / self.square_s2
             weights = [
-                s.frames * (1 / self.frames + away * (s.exposure_time_s - self.mean_s)) ** 2
-                for s in own
+                s.frames * (1 / self.frames + away * (_seconds(s) - self.mean_s)) ** 2 for s in own
             ]
             row = sum(w * s.row_variance_dn2 for w, s in zip(weights, own, strict=True))
             column = sum(w * s.column_variance_dn2 for w, s in zip(weights, own, strict=True))
@@ -220,7 +233,7 @@ class _Times:
     def noise_of_slope(self, name: str) -> tuple[float, float]:
         """Return the noise of a pixel's slope, DN/s, and how much of its variance grows."""
         own = [s for s in self.darks if s.channel == name]
-        weights = np.array([s.frames * (s.exposure_time_s - self.mean_s) ** 2 for s in own])
+        weights = np.array([s.frames * (_seconds(s) - self.mean_s) ** 2 for s in own])
         pixel = np.array([s.variance_dn2 - s.row_variance_dn2 - s.column_variance_dn2 for s in own])
         total = float(weights @ np.maximum(pixel, 0.0))
         if total <= 0:
@@ -229,6 +242,11 @@ class _Times:
         rest = shortest.variance_dn2 - shortest.row_variance_dn2 - shortest.column_variance_dn2
         grown = float(weights @ np.maximum(pixel - rest, 0.0))
         return total**0.5 / self.square_s2, min(grown / total, 1.0)
+
+
+def _seconds(own: LevelStatistics) -> float:
+    """Return an exposure time as sums weigh it: in whole microseconds."""
+    return _microseconds(own) * 1e-6
 
 
 def _microseconds(exposure: Any) -> int:
@@ -262,7 +280,7 @@ class _Stack:
         return cls(frames, time_s, noise)
 
 
-def _sites(recording: Recorded) -> dict[str, tuple[slice, slice]]:
+def _sites(recording: Recorded) -> Sites:
     """Return where each channel lies in a frame."""
     names = channel_names(recording.sensor.cfa)
     if names[0][0] == names[1][1]:

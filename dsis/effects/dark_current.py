@@ -45,6 +45,11 @@ class DarkCurrent(Effect):
         """Level and variance, and the pixels' own where they differ."""
         return self.measures if self.log_sigma else self.measures - _OF_PIXELS
 
+    @property
+    def drawn(self) -> bool:
+        """Whether pixels differ."""
+        return bool(self.log_sigma)
+
     def apply(self, image: Image, exposure: Exposure) -> Image:
         """Add the dark charge."""
         charge = self.dn_per_s * exposure.exposure_time_s

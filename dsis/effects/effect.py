@@ -264,6 +264,11 @@ class Effect(Model, ABC):
         return self.measures
 
     @property
+    def drawn(self) -> bool:
+        """Whether this one draws anything at random: as `draws` says, of its form."""
+        return self.draws
+
+    @property
     def exchanges(self) -> bool:
         """Whether neighbouring sites exchange what they hold, as `exchanged` says."""
         return type(self).exchanged is not Effect.exchanged

@@ -30,6 +30,9 @@ REPLACED = frozenset(
     }
 )
 """Effects that draw a pattern which the maps hold as it was measured."""
+GROWN = frozenset({"dark_current", "hot_pixels", "amp_glow"})
+"""Those that a map of dark currents holds."""
+_CURRENT = "dark_current_dn_per_s"
 
 _DTYPE = np.dtype(np.float32)
 
@@ -49,12 +52,15 @@ class SensorMaps:
     dsnu_noise_dn, prnu_noise
         By how much the maps miss the sensor's pattern, standard deviation of a pixel; 0 where it is
         not known. Maps are best linear estimates, so the sensor has this much more variance.
+    dark_current_dn_per_s
+        Dark current of each pixel, DN/s; None where it is not known, or the same in all.
     """
 
     dsnu_dn: Image
     prnu_gain: Image
     dsnu_noise_dn: float = 0.0
     prnu_noise: float = 0.0
+    dark_current_dn_per_s: Image | None = None
 
 
 def read_maps(camera_file: Path) -> SensorMaps:
@@ -90,11 +96,18 @@ def read_maps(camera_file: Path) -> SensorMaps:
         for name, array in arrays.items()
         if array.ndim != 2 or array.dtype.kind not in "fiu" or not np.isfinite(array).all()
     ]
-    if not faults and arrays["dsnu_dn"].shape != arrays["prnu_gain"].shape:
-        sizes = f"{arrays['prnu_gain'].shape}, must be {arrays['dsnu_dn'].shape} like dsnu_dn"
-        faults.append(Fault(str(path), "prnu_gain", f"has shape {sizes}"))
+    if not faults:
+        wanted = arrays["dsnu_dn"].shape
+        faults += [
+            Fault(str(path), name, f"has shape {own.shape}, must be {wanted} like dsnu_dn")
+            for name in ("prnu_gain", _CURRENT)
+            if (own := arrays.get(name)) is not None and own.shape != wanted
+        ]
     if not faults and arrays["prnu_gain"].min() <= 0:
         faults.append(Fault(str(path), "prnu_gain", "holds a gain <= 0, must be greater than 0"))
+    current = arrays.get(_CURRENT)
+    if not faults and current is not None and current.min() < 0:
+        faults.append(Fault(str(path), _CURRENT, "holds a current < 0, must be 0 or more"))
     if faults:
         raise InputError(faults)
     return SensorMaps(
@@ -102,6 +115,7 @@ def read_maps(camera_file: Path) -> SensorMaps:
         arrays["prnu_gain"].astype(_DTYPE),
         float(noise["dsnu_noise_dn"]),
         float(noise["prnu_noise"]),
+        None if current is None else current.astype(_DTYPE),
     )
 
 
@@ -116,14 +130,16 @@ def owner_of(maps_file: Path) -> str | None:
 
 def write_maps(maps: SensorMaps, camera_file: Path) -> None:
     """Write the maps beside a `camera.toml`; `read_maps` returns equal ones."""
-    np.savez(
-        camera_file.parent / MAPS,
-        dsnu_dn=maps.dsnu_dn.astype(_DTYPE),
-        prnu_gain=maps.prnu_gain.astype(_DTYPE),
-        dsnu_noise_dn=np.float64(maps.dsnu_noise_dn),
-        prnu_noise=np.float64(maps.prnu_noise),
-        camera=np.str_(camera_file.name),
-    )
+    arrays: dict[str, Any] = {
+        "dsnu_dn": maps.dsnu_dn.astype(_DTYPE),
+        "prnu_gain": maps.prnu_gain.astype(_DTYPE),
+        "dsnu_noise_dn": np.float64(maps.dsnu_noise_dn),
+        "prnu_noise": np.float64(maps.prnu_noise),
+        "camera": np.str_(camera_file.name),
+    }
+    if maps.dark_current_dn_per_s is not None:
+        arrays[_CURRENT] = maps.dark_current_dn_per_s.astype(_DTYPE)
+    np.savez(camera_file.parent / MAPS, **arrays)
 
 
 class OffsetMap(Effect):
@@ -139,6 +155,25 @@ class OffsetMap(Effect):
     def apply(self, image: Image, exposure: Exposure) -> Image:
         """Add the offsets of the pixels."""
         part: Image = image + _part(self.offsets_dn, exposure.grid)
+        return part
+
+
+class CurrentMap(Effect):
+    """The measured dark current of every pixel: no effect of the vocabulary."""
+
+    model_config = ConfigDict(arbitrary_types_allowed=True)
+    kind: str = "current_map"
+    dn_per_s: Any
+    stage: ClassVar[Stage] = Stage.LIGHT
+    rank: ClassVar[int] = 50  # after what acts on light alone
+    reference: ClassVar[str] = "EMVA Standard 1288, release 3.1, section 7"
+    measures: ClassVar[frozenset[str]] = frozenset({"level"})
+    grows_with_time: ClassVar[bool] = True
+
+    def apply(self, image: Image, exposure: Exposure) -> Image:
+        """Add what the pixels collect in the exposure time."""
+        time = np.float32(exposure.exposure_time_s)
+        part: Image = image + _part(self.dn_per_s, exposure.grid) * time
         return part
 
 
@@ -166,7 +201,9 @@ def with_maps(camera: Camera, maps: SensorMaps, grid: PixelGrid) -> Camera:
     if maps.dsnu_dn.shape != grid.shape:
         found, wanted = (" x ".join(map(str, s)) for s in (maps.dsnu_dn.shape, grid.shape))
         raise InputError.of(MAPS, "", f"is of {found} pixels, must be of {wanted} (rows x columns)")
-    kept = tuple(effect for effect in camera.effect if effect.kind not in REPLACED)
+    current = maps.dark_current_dn_per_s
+    held = REPLACED if current is None else REPLACED | GROWN
+    kept = tuple(effect for effect in camera.effect if effect.kind not in held)
     offset, gain = np.float32(0), np.float32(1)
     for effect in camera.effect:
         if isinstance(effect, LineSettling):  # a map has no mean of its own
@@ -176,6 +213,8 @@ def with_maps(camera: Camera, maps: SensorMaps, grid: PixelGrid) -> Camera:
         GainMap(gains=maps.prnu_gain * gain),
         OffsetMap(offsets_dn=maps.dsnu_dn + offset),
     ]
+    if current is not None:
+        links.append(CurrentMap(dn_per_s=current))
     if maps.prnu_noise:
         links.append(registry()["prnu"].model_validate({"sigma_percent": 100 * maps.prnu_noise}))
     if maps.dsnu_noise_dn:

@@ -19,6 +19,7 @@ from scipy.special import log_ndtr, ndtr
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+CLEAR_GAIN = 4.5  # of log-likelihood: three standard errors
 _AROUND = 15  # pixels: what is smooth is a glow, or light
 _LINES = 4.0  # standard deviations of the variance of means of lines, and around pixels
 _CLIPPED = 5.0  # robust standard deviations, beyond which a pixel is none of the many around

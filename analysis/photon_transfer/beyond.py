@@ -6,14 +6,13 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from pydantic import ValidationError
 
-from analysis.currentlaw import current_spread
+from analysis.currentlaw import CLEAR_GAIN, current_spread
 from analysis.photon_transfer.black import DarkLine
 from analysis.photon_transfer.parts import P_SEEN, Component
 from analysis.photon_transfer.patterns import FixedPatterns, Growth
 from dsis.effects import Effect, registry
 from dsis.errors import InputError
 
-LEAST_GAIN = 4.5  # of log-likelihood: three standard errors
 LEAST_Z = 3.0  # standard errors from which a growth is taken for real
 
 
@@ -111,7 +110,7 @@ def with_spread(current: FittedEffect | None, growth: Mapping[str, Growth]) -> F
     ]
     shot = float(np.mean([own.shot for own in growth.values()]))
     spread = current_spread(maps, current.value, current.standard_error, shot)
-    if spread is None or spread.gain < LEAST_GAIN:
+    if spread is None or spread.gain < CLEAR_GAIN:
         return current
     # This one sensor's mean is that of its pixels.
     relative = np.expm1(spread.log_sigma**2) / sum(own.dn_per_s.size for own in growth.values())

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import median_abs_deviation
 
-from analysis.currentlaw import Body, Spread, current_spread
+from analysis.currentlaw import CLEAR_GAIN, Body, Spread, current_spread
 from analysis.mismatch.candidates.candidate import Candidate, Proposal, measured, proposals
 from analysis.mismatch.clues import Clues
 from analysis.mismatch.counted import Counted
@@ -18,7 +18,6 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 _NUMBERS = ("pixel_fraction", "mean_dn_per_s")
 _RATE, _SPREAD = "dn_per_s", "log_sigma"
-_TOLD = 3.0  # of log-likelihood: odds of 20
 _CLEAR = 5.0  # standard deviations of a pixel's summed variance
 _FEW = 0.1  # of all pixels
 _SEEN = 2  # frames, of which there are variances
@@ -69,7 +68,7 @@ def current_spread_of(clues: Clues, rate: float) -> Spread | None:
         for name, (image, noise) in images.items()
     ]
     spread = current_spread(maps, rate * scale, shot=_shot(clues, rate))
-    return spread if spread is not None and spread.gain > _TOLD else None
+    return spread if spread is not None and spread.gain > CLEAR_GAIN else None
 
 
 def _normal(clues: Clues) -> bool:

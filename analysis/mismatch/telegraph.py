@@ -24,6 +24,7 @@ from dsis.recording.ahead import in_order
 
 Array = NDArray[np.float64]
 _TOLD_APART = 3.0  # of log-likelihood: odds of 20
+_APART = 3.0  # standard deviations of noise between levels that frames show one by one
 _LEAST_FRAMES = 3  # of which a median pixel tells the noise
 _COARSE = 1.0  # step between codes, in standard deviations, from which on codes jump by themselves
 _MOST_LINES = 160
@@ -306,7 +307,8 @@ def _fitted(jumps: Array, others: _Others, weight: Array, heights: Array) -> Tel
     more = _mean(equal) - _mean(sizes)
     if more > _TOLD_APART:
         told = _told(equal, amplitudes, (gain + more, gains[1], gains[2]))
-        return None if told is None else replace(told, equal=True)
+        if told is not None and told.amplitude_dn > _APART * heights[0] / _HEIGHTS[0]:
+            return replace(told, equal=True)
     return _told(sizes, amplitudes, gains)
 
 

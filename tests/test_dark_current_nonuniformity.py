@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import lognorm
 
-from analysis.currentlaw import Body, current_spread, of_all
+from analysis.currentlaw import Body, of_all
+from analysis.currentspread import current_spread
 from analysis.photon_transfer import fit_camera
 from dsis.camera import read_camera
 from dsis.cfa import Cfa

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from pydantic import ValidationError
 
-from analysis.currentlaw import CLEAR_GAIN, current_spread
+from analysis.currentspread import CLEAR_GAIN, current_spread
 from analysis.photon_transfer.black import DarkLine
 from analysis.photon_transfer.parts import P_SEEN, Component
 from analysis.photon_transfer.patterns import FixedPatterns, Growth

@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import median_abs_deviation
 
-from analysis.currentlaw import CLEAR_GAIN, Body, Spread, current_spread
+from analysis.currentlaw import Body
+from analysis.currentspread import CLEAR_GAIN, Spread, current_spread
 from analysis.mismatch.candidates.candidate import Candidate, Proposal, measured, proposals
 from analysis.mismatch.clues import Clues
 from analysis.mismatch.counted import Counted

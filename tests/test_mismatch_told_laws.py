@@ -90,6 +90,8 @@ def test_a_soft_limit_needs_a_level_near_it() -> None:
     assert far_below(_levels(2700.0, 900.0), soft) is None
     assert far_below(_levels(2200.0, 900.0), Saturation(full_well_dn=3000.0)) is None
     assert far_below(_levels(2200.0, 900.0), Prnu(sigma_percent=1.0)) is None
+    # Noise has a standard deviation of 30 DN: what cuts its tail is near, however hard it is.
+    assert far_below(_levels(2940.0, 900.0), Saturation(full_well_dn=3000.0, softness_dn=2)) is None
 
 
 def test_spikes_that_are_left_make_codes_uneven() -> None:

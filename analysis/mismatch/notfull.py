@@ -9,6 +9,7 @@ from analysis.mismatch.state import State
 from dsis.effects import Effect
 from dsis.effects.saturation import Saturation
 
+_BRIGHTEST = 3.0  # standard deviations of noise: of many pixels some have as much
 _BENT = 0.9  # of charge that comes, that a pixel still keeps where a limit is near
 
 
@@ -28,7 +29,7 @@ def far_below(state: State, effect: Effect) -> Denial | None:
     most = max(
         (
             max(state.setting.layout.signal_dn[place], 0.0) * brightest.get(place[1], 1.0)
-            + max(own.variance_dn2, 0.0) ** 0.5
+            + _BRIGHTEST * max(own.variance_dn2, 0.0) ** 0.5
             for place, own in levels.items()
             if place[0] in flats
         ),

@@ -12,6 +12,7 @@ from math import exp, hypot, inf, log, sqrt
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter
+from scipy.stats import median_abs_deviation
 
 from analysis.currentlaw import BIN, FAR, Binned, Body, exponential, of_all
 
@@ -130,7 +131,7 @@ def _stray(values: Array, farthest: float) -> Array:
 def _most(image: Array) -> Array:
     """Return a map about its median, what is far out drawn in."""
     centred = image - np.median(image)
-    limit = _CLIPPED * _robust(centred)
+    limit = _CLIPPED * float(median_abs_deviation(centred, axis=None, scale="normal"))
     return np.asarray(np.clip(centred, -limit, limit))
 
 
@@ -159,10 +160,6 @@ def _without_smooth(image: Array) -> tuple[Array, float]:
     if float(smooth.var()) <= scatter**2 * (1 + _LINES * sqrt(2 * count / image.size)):
         return image, 0.0
     return (image - smooth) * count / (count - 1), float(most.std()) / sqrt(count - 1)
-
-
-def _robust(values: Array) -> float:
-    return 1.4826 * float(np.median(np.abs(values)))
 
 
 def current_spread(

@@ -13,12 +13,12 @@ _OF_PIXELS = frozenset({"fixed_pixel_variance", "variance_spread", "kurtosis"})
 
 
 class DarkCurrent(Effect):
-    """A mean dark signal that grows with the exposure time, with its shot noise.
+    """A dark signal that grows with the exposure time, alike in all pixels or log-normal over them.
 
-    S'(y, x) = S(y, x) + d(y, x) T. Darks of two exposure times show the mean and the variance grow.
-    In all pixels d is the same, or log-normal: d exp(s k(y, x) - s^2 / 2), k ~ N(0, 1) and fixed
-    per sensor, s = `log_sigma`. The mean is d then too, and d sqrt(exp(s^2) - 1) its standard
-    deviation over pixels, the dark current non-uniformity (DCNU).
+    It has its shot noise. S'(y, x) = S(y, x) + d(y, x) T. Darks of two exposure times show the mean
+    and the variance grow. In all pixels d is the same, or log-normal: d exp(s k(y, x) - s^2 / 2),
+    k ~ N(0, 1) and fixed per sensor, s = `log_sigma`. The mean is d then too, and
+    d sqrt(exp(s^2) - 1) its standard deviation over pixels, the dark current non-uniformity (DCNU).
     """
 
     kind: Literal["dark_current"] = "dark_current"

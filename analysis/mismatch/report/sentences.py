@@ -83,6 +83,8 @@ def parameter_words(name: str) -> str:
     alone = ("dn_per_s", "per_dn", "percent_full_scale", "cycles_per_frame", "per_megapixel_frame")
     if name in alone:
         return ""
+    if name == "log_sigma":  # its letters say nothing to who has not read the formula
+        return "spread over pixels (sigma of the logarithm)"
     for end in ("_dn_per_s", "_percent_full_scale", "_dn", "_percent", "_lsb", "_pixels", "_rows"):
         if name.endswith(end):
             return name.removesuffix(end).replace("_", " ")

@@ -67,7 +67,7 @@ def test_plain_steps_are_told_as_they_are(step: float, phase: float) -> None:
     assert made & set(range(60, 3060)) == codes & set(range(60, 3060))
 
 
-@pytest.mark.parametrize("step", [1.1, 1.25, 1.5, 1.75, 2.5])
+@pytest.mark.parametrize("step", [1.1, 1.25, 1.5, 1.75, 2.5, 1.37, 157 / 128, 293 / 256])
 def test_the_steps_of_the_effect_itself_are_told(step: float) -> None:
     """Its halves go to even: they fit at the ratio itself and nowhere beside it."""
     codes = {int(code) for code in whole_codes(np.arange(4000), step, 0.0)}

@@ -18,7 +18,8 @@ _FINER = 0.25  # of that, at last
 _ENDS = 2.0  # codes by which a range is no whole number of steps
 _AT_ONCE = 1 << 18  # steps times codes
 _MOST = 20_000  # steps tried: where more are left the codes tell none
-_PLAIN = 64  # the largest divisor of a step that is a ratio
+# Divisors of a step that is a ratio: of small numbers, or as gains are written and stored.
+_PLAIN = (*range(1, 65), 100, 128, 256, 512, 1000, 1024)
 _BETWEEN = 11  # steps of a range, its ends among them
 _EDGE, _DIGITS = 1e-6, 6  # of a code
 
@@ -169,10 +170,10 @@ def _plainest(seen: Seen, runs: Sequence[tuple[float, float]]) -> tuple[float, f
     """
     tried: list[tuple[int, int, float, float]] = []
     for low, high in runs:
-        divisor = next((d for d in range(1, _PLAIN + 1) if int(high * d) >= low * d), 0)
+        divisor = next((d for d in _PLAIN if int(high * d) >= low * d), 0)
         plain = [(int(high * divisor) / divisor, divisor)] if divisor else []
         others = np.linspace(low, high, _BETWEEN)[1:-1].tolist()
-        for own, rank in (*plain, *((other, _PLAIN + 1) for other in others)):
+        for own, rank in (*plain, *((other, _PLAIN[-1] + 1) for other in others)):
             phase = round(float(seen.wrong(np.array([own]))[1][0]), _DIGITS)
             tried.append((seen.missed(own, 0.0), 2 * rank, own, 0.0))
             tried.append((seen.missed(own, phase), 2 * rank + 1, own, phase))

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from analysis.mismatch import judge, name
+from analysis.mismatch import choice, judge
 from analysis.mismatch.candidates import Proposal
 from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.judge import Judge
@@ -84,9 +84,9 @@ def _offering(
     def refuted(*of: Any) -> Denial | None:
         return Denial(0.0, "it shows 0% of it") if of[2] in denied else None
 
-    monkeypatch.setattr(name, "ranked", ranked)
-    monkeypatch.setattr(name, "refuted", refuted)
-    monkeypatch.setattr(name, "replicates_for", lambda *_: 2)
+    monkeypatch.setattr(choice, "ranked", ranked)
+    monkeypatch.setattr(choice, "refuted", refuted)
+    monkeypatch.setattr(choice, "replicates_for", lambda *_: 2)
 
 
 def test_predictions_of_the_same_numbers_are_alike() -> None:
@@ -324,11 +324,11 @@ def test_a_denied_decay_waits_as_others_do_and_leaves_other_edges(
         offered = [one for one in (left, other, top) if one.kind in kinds]
         return [one for one in offered if possible(one.proposal.effect)]
 
-    monkeypatch.setattr(name, "ranked", ranked)
+    monkeypatch.setattr(choice, "ranked", ranked)
     monkeypatch.setattr(
         name, "refuted", lambda *of: Denial(0.0, "no") if id(of[3].mean) in denied else None
     )
-    monkeypatch.setattr(name, "replicates_for", lambda *_: 2)
+    monkeypatch.setattr(choice, "replicates_for", lambda *_: 2)
     layout = SimpleNamespace(channels=("MONO",))
     search = _search(
         setting=SimpleNamespace(nulls=16, drafts=16, layout=layout, large=False, given=0),

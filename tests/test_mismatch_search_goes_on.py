@@ -8,7 +8,7 @@ import pytest
 import analysis.mismatch.fitted as fitted_module
 import analysis.mismatch.name as search_module
 from analysis.mismatch.candidates import Proposal
-from analysis.mismatch.confirmed import proven
+from analysis.mismatch.confirmed import proven, small
 from analysis.mismatch.name import Search
 from analysis.mismatch.named import Named, unclear
 from analysis.mismatch.state import State
@@ -203,6 +203,19 @@ def test_a_bend_at_full_scale_is_known_no_better_than_its_exponent() -> None:
         assert (unclear(named) == "") == clear
         unknown = Named("nonlinearity", Proposal(bend, free), {**errors, "exponent": 5.0}, 34.0, ())
         assert "percent full scale" in unclear(unknown)
+
+
+@pytest.mark.parametrize("left", [True, False])
+def test_what_draws_must_exceed_its_errors_where_what_calls_for_it_is_left(left: bool) -> None:
+    """A camera averages frames: pixels that jump fit a little of it, and frames gain by that."""
+    jumps = registry()["rts"](pixel_fraction=0.16, amplitude_dn=0.7, switch_probability=0.1)
+    errors = {"pixel_fraction": 0.61, "amplitude_dn": 0.47}
+    named = Named("rts", Proposal(jumps, tuple(errors)), errors, 90.0, ())
+    surely: Any = Stub(certain=True, gain=Stub(nats_per_frame=1.6, ci95=(1.3, 1.9)))
+    state: Any = Stub(mismatches=[Stub(statistic="frame_correlation")] if left else [])
+    assert ("pixel fraction 0.16 ± 0.61" in small(state, named, surely)) == left
+    sure = Named("rts", Proposal(jumps, tuple(errors)), {**errors, "amplitude_dn": 0.1}, 90.0, ())
+    assert small(state, sure, surely) == ""
 
 
 def test_an_effect_within_its_errors_is_dropped_and_what_it_hid_is_looked_for() -> None:

@@ -64,16 +64,11 @@ def proven(
     while True:
         final = final if judged else undenied(search, final)
         gained = _gained(search, final, trial)
-        small = next(
-            (
-                (one, why)
-                for one in search.named
-                if (why := unclear(one)) and not _borne_out(gained.get(one.name))
-            ),
-            None,
-        )
-        if small is not None:
-            final = _without(search, final, small, judged=judged)
+        named = search.named
+        why_small = ((one, small(final, one, gained.get(one.name))) for one in named)
+        least = next(((one, why) for one, why in why_small if why), None)
+        if least is not None:
+            final = _without(search, final, least, judged=judged)
             continue
         weak = [
             named
@@ -88,6 +83,17 @@ def proven(
         if _calls_left(final, worst) and gained[worst.name].gain.ci95[0] <= 0 < nats:
             why += " may where what calls for it is left"
         final = _without(search, final, (worst, why), judged=judged)
+
+
+def small(state: State, named: Named, told: Gained | None) -> str:
+    """Return why an effect is not told from none by its own size; empty: it is, or frames bear it.
+
+    What draws at random is known by what frames gain, whatever its size, unless a statistic that
+    calls for it is left: then something else is there, by which frames would gain as well.
+    """
+    if named.effect is not None and named.effect.draws:
+        return unclear(named, at_random=True) if _calls_left(state, named) else ""
+    return "" if _borne_out(told) else unclear(named)
 
 
 def _borne_out(told: Gained | None) -> bool:

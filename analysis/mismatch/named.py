@@ -11,6 +11,7 @@ from dsis.effects import Effect
 from dsis.effects.shading import Shading
 
 _OF_FRAMES = LINES | {"rts"}
+_APART = 1.96  # standard errors of a size whose interval of 95 % reaches none
 _CLEAR = 3.0  # standard errors of an effect's size that is no chance
 SHAPES = frozenset(
     {
@@ -86,15 +87,17 @@ class Named:
         return self.proposal is not None and self.proposal.of_pixels is not None
 
 
-def unclear(named: Named) -> str:
+def unclear(named: Named, *, at_random: bool = False) -> str:
     """Return why an effect is not told from none by its own size; empty: it is.
 
-    Asked of what draws nothing at random, whose size is known as a mean is. Where an error is
+    Asked of what draws nothing at random, whose size is known as a mean is; of the rest only
+    where `at_random`, and only whether the interval of 95 % reaches none. Where an error is
     unknown, or is that of a shape which is sure itself, nothing is said.
     """
     effect = named.effect
-    if named.proposal is None or effect is None or effect.draws:
+    if named.proposal is None or effect is None or effect.draws > at_random:
         return ""
+    clear = _APART if effect.draws else _CLEAR
     free = named.proposal.free
     sizes = {
         name: (float(getattr(effect, name)), named.errors.get(name, inf))
@@ -102,14 +105,14 @@ def unclear(named: Named) -> str:
         if name not in SHAPES and not _sure(named, effect, _FAR_FROM_LEVELS.get(name, ""))
     }
     if not sizes or any(
-        not isfinite(error) or abs(value) > _CLEAR * error for value, error in sizes.values()
+        not isfinite(error) or abs(value) > clear * error for value, error in sizes.values()
     ):
         return ""
     said = ", ".join(
         f"{name.replace('_', ' ')} {value:.3g} ± {error:.2g}"
         for name, (value, error) in sizes.items()
     )
-    return f"its size is less than {_CLEAR:g} of its standard errors ({said})"
+    return f"its size is less than {clear:g} of its standard errors ({said})"
 
 
 def _sure(named: Named, effect: Effect, shape: str) -> bool:

@@ -1,0 +1,243 @@
+"""What a search takes in next: the effect that explains most, if any may be claimed."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from math import log
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.mismatch.candidates import CANDIDATES, measured
+from analysis.mismatch.clues import NO_LINE
+from analysis.mismatch.codegain import gain_by_codes
+from analysis.mismatch.contradicted import refuted
+from analysis.mismatch.credited import joined
+from analysis.mismatch.displaced import displaced
+from analysis.mismatch.fitted import Fitted
+from analysis.mismatch.forms import in_form
+from analysis.mismatch.instance import LINES, Frequency, frequency_of, instance
+from analysis.mismatch.instep import in_step
+from analysis.mismatch.memory import Memory
+from analysis.mismatch.named import Named
+from analysis.mismatch.phase import ABSENT, WholeFrames
+from analysis.mismatch.polish import with_effects
+from analysis.mismatch.rank import (
+    LEAST_GAIN,
+    SURE_CHANCE,
+    SURE_GAIN,
+    TOLD_APART,
+    Ranked,
+    behind,
+    ranked,
+    replicates_for,
+)
+from analysis.mismatch.rowtold import AS_WELL, as_shown, unlike_frames
+from analysis.mismatch.segments import Path, spiky
+from analysis.mismatch.state import State
+from analysis.mismatch.ties import akin, bends_as_well, by_numbers, plainest, ties, twin
+from dsis.camera import Camera
+from dsis.effects import Effect
+
+Array = NDArray[np.float64]
+_MOST_LINES = 5  # further ones stay unexplained, located
+
+
+@dataclass
+class Choice(Fitted):
+    """What may be taken in beside what is, and what may not any more.
+
+    Attributes
+    ----------
+    refused, doubted
+        By name, why: for good, and in this state.
+    tied
+        Of two that tied before, each other.
+    apart
+        What one of two makes that frames show.
+    settled
+        Lines that need no trial.
+    absent
+        Peaks that were no line.
+    lines, measuring
+        Of all frames of a small recording; of those that are not locked.
+    memory
+        What was tried before.
+    least
+        Gain for an effect to be taken in.
+    predicted
+        The numbers with what was found last.
+    """
+
+    refused: dict[str, str] = field(default_factory=dict)
+    tied: dict[str, Ranked | Path] = field(default_factory=dict)
+    doubted: dict[str, str] = field(default_factory=dict)
+    apart: list[Array] = field(default_factory=list)
+    settled: list[tuple[str, Frequency]] = field(default_factory=list)
+    absent: set[Frequency] = field(default_factory=set)
+    lines: WholeFrames | None = None
+    measuring: WholeFrames | None = None
+    memory: Memory = field(default_factory=Memory)
+    least: float = SURE_GAIN
+    predicted: Array | None = None
+
+    def _refuse(self, kind: str, effect: Effect | None, why: str) -> None:
+        self.refused[instance(kind, effect)] = why
+        if (line := frequency_of(effect)) is not None:
+            self.settled.append((kind, line))
+
+    def _best(
+        self, state: State, besides: Sequence[Array] = (), least: float = 0.0
+    ) -> tuple[Named, Camera] | None:
+        """Return the effect that explains most, and the camera with it.
+
+        `besides`: numbers with what was taken in beside this state, if any; then something else is
+        asked for, which gains at `least` so much.
+        """
+        if self.setting.large and self.least > SURE_GAIN:  # what is weaker is sought later
+            least = max(least, self.least)
+        left, self.predicted = self._left(), None
+        off = {m.statistic for m in state.mismatches}
+        bent = "dual_gain" in left and "pixel_variance" in off and not besides
+        path = self.path(state) if bent else None
+        silent = spiky(state, path)  # its variances say nothing yet, unless there is nothing else
+        fitted = self._decided(state, None if silent else path, besides, least)
+        if (fitted and silent) or any(pair[1] is path for pair in self.ties):
+            path = None
+        most = fitted[0].gain if fitted else 0.0
+        fits = [one for pair in self.ties for one in pair if one.kind in CANDIDATES]
+        bends = [one.gain for one in fits if "pixel_variance" in CANDIDATES[one.kind].calls]
+        tied = max(bends, default=0.0)
+        if path is not None and path.gain > max(self.least, most, tied):
+            rivals = behind(path.kind, path.gain, fitted)
+            error = {"switch_dn": path.error_dn}
+            found = Named(path.kind, None, error, path.gain, rivals, path.switch_dn)
+            return found, path.camera
+        if not fitted or most < self._least(state, fitted[0].kind):
+            return None
+        best, self.predicted = fitted[0], fitted[0].mean
+        camera = joined(state.camera, best.polished.effects, self.setting.given)
+        rivals = behind(best.kind, best.gain, fitted[1:])
+        if path is not None:
+            rivals = (*rivals, ("dual_gain", best.gain - path.gain))
+        proposal = replace(best.proposal, effect=best.polished.effects[0])
+        errors = best.polished.errors[0]
+        known = None if self.measuring is None else self.measuring.measured(proposal.effect)
+        if known is not None:  # better than from the heights of peaks, or sums over pixels
+            proposal = measured(proposal, *known)
+            errors = dict(proposal.errors)
+            camera = with_effects(state.camera, [proposal.effect])
+        named = Named(best.kind, proposal, errors, best.gain, rivals)
+        return None if camera is None else (named, camera)
+
+    def _least(self, state: State, kind: str) -> float:
+        """Return the gain from which an effect is taken in: at odds of 20 against none.
+
+        Of all kinds of the vocabulary; where what calls for it is sure, of those that this calls
+        for. Less for lines: whole frames show them besides.
+        """
+        if self.least > SURE_GAIN:
+            return self.least
+        if kind in LINES:
+            return LEAST_GAIN
+        sure = {m.statistic for m in state.mismatches if m.p_adjusted < SURE_CHANCE}
+        if not sure.intersection(CANDIDATES[kind].calls):
+            return self.least
+        rivals = sum(bool(sure.intersection(own.calls)) for own in CANDIDATES.values())
+        return min(TOLD_APART + log(rivals), self.least)
+
+    def _left(self) -> frozenset[str]:
+        full = LINES if sum(n.kind in LINES for n in self.named) >= _MOST_LINES else frozenset()
+        return self.vocabulary - self._done() - full
+
+    def _done(self) -> frozenset[str]:
+        return frozenset({*(n.name for n in self.named), *self.refused})
+
+    def _decided(
+        self,
+        state: State,
+        path: Path | None = None,
+        besides: Sequence[Array] = (),
+        least: float = 0.0,
+    ) -> list[Ranked]:
+        """Return the effects that may be claimed; the best of pairs that tie are put aside.
+
+        Neither of two that tie over the same numbers is claimed, nor what explains the same, and
+        worse. What is taken in besides may decide: they are tried again in the next round.
+        """
+        self.ties, self.doubted, self.apart = [], {}, []
+        while True:
+            apart = [*besides, *self.apart, *(one.mean for pair in self.ties for one in pair)]
+            settled = tuple(self.settled)
+            left = self._left() - self.doubted.keys() - akin(self.ties)
+            shows = self._possible, self._shown
+            fitted = ranked(state, left, self.memory, self.step, settled, apart, *shows, least)
+            if len(self.settled) > len(settled):
+                continue  # a line was refused: behind it another may be
+            before = len(self.doubted)
+            fitted = as_shown(state, self.lines, plainest(state, fitted))
+            fitted = in_form(state, self.camera, fitted)
+            fitted = self._undoubted(state, fitted)
+            if len(self.doubted) > before:
+                continue  # all that was fitted of a kind is denied: others were too far behind it
+            if not fitted or fitted[0].gain < LEAST_GAIN:
+                return fitted
+            tied = (one for one in fitted[1:] if ties(state, fitted[0], one))
+            rival: Ranked | Path | None = next(tied, self._named_otherwise(fitted[0]))
+            rival = rival or bends_as_well(state, fitted[0], path)
+            if self._shown(fitted[0].proposal.effect) < SURE_GAIN:  # else frames tell it from all
+                rival = rival or twin(state, fitted[0], self.vocabulary, self.memory, self.step)
+            if rival is None:
+                return fitted
+            if (told := by_numbers(state, self.camera.noise, fitted, rival)) is not None:
+                return told
+            self.ties.append((fitted[0], rival))
+            self.tied |= {fitted[0].kind: rival, rival.kind: fitted[0]}
+
+    def _named_otherwise(self, best: Ranked) -> Ranked | Path | None:
+        """Return the rival that tied before, if it only is no rival since its kind was named.
+
+        Amplifiers of the two halves say nothing of those of even and odd rows.
+        """
+        rival, named = self.tied.get(best.kind), {n.kind for n in self.named}
+        return rival if rival is not None and rival.kind in named - LINES else None
+
+    def _undoubted(self, state: State, fitted: list[Ranked]) -> list[Ranked]:
+        """Leave out the best as long as a statistic which calls for it denies it, for this round.
+
+        That of which nothing is left is doubted, until what is named besides shows another of it.
+        """
+        while fitted and fitted[0].gain >= LEAST_GAIN and fitted[0].kind not in LINES:
+            best, *others = fitted
+            predictor = state.predictor(replicates_for(self.setting, [best.proposal.effect]))
+            denial = refuted(state, predictor, best.kind, best.polished, self._left())
+            denial = denial or unlike_frames(state, self.lines, best, others)
+            if (denial := denial or displaced(state, best.kind, best.polished.mean)) is None:
+                break
+            fitted = others
+            if all(one.name != best.name for one in others):
+                self.doubted[best.name] = denial.why
+                self.apart += [best.mean] if denial.why.startswith(AS_WELL) else []
+                break
+        return fitted
+
+    def _possible(self, effect: Effect) -> bool:
+        """Return whether an effect may be tried: not again, and as whole frames show its line."""
+        if instance(effect.kind, effect) in self._done() | self.doubted.keys():
+            return False
+        if any(own.place in self.sized and own.like(effect) for own in self._sizes()):
+            return False
+        if self.lines is None or not self.lines.shown(effect):
+            return self.lines is None
+        denial = self.lines.denial(effect) or in_step(self.setting, effect)
+        if denial == ABSENT:
+            line = frequency_of(effect)
+            self.settled += [(NO_LINE, line)] if line is not None else []
+            self.absent |= {line} if line is not None else set()
+        elif denial is not None:
+            self._refuse(effect.kind, effect, denial)
+        return denial is None
+
+    def _shown(self, effect: Effect, without: State | None = None) -> float:
+        """Return what whole frames gain by a line, or codes; minus infinity: nothing of either."""
+        by_codes = gain_by_codes(self.setting, effect, without)
+        return by_codes if self.lines is None else max(by_codes, self.lines.gain(effect))

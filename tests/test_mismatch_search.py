@@ -326,7 +326,7 @@ def test_a_denied_decay_waits_as_others_do_and_leaves_other_edges(
 
     monkeypatch.setattr(choice, "ranked", ranked)
     monkeypatch.setattr(
-        name, "refuted", lambda *of: Denial(0.0, "no") if id(of[3].mean) in denied else None
+        choice, "refuted", lambda *of: Denial(0.0, "no") if id(of[3].mean) in denied else None
     )
     monkeypatch.setattr(choice, "replicates_for", lambda *_: 2)
     layout = SimpleNamespace(channels=("MONO",))

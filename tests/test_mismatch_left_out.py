@@ -3,6 +3,8 @@
 from dataclasses import replace
 
 from analysis.mismatch.diagnose import find_mismatch
+from analysis.mismatch.report import headline
+from analysis.mismatch.report.sentences import verdict
 from mismatch_recordings import camera, recorded
 
 LEVELS = (100.0, 500.0, 1600.0)
@@ -27,3 +29,6 @@ def test_darks_alone_do_not_judge_light() -> None:
     darks = replace(recording, exposures=recording.of_kind("dark"))
     found = find_mismatch(camera(), darks, vocabulary=frozenset())
     assert any("no flats" in remark for remark in found.remarks)
+    assert found.verdict == "match"
+    assert verdict(found) == ("In darks simulation and recording agree; no flat could be judged.",)
+    assert headline(found) == "In darks simulation and recording agree"

@@ -8,6 +8,7 @@ from analysis.mismatch.wholecells import Cropped
 from analysis.mismatch.words import statistic_words
 from dsis.recording import Recording
 
+NO_FLATS = "There are no flats: noise that grows with light and the response to it are not judged."
 _SHOWN = 8
 
 
@@ -41,9 +42,7 @@ def remarks_on(
         )
     flats = [e for e in layout.uniform if e.kind == "flat"]
     if not flats and not layout.scenes:
-        found.append(
-            "There are no flats: noise that grows with light and the response to it are not judged."
-        )
+        found.append(NO_FLATS)
     if flats and any(e.light is None for e in flats):
         found.append(
             "The light of some flats is unknown: their levels cannot show a bent response."

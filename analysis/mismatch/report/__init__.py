@@ -11,6 +11,7 @@ import numpy as np
 from analysis.mismatch.evidence import Evidence
 from analysis.mismatch.finding import Finding, Mismatch
 from analysis.mismatch.model import apart
+from analysis.mismatch.remarks import NO_FLATS
 from analysis.mismatch.report.figures import Picture, ladder_picture, pictures, save
 from analysis.mismatch.report.numbers import interval, measured, plain
 from analysis.mismatch.report.sentences import (
@@ -42,10 +43,20 @@ HEADLINES = {
     "omitted_physics": "The simulation leaves out physics",
     "unexplained": "Something differs that is not explained",
 }
+DARKS_AGREE = "In darks simulation and recording agree"
 LOCATED = "Simulation and recording differ"
 TEMPLATE = Path(__file__).with_name("report.html.jinja")
 _FIRST_PAGE = 8  # kinds of departure listed before the details
 _SAID = 3  # sentences below a picture
+
+
+def headline(finding: Finding) -> str:
+    """Return the verdict in a line."""
+    if finding.verdict == "unexplained" and not finding.searched:
+        return LOCATED
+    if finding.verdict == "match" and NO_FLATS in finding.remarks:
+        return DARKS_AGREE
+    return HEADLINES[finding.verdict]
 
 
 @dataclass(frozen=True)
@@ -100,9 +111,7 @@ def render(
     differences = _differences(finding)
     values = {
         "finding": finding,
-        "headline": HEADLINES[finding.verdict]
-        if finding.searched or finding.verdict != "unexplained"
-        else LOCATED,
+        "headline": headline(finding),
         "searched": finding.searched,
         "verdict": verdict(finding),
         "origin": [line for line in origin.splitlines() if line],

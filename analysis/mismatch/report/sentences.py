@@ -15,9 +15,12 @@ from analysis.mismatch.finding import (
     OmittedEffect,
     ParameterError,
 )
+from analysis.mismatch.remarks import NO_FLATS
 from analysis.mismatch.report.numbers import interval, measured, plain
 from analysis.mismatch.words import effect_words, place, statistic_words, unit
 
+_AGREE = "Simulation and recording agree: nothing differs by more than chance."
+_IN_DARKS = "In darks simulation and recording agree; no flat could be judged."
 _NAMED = 3
 _TOGETHER = "all that is named, together"
 _IN_FULL = 4  # effects that one sentence can hold with their numbers
@@ -27,7 +30,7 @@ def verdict(finding: Finding) -> tuple[str, ...]:
     """Return the verdict in a sentence, then what is wrong, left over and not decided."""
     match finding.verdict:
         case "match":
-            said = ["Simulation and recording agree: nothing differs by more than chance."]
+            said = [_IN_DARKS if NO_FLATS in finding.remarks else _AGREE]
         case "parameters":
             said = ["The physics is complete; its numbers are off."]
         case "omitted_physics":

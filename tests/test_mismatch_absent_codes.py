@@ -20,16 +20,20 @@ LEVELS = (250.0, 900.0, 2600.0)
 BASE = camera(segments=((SLOPE, INTERCEPT, None),), black=BLACK)
 
 
-def coded(converted: Callable[[Array], Array]) -> InMemory:
-    """Return noise of the base model, its voltages (DN above black) made codes."""
+def coded(
+    converted: Callable[[Array], Array],
+    levels: tuple[float, ...] = LEVELS,
+    line: tuple[float, float] = (SLOPE, INTERCEPT),
+) -> InMemory:
+    """Return noise of a base model, its voltages (DN above black) made codes."""
     draws = np.random.default_rng(5)
-    like = recorded(BASE, 1, rows=96, columns=96, levels=LEVELS)
+    like = recorded(BASE, 1, rows=96, columns=96, levels=levels)
     assert like.stacks is not None
     stacks = {}
     for exposure in like.exposures:
         signal = exposure.light or 0.0
         noise = draws.standard_normal(like.stacks[exposure.name].shape)
-        voltage = signal + noise * np.sqrt(SLOPE * signal + INTERCEPT)
+        voltage = signal + noise * np.sqrt(line[0] * signal + line[1])
         stacks[exposure.name] = np.clip(converted(voltage), 0, 4095).astype(np.uint16)
     return replace(like, stacks=stacks)
 

@@ -19,7 +19,7 @@ from dsis.effects.quantisation import last_step, whole_codes
 from dsis.grid import PixelGrid
 from dsis.measures import Middle
 from mismatch_recordings import camera
-from test_mismatch_absent_codes import BASE, INTERCEPT, coded, companded, multiplied
+from test_mismatch_absent_codes import BASE, BLACK, INTERCEPT, coded, companded, multiplied
 
 Array = NDArray[np.float64]
 
@@ -146,3 +146,17 @@ def test_a_digital_gain_is_named_as_steps_of_codes() -> None:
 def test_codes_of_a_table_are_no_digital_gain() -> None:
     found = find_mismatch(BASE, coded(companded), seed=1)
     assert "quantisation" not in {one.effect for one in found.omitted_physics}
+
+
+def test_what_coarse_codes_make_of_narrow_noise_is_no_second_path() -> None:
+    """Noise of half a code to six codes, in steps of 4: without a word for them it is left open."""
+    own = camera(segments=((0.08, 0.25, None),), black=BLACK)
+    levels = (33.0, 150.0, 500.0, 1000.0, 2000.0)
+
+    def fours(voltage: Array) -> Array:
+        return 4 * np.rint((voltage + BLACK) / 4)
+
+    recording = coded(fours, levels, (0.08, 0.25))
+    found = find_mismatch(own, recording, seed=1, vocabulary=frozenset({"dual_gain"}))
+    assert found.omitted_physics == ()
+    assert {"code_spacing", "pixel_variance"} <= {one.statistic for one in found.unexplained}

@@ -124,7 +124,7 @@ def _of_codes(state: State, kind: str, mean: Array) -> Denial | None:
         return None
     if kind == "adc_dnl":
         return Denial(0.0, "codes come in steps, which widths that scatter do not make")
-    coarse = _coarse(state)
+    narrow = coarse(state)
     known = state.null.known & np.isfinite(mean)
     moved = np.where(known, np.nan_to_num(mean) - state.null.mean, 0.0)
     change = (moved / state.null.sd) ** 2
@@ -132,10 +132,10 @@ def _of_codes(state: State, kind: str, mean: Array) -> Denial | None:
     own = np.array([key.statistic in calls for key in state.vector.keys])
     theirs = np.array(
         [
-            key.place in coarse
+            key.place in narrow
             and (
                 key.statistic in _SHAPE
-                or (key.statistic == "level" and abs(dn) <= coarse[key.place] / 2)
+                or (key.statistic == "level" and abs(dn) <= narrow[key.place] / 2)
             )
             for key, dn in zip(state.vector.keys, moved.tolist(), strict=True)
         ]
@@ -146,7 +146,7 @@ def _of_codes(state: State, kind: str, mean: Array) -> Denial | None:
     return Denial(1 - feigned / whole, "codes come in steps no finer than the noise they shape")
 
 
-def _coarse(state: State) -> dict[Place, float]:
+def coarse(state: State) -> dict[Place, float]:
     """Return the distance of codes, DN, where it is wider than the model's and than the noise."""
     found: dict[Place, float] = {}
     seen = state.setting.seen

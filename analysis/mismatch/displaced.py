@@ -14,7 +14,7 @@ from analysis.mismatch.alikesamples import of_alike_samples
 from analysis.mismatch.brighter import no_brighter_alike
 from analysis.mismatch.bylevel import otherwise_by_level
 from analysis.mismatch.candidates.response import skewness_below
-from analysis.mismatch.contradicted import Denial
+from analysis.mismatch.contradicted import Denial, coarse
 from analysis.mismatch.covariances import of_neighbours, straightened
 from analysis.mismatch.feignedtails import replaced
 from analysis.mismatch.fewlines import of_few_lines
@@ -43,6 +43,7 @@ _GREENS = frozenset({"channel_imbalance", "tap_mismatch"})
 _MIXES = "crosstalk"  # which makes neighbours alike, and by that the greens differ
 _BESIDE = ("R", "Gr", "Gb", "B")
 _MOST = 0.5  # of a misfit, or of what white rows explain, that something else may make
+_OF_A_LINE = 2  # numbers
 _CHANCE = 1e-3  # that variances on a line misfit more
 _LIMITS = (-1.5, 4.0)  # standard deviations at which noise may be cut
 
@@ -53,7 +54,8 @@ def displaced(state: State, kind: str, mean: Array, without: Array | None = None
     Of bends of the photon transfer curve, asked is whether variances lie on a line once they are
     what they would be without: by covariances that neighbours have instead, or by what is cut off
     of noise that leans. Where that leaves half of the misfit or less, there may be no bend; nor
-    where variances scatter no more than codes that are not equally wide make them. Of a bend that
+    where variances scatter no more than codes that are not equally wide make them, or are those of
+    codes that come in steps. Of a bend that
     levels show is asked whether it is smooth, or begins where a read-out path does. Of
     filters, crosstalk and charge that repels charge, how alike neighbours are at each level; of
     counted photons and amplifiers of greens, by how much levels show them; of noise of whole lines,
@@ -77,7 +79,8 @@ def displaced(state: State, kind: str, mean: Array, without: Array | None = None
     if kind in _BENDS:
         seen, denial = by_levels(state, kind, without, mean)
         if denial is None and not seen:
-            denial = of_neighbours(state, mean) or _of_limits(state) or _of_codes(state)
+            denial = of_neighbours(state, mean) or _of_limits(state)
+            denial = denial or _of_codes(state) or _of_steps(state)
         return denial
     if kind in LINES:
         denial = of_few_lines(state, kind, without) or of_parts(state, kind)
@@ -138,10 +141,30 @@ def _of_codes(state: State) -> Denial | None:
     for signal, variance, weight, places in curves(state):
         extra = np.array([scatter(at, v) for at, v in zip(places, variance, strict=True)])
         apart += misfit(signal, variance, 1 / (1 / weight + extra))
-        free += signal.size - 2
+        free += signal.size - _OF_A_LINE
     if free <= 0 or apart > float(chi2.isf(_CHANCE, free)):
         return None
     return Denial(0.0, "codes are not equally wide, and scatter the variances by as much")
+
+
+def _of_steps(state: State) -> Denial | None:
+    """Return how a bend is denied by codes that come in steps; None: it is not.
+
+    Noise that is no wider than they are apart has their variance; any other has a twelfth of their
+    square more, whatever the signal, and its variances lie on a line as before.
+    """
+    narrow = coarse(state)
+    if not narrow:
+        return None
+    apart = free = 0.0
+    for signal, variance, weight, places in curves(state):
+        wide = np.array([at not in narrow for at in places])
+        if wide.sum() > _OF_A_LINE:
+            apart += misfit(signal[wide], variance[wide], weight[wide])
+            free += float(wide.sum()) - _OF_A_LINE
+    if free > 0 and apart > float(chi2.isf(_CHANCE, free)):
+        return None
+    return Denial(0.0, "codes come in steps, and variances of noise no wider are theirs")
 
 
 def _left_of_codes(state: State) -> dict[Place, tuple[float, float]]:

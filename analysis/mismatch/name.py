@@ -25,6 +25,7 @@ Array = NDArray[np.float64]
 _MOST_EFFECTS = 20  # some may have to go again
 _CHOSEN = frozenset({"adc_memory", "dual_gain"})  # a period, a gap between levels
 _ROUNDS, _FEW_ROUNDS = 6, 3  # of a search that goes on; of a large recording
+_SURE = 100.0  # gain that an effect keeps, whatever is taken in with it
 _APART = 0.1  # cosine of what two predictions change, up to which they change other numbers
 _FORGIVING = 2  # rounds after which what was dropped may come back
 
@@ -161,8 +162,8 @@ class Search(Choice):
         means: list[Array] = []
         while self.predicted is not None and len(self.named) < _MOST_EFFECTS:
             means.append(self.predicted)
-            found = self._best(state, means, WEAK)
-            if found is None or self.predicted is None or found[0].gain < WEAK:
+            found = self._best(state, means, _SURE)
+            if found is None or self.predicted is None or found[0].gain < _SURE:
                 break
             named, alone = found
             apart = all(abs(cosine(state, self.predicted, one)) < _APART for one in means)

@@ -287,9 +287,10 @@ def _tried(
     known = {kind: CANDIDATES[kind] for kind in kinds if kind in CANDIDATES}
     left = {kind for kind, own in known.items() if off & {*own.calls, *own.hints}}
     best = max((memory.gained(kind, 0.0) for kind in left), default=0.0)
+    strong = SURE_GAIN if state.setting.large else _STRONG
     found: list[tuple[float, str, Proposal, Array]] = []
     while True:
-        much = max(least, best if best > _STRONG else 0.0)
+        much = max(least, best if best > strong else 0.0)
         worth = _WORTH_IT * much if much else -np.inf
         chosen = sorted(kind for kind in left if memory.gained(kind, np.inf) >= worth)
         if not chosen:

@@ -92,7 +92,11 @@ STRONG: dict[str, tuple[dict[str, object], ...]] = {
         {"percent_full_scale": 3.0, "exponent": 4.0},
         {"percent_full_scale": 0.5, "exponent": -0.3},
     ),
-    "saturation": ({"softness_dn": 60.0},),
+    "saturation": (
+        {"softness_dn": 60.0},
+        {"spread_percent": 2.0},
+        {"softness_dn": 60.0, "spread_percent": 1.0},
+    ),
     "dual_gain_mismatch": ({"gain_error_percent": 5.0, "mean": "kinks"},),
     "tap_mismatch": (
         {"gain_percent": 40.0, "regions": "top_bottom", "seam": 0.3},

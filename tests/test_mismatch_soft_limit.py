@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from analysis.mismatch import find_mismatch
 from analysis.mismatch.bank.key import Key
 from analysis.mismatch.candidates import CANDIDATES
-from analysis.mismatch.candidates.response import soft_moments
+from analysis.mismatch.candidates.response import moments_of_many, soft_moments
 from analysis.mismatch.memory import Memory
 from dsis.effects.dual_gain_mismatch import DualGainMismatch
 from dsis.effects.saturation import Saturation
@@ -54,8 +55,56 @@ def test_moments_are_those_of_noise_that_is_limited(softness: float) -> None:
         assert (away**3).mean() / made.std() ** 3 == pytest.approx(skewness[i], abs=0.02)
 
 
+@pytest.mark.parametrize(("softness", "spread"), [(20.0, 1.0), (80.0, 0.5)])
+def test_moments_are_means_over_pixels_whose_limits_differ(softness: float, spread: float) -> None:
+    """4000 pixels of 500 samples each: what is between pixels is no noise."""
+    rng = np.random.default_rng(8)
+    signal, sd = np.array([2950.0, 3050.0]), np.array([39.0, 40.0])
+    found = moments_of_many(signal, sd, FULL, softness, spread)
+    wells = FULL * (1 + spread / 100 * rng.standard_normal((4000, 1)))
+    for i in range(2):
+        q = rng.normal(signal[i], sd[i], (4000, 500))
+        made = wells - softness * np.logaddexp(0, (wells - q) / softness)
+        mean, log_variance, skewness, log_apart = (float(one[i]) for one in found)
+        away = made - made.mean(1, keepdims=True)
+        assert made.mean() - signal[i] == pytest.approx(mean, abs=1.0)
+        assert np.log(made.var(1, ddof=1).mean() / sd[i] ** 2) == pytest.approx(
+            log_variance, abs=0.06
+        )
+        third = (away**3).mean() / (away**2).mean() ** 1.5
+        assert third == pytest.approx(skewness, abs=0.06)
+        between = made.mean(1).var() - made.var(1, ddof=1).mean() / 500
+        assert np.log(between) == pytest.approx(log_apart, abs=0.08)
+
+
+@pytest.mark.parametrize("softness", [0.0, 40.0])
+def test_full_wells_that_differ_from_pixel_to_pixel(softness: float) -> None:
+    """numpy's sensor: without a word for it, frames denied the full well of all pixels."""
+    own = np.random.default_rng(3).standard_normal((64, 64))
+    wells = FULL * (1 + 0.01 * own)
+
+    def limited(charge: NDArray[np.float64]) -> NDArray[np.float64]:
+        if not softness:
+            return np.minimum(charge, wells)
+        return np.asarray(wells - softness * np.logaddexp(0, (wells - charge) / softness))
+
+    levels = (300.0, 900.0, 1500.0, 2100.0, 2990.0)
+    found = find_mismatch(
+        camera(segments=((SLOPE, READ, None),)), responding(5, levels, limited), seed=1
+    )
+    (named,) = found.omitted_physics
+    assert named.effect == "saturation"
+    assert not found.unexplained
+    assert named.heldout_gain.ci95[0] > 0
+    truth = {"full_well_dn": FULL, "spread_percent": 1.0, "softness_dn": softness}
+    for name, own_value in named.parameters.items():
+        away = own_value.value - truth[name]
+        assert abs(away) < 3 * own_value.standard_error, name
+        assert own_value.standard_error < 0.2 * max(truth[name], 60.0)
+
+
 def test_a_limit_that_is_not_soft_is_written_as_ever() -> None:
-    assert "softness_dn" not in Saturation(full_well_dn=FULL).model_dump()
+    assert Saturation(full_well_dn=FULL).model_dump().keys() == {"kind", "full_well_dn"}
     assert Saturation(full_well_dn=FULL, softness_dn=2.0).model_dump()["softness_dn"] == 2.0
 
 

@@ -10,6 +10,7 @@ from scipy.special import ndtr
 
 from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, Stage
 
+_OF_PIXELS = frozenset({"fixed_pixel_variance"})
 _NODES, _WEIGHTS = np.polynomial.hermite_e.hermegauss(41)
 _WEIGHTS = _WEIGHTS / _WEIGHTS.sum()
 
@@ -19,37 +20,54 @@ class Saturation(Effect):
 
     Q' = min(Q, full well), after shot noise: near the full well the variance falls to that of the
     read noise and the skew turns negative. Where a pixel that fills up collects less and less, the
-    limit is soft, of a softness k: Q' = full well - k ln(1 + exp((full well - Q) / k)).
+    limit is soft, of a softness k: Q' = full well - k ln(1 + exp((full well - Q) / k)). Pixels'
+    full wells differ by a standard deviation of `spread_percent`, normal and fixed per sensor.
     """
 
     kind: Literal["saturation"] = "saturation"
     full_well_dn: Annotated[float, Field(gt=0, examples=[5010.0])]
     softness_dn: Annotated[float, Field(ge=0, exclude_if=not_)] = 0.0
+    spread_percent: Annotated[float, Field(ge=0, le=20, exclude_if=not_)] = 0.0
 
     stage: ClassVar[Stage] = Stage.CHARGE
     draws: ClassVar[bool] = False
     reference: ClassVar[str] = "Janesick, Photon Transfer, SPIE Press, 2007"
-    measures: ClassVar[frozenset[str]] = frozenset(
-        {
-            "level",
-            "pixel_variance",
-            "skewness",
-            "kurtosis",
-            "variance_spread",
-            "code_imbalance",
-        }
+    measures: ClassVar[frozenset[str]] = (
+        frozenset(
+            {
+                "level",
+                "pixel_variance",
+                "skewness",
+                "kurtosis",
+                "variance_spread",
+                "code_imbalance",
+            }
+        )
+        | _OF_PIXELS
     )
     confounders: ClassVar[str] = (
         "Clipping at the white level has no read noise on top; nonlinearity bends long before."
     )
 
-    def apply(self, image: Image, exposure: Exposure) -> Image:
-        """Cut charge at the full well."""
-        del exposure
-        return self._limited(image)
+    @property
+    def changes(self) -> frozenset[str]:
+        """The pixels' own only where they differ."""
+        return self.measures if self.spread_percent else self.measures - _OF_PIXELS
 
-    def _limited(self, image: Image) -> Image:
-        full = np.float32(self.full_well_dn)
+    @property
+    def drawn(self) -> bool:
+        """Whether pixels differ."""
+        return bool(self.spread_percent)
+
+    def apply(self, image: Image, exposure: Exposure) -> Image:
+        """Cut charge at the full well of each pixel."""
+        full = np.asarray(np.float32(self.full_well_dn))
+        if self.spread_percent:
+            own = exposure.sensor.fixed("full_well", exposure.grid, threads=exposure.threads)
+            full = full * (1 + np.float32(self.spread_percent / 100) * own)
+        return self._limited(image, full)
+
+    def _limited(self, image: Image, full: Image) -> Image:
         if not self.softness_dn:
             return np.minimum(image, full)
         k = np.float32(self.softness_dn)
@@ -59,24 +77,34 @@ class Saturation(Effect):
     def contributions(self, point: OperatingPoint) -> Mapping[str, float]:
         """Return mean and variance of a censored normal law less those of the whole.
 
-        Of a soft limit, which has no closed form, by Gauss-Hermite quadrature.
+        Of a soft limit, which has no closed form, by Gauss-Hermite quadrature; so are the means
+        over pixels whose full wells differ, and how far their levels do.
         """
+        if not self.spread_percent:
+            level, variance = self._censored(point, self.full_well_dn)
+            return {"level": level, "pixel_variance": variance}
+        wells = self.full_well_dn * (1 + self.spread_percent / 100 * _NODES)
+        levels, variances = np.transpose([self._censored(point, float(one)) for one in wells])
+        level = float(_WEIGHTS @ levels)
+        return {
+            "level": level,
+            "pixel_variance": float(_WEIGHTS @ variances),
+            "fixed_pixel_variance": float(_WEIGHTS @ (levels - level) ** 2),
+        }
+
+    def _censored(self, point: OperatingPoint, full: float) -> tuple[float, float]:
+        """Return what one full well does to the mean and the variance of a pixel."""
         sigma = np.sqrt(point.shot_variance_dn2)
         if self.softness_dn:
             at = (point.signal_dn + sigma * _NODES).astype(np.float32)
-            made = self._limited(at).astype(np.float64) - point.signal_dn
+            made = self._limited(at, np.asarray(np.float32(full))).astype(np.float64)
+            made -= point.signal_dn
             mean = float(_WEIGHTS @ made)
-            return {
-                "level": mean,
-                "pixel_variance": float(_WEIGHTS @ (made - mean) ** 2 - sigma**2),
-            }
+            return mean, float(_WEIGHTS @ (made - mean) ** 2 - sigma**2)
         if not sigma:
-            return {"level": min(self.full_well_dn - point.signal_dn, 0.0), "pixel_variance": 0.0}
-        z = (self.full_well_dn - point.signal_dn) / sigma
+            return min(full - point.signal_dn, 0.0), 0.0
+        z = (full - point.signal_dn) / sigma
         density, below = np.exp(-z * z / 2) / np.sqrt(2 * np.pi), ndtr(z)
         mean = -density + z * (1 - below)
         square = below - z * density + z * z * (1 - below)
-        return {
-            "level": float(sigma * mean),
-            "pixel_variance": float(sigma**2 * (square - mean**2 - 1)),
-        }
+        return float(sigma * mean), float(sigma**2 * (square - mean**2 - 1))

@@ -20,10 +20,16 @@ _HARD, _TOLD_APART = 0.02, 3.0  # of noise: as good as hard; of log-likelihood: 
 _BEYOND = np.linspace(-1.0, 6.0, 22)
 _LEFT = 0.05  # of shot noise, at a full well that is far below the light
 _BELOW = np.linspace(1.0, 8.0, 71)  # standard deviations of a full well below the light
+_DIFFERENT = 5.0  # standard errors by which pixels' levels differ
+_SPREADS = (0.05, 10.0)  # of full wells, per cent
+_FARTHER = np.array([1.0, 1.2, 1.4, 1.7, 2.2])  # times what levels show, where not all are full
+_FIXED, _OF_FIXED = "fixed_pixel_variance", 3
 _ROUNDING = 1 / 12  # of variance, DN^2
 _NU = 6.0  # of Student's t law, by which numbers depart
 _NODES, _WEIGHTS = np.polynomial.hermite_e.hermegauss(41)
 _WEIGHTS = _WEIGHTS / _WEIGHTS.sum()
+_FEW_NODES, _FEW_WEIGHTS = np.polynomial.hermite_e.hermegauss(5)
+_FEW_WEIGHTS = _FEW_WEIGHTS / _FEW_WEIGHTS.sum()
 Array = NDArray[np.float64]
 
 
@@ -94,6 +100,27 @@ def _bends(percent: float) -> list[Proposal]:
 
 
 def _saturation(clues: Clues) -> Sequence[Proposal]:
+    """Propose a full well, and how far pixels' own differ where fixed patterns show that."""
+    found = _limits(clues)
+    top = max(clues.places, key=clues.signal)
+    apart, error = clues.excess(_FIXED).get(top, (0.0, np.inf))
+    if apart < _DIFFERENT * error or not np.isfinite(error):
+        return found
+    spread = float(np.clip(100 * apart**0.5 / clues.signal(top), *_SPREADS))
+    hard = [one for one in found if "softness_dn" not in one.free]
+    lights = {e.name: e.light for e in clues.layout.exposures}
+    soft = [] if lights[top[0]] is None else _soft_limits(clues, top, spread=spread)
+    return [*found, *(_differing(one, spread) for one in hard), *soft]
+
+
+def _differing(one: Proposal, spread: float) -> Proposal:
+    """Return a hard limit as a start for one that differs from pixel to pixel: all is fitted."""
+    full, names = float(dict(one.effect)["full_well_dn"]), ["full_well_dn", "spread_percent"]
+    (made,) = proposals("saturation", names, full_well_dn=full, spread_percent=spread)
+    return made
+
+
+def _limits(clues: Clues) -> Sequence[Proposal]:
     """Start where the skewness of the brightest level puts the full well, and around it."""
     top = max(clues.places, key=clues.signal)
     level = clues.signal(top)
@@ -139,19 +166,24 @@ def _full(clues: Clues, top: Place) -> list[Proposal]:
             for one in made]  # fmt: skip
 
 
-def _soft_limits(clues: Clues, top: Place, hard: float | None = None) -> list[Proposal]:
+def _soft_limits(
+    clues: Clues, top: Place, hard: float | None = None, spread: float = 0.0
+) -> list[Proposal]:
     """Start where levels, variances and skewness put a soft limit, by a grid of well and softness.
 
     What the limit makes of normal noise is found by Gauss-Hermite quadrature; beside it the scale
     of the light and the slope of the variances are free, which were fitted without it. Nothing
-    where a limit at `hard`, DN, is as likely as the best, at odds of 20.
+    where a limit at `hard`, DN, is as likely as the best, at odds of 20. Where pixels' levels
+    differ by what full wells do that are `spread` apart, per cent, or more, that is in the grid.
     """
-    off = {name: clues.excess(name) for name in ("level", "pixel_variance", "skewness")}
+    measured = ("level", "pixel_variance", "skewness", *([_FIXED] if spread else []))
+    off = {name: clues.excess(name) for name in measured}
     rows = [
-        (place, number, value, error)
+        (place, number, *(_logarithm(value, error) if number == _OF_FIXED else (value, error)))
         for number, own in enumerate(off.values())
         for place, (value, error) in own.items()
         if clues.signal(place) > 0 and np.isfinite(error)
+        if number < _OF_FIXED or value > _DIFFERENT * error
     ]
     if not rows:
         return []
@@ -164,22 +196,40 @@ def _soft_limits(clues: Clues, top: Place, hard: float | None = None) -> list[Pr
     free = free / error[:, np.newaxis]
     level, unit = clues.signal(top), clues.seen.levels[top].variance_dn2 ** 0.5
 
-    def misfit(full: float, softness: float) -> float:
-        made = soft_moments(signal, sd, full, softness)
+    def misfit(full: float, softness: float, apart: float) -> float:
+        if apart:
+            made = moments_of_many(signal, sd, full, softness, apart)
+        else:
+            made = soft_moments(signal, sd, full, softness)
         own = (value - np.choose(number.astype(int), made)) / error
         rest = own - free @ np.linalg.lstsq(free, own, rcond=None)[0]
         return (_NU + 1) / 2 * float(np.log1p(rest**2 / _NU).sum())
 
-    tried = [
-        (float(full), float(softness))
-        for softness in unit * _SOFTNESS
-        for full in level + np.sqrt(unit * max(softness, unit)) * _BEYOND
-    ]
-    found = min(tried, key=lambda one: misfit(*one))
-    if hard is not None and misfit(hard, unit * _HARD) < misfit(*found) + _TOLD_APART:
+    def least(some: Array) -> tuple[float, tuple[float, float, float]]:
+        tried = (
+            (float(full), float(softness), float(apart))
+            for softness in some
+            for full in level + np.sqrt(unit * max(softness, unit)) * _BEYOND
+            for apart in (spread * _FARTHER if spread else (0.0,))
+        )
+        return min((misfit(*one), one) for one in tried)
+
+    best, found = least(unit * _SOFTNESS)
+    as_hard = np.inf if hard is None else misfit(hard, unit * _HARD, 0.0)
+    if spread:
+        as_hard, _ = least(unit * np.array([_HARD]))
+    if as_hard < best + _TOLD_APART:
         return []
+    full, softness, apart = found
     names = ["full_well_dn", "softness_dn"]
-    return proposals("saturation", names, full_well_dn=found[0], softness_dn=found[1])
+    own = {"full_well_dn": full, "softness_dn": softness}
+    if not spread:
+        return proposals("saturation", names, (), **own)
+    return proposals("saturation", [*names, "spread_percent"], (), **own, spread_percent=apart)
+
+
+def _logarithm(value: float, error: float) -> tuple[float, float]:
+    return float(np.log(value)), error / value
 
 
 def soft_moments(signal: Array, sd: Array, full: float, softness: float) -> list[Array]:
@@ -193,6 +243,23 @@ def soft_moments(signal: Array, sd: Array, full: float, softness: float) -> list
     away = made - mean[:, np.newaxis]
     variance = np.maximum(away**2 @ _WEIGHTS, 1e-12)
     return [mean, np.log(variance / sd**2), (away**3 @ _WEIGHTS) / variance**1.5]
+
+
+def moments_of_many(
+    signal: Array, sd: Array, full: float, softness: float, spread: float
+) -> list[Array]:
+    """Return means over pixels whose limits differ by `spread`, per cent; see `soft_moments`.
+
+    The last is the logarithm of the variance of their levels, DN^2.
+    """
+    wells = full * (1 + spread / 100 * _FEW_NODES)
+    each = np.stack([soft_moments(signal, sd, float(own), softness) for own in wells])
+    levels, logs, skewness = each.transpose(1, 2, 0)
+    variance = np.exp(logs)
+    third = (skewness * variance**1.5) @ _FEW_WEIGHTS
+    mean, total = levels @ _FEW_WEIGHTS, variance @ _FEW_WEIGHTS
+    apart = (levels - mean[:, np.newaxis]) ** 2 @ _FEW_WEIGHTS
+    return [mean, np.log(total), third / total**1.5, np.log(np.maximum(apart, 1e-12))]
 
 
 def skewness_below(limit: float) -> float:

@@ -28,7 +28,7 @@ def test_darks_alone_do_not_judge_light() -> None:
     assert recording.stacks is not None
     darks = replace(recording, exposures=recording.of_kind("dark"))
     found = find_mismatch(camera(), darks, vocabulary=frozenset())
-    assert any("no flats" in remark for remark in found.remarks)
+    assert any("No flat could be judged" in remark for remark in found.remarks)
     assert found.verdict == "match"
     assert verdict(found) == ("In darks simulation and recording agree; no flat could be judged.",)
     assert headline(found) == "In darks simulation and recording agree"

@@ -1,5 +1,6 @@
 """A full well that is reached softly: where it starts from, and what a camera makes of it."""
 
+from collections.abc import Sequence
 from types import SimpleNamespace
 from typing import Any
 
@@ -9,16 +10,19 @@ from numpy.typing import NDArray
 
 from analysis.mismatch import find_mismatch
 from analysis.mismatch.bank.key import Key
-from analysis.mismatch.candidates import CANDIDATES
+from analysis.mismatch.candidates import CANDIDATES, Proposal
 from analysis.mismatch.candidates.response import moments_of_many, soft_moments
 from analysis.mismatch.memory import Memory
+from analysis.mismatch.state import State
+from dsis.effects import registry
 from dsis.effects.dual_gain_mismatch import DualGainMismatch
 from dsis.effects.saturation import Saturation
-from mismatch_recordings import InMemory, camera, responding, state_of
+from mismatch_recordings import InMemory, camera, recorded, responding, state_of
 
 LEVELS = (500.0, 1500.0, 2400.0, 2850.0)
 FULL, SOFT = 3000.0, 60.0
 SLOPE, READ = 0.5, 6.0
+SHARES = {"full_well_dn": 0.003, "softness_dn": 0.3, "spread_percent": 0.2}  # of it, its error
 
 
 def _recording(seed: int, softness: float) -> InMemory:
@@ -97,10 +101,31 @@ def test_full_wells_that_differ_from_pixel_to_pixel(softness: float) -> None:
     assert not found.unexplained
     assert named.heldout_gain.ci95[0] > 0
     truth = {"full_well_dn": FULL, "spread_percent": 1.0, "softness_dn": softness}
-    for name, own_value in named.parameters.items():
-        away = own_value.value - truth[name]
-        assert abs(away) < 3 * own_value.standard_error, name
-        assert own_value.standard_error < 0.2 * max(truth[name], 60.0)
+    said = {name: one for name, one in named.parameters.items() if one.value}
+    assert said.keys() == {name for name, value in truth.items() if value}
+    for name, one in said.items():
+        assert abs(one.value - truth[name]) < 3 * one.standard_error, name
+        assert one.standard_error < SHARES[name] * truth[name], name
+
+
+def test_darks_alone_say_nothing_of_a_full_well() -> None:
+    """Their brightest place has no signal, and offsets that differ."""
+    tails = registry()["heavy_tailed_read_noise"](tail_df=4.0)
+    offsets = registry()["dsnu"](sigma_dn=3.0)
+    true = camera(offsets, tails, segments=((SLOPE, READ, None),))
+    recording = recorded(true, 3, rows=64, columns=64, levels=())
+    state = state_of(recording, camera(segments=((SLOPE, READ, None),)))
+    assert not any("spread_percent" in one.free for one in _proposed(state))
+
+
+def test_gains_that_differ_are_no_full_wells_that_do() -> None:
+    true = camera(registry()["prnu"](sigma_percent=1.0), segments=((SLOPE, READ, None),))
+    state = state_of(recorded(true, 3, levels=LEVELS), camera(segments=((SLOPE, READ, None),)))
+    assert not any("spread_percent" in one.free for one in _proposed(state))
+
+
+def _proposed(state: State) -> Sequence[Proposal]:
+    return CANDIDATES["saturation"].propose(state.clues())
 
 
 def test_a_limit_that_is_not_soft_is_written_as_ever() -> None:

@@ -3,16 +3,11 @@
 from types import SimpleNamespace as Stub
 from typing import Any
 
-import numpy as np
 import pytest
 
 import analysis.mismatch.diagnose as module
-import analysis.mismatch.name as search_module
-from analysis.mismatch.candidates import Proposal
 from analysis.mismatch.diagnose import _searched, _switched
-from analysis.mismatch.name import Search
 from analysis.mismatch.named import Named
-from dsis.effects import registry
 
 WHOLE, FEW, MORE = (Stub(exposures=(), name=name) for name in ("whole", "few", "more"))
 
@@ -125,51 +120,3 @@ def test_the_switch_of_a_second_path_is_told_by_all_levels(monkeypatch: pytest.M
     assert final.camera == "with the switch at 827"
     assert search.named[0].switch_dn == 827.0
     assert search.named[0].errors == {"switch_dn": 40.0}
-
-
-class Offered(Search):
-    """A search in whose state effects gain what they are offered with, one after the other."""
-
-    offers: tuple[tuple[float, tuple[float, float]], ...] = ()
-
-    def _best(self, state: Any, besides: Any = (), least: float = 0.0) -> Any:
-        gain, change = self.offers[len(besides) - 1]
-        self.predicted = None if gain < least else np.array(change)
-        effect = registry()["row_noise"](sigma_dn=gain)
-        named = Named(f"kind {gain:.0f}", Proposal(effect, ()), {}, gain, ())
-        return None if gain < least else (named, Stub(effect=(*state.camera.effect, effect)))
-
-    def _own(self, named: Named) -> Any:
-        return "the camera's" if named.gain == CAMERAS else None
-
-
-CAMERAS = 333.0
-
-
-@pytest.mark.parametrize(
-    ("offers", "taken"),
-    [
-        (((200.0, (0, 1)), (150.0, (0, 0))), [200.0, 150.0]),
-        (((200.0, (0.3, 1)), (150.0, (0, 1))), []),  # what the first explains, it may explain
-        (((200.0, (0, 1)), (150.0, (1, 0))), [200.0]),
-        (((99.0, (0, 1)),), []),  # more frames will tell
-        (((CAMERAS, (0, 1)),), []),  # the size of one that it has is fitted
-    ],
-)
-def test_of_a_large_recording_what_changes_other_numbers_is_taken_in_at_once(
-    monkeypatch: pytest.MonkeyPatch, offers: Any, taken: list[float]
-) -> None:
-    monkeypatch.setattr(
-        search_module, "with_effects", lambda own, more: Stub(effect=(*own.effect, *more))
-    )
-    null = Stub(mean=np.zeros(2), sd=np.ones(2), known=np.ones(2, bool))
-    first = Stub(effect=("first",))
-    state: Any = Stub(null=null, camera=Stub(effect=()))
-    setting: Any = Stub(large=True)
-    camera: Any = first
-    search = Offered(setting, camera, state, frozenset(), step=lambda: None)
-    search.offers = (*offers, (0.0, (0, 0)))
-    search.predicted = np.array((1.0, 0.0))
-    made = search._besides(state, camera)  # the step under test
-    assert [one.gain for one in search.named] == taken
-    assert [one if one == "first" else one.sigma_dn for one in made.effect] == ["first", *taken]

@@ -1,6 +1,5 @@
 """What a search takes in next: the effect that explains most, if any may be claimed."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from math import log
 
@@ -64,8 +63,6 @@ class Choice(Fitted):
         What was tried before.
     least
         Gain for an effect to be taken in.
-    predicted
-        The numbers with what was found last.
     """
 
     refused: dict[str, str] = field(default_factory=dict)
@@ -78,35 +75,25 @@ class Choice(Fitted):
     measuring: WholeFrames | None = None
     memory: Memory = field(default_factory=Memory)
     least: float = SURE_GAIN
-    predicted: Array | None = None
 
     def _refuse(self, kind: str, effect: Effect | None, why: str) -> None:
         self.refused[instance(kind, effect)] = why
         if (line := frequency_of(effect)) is not None:
             self.settled.append((kind, line))
 
-    def _best(
-        self, state: State, besides: Sequence[Array] = (), least: float = 0.0
-    ) -> tuple[Named, Camera] | None:
-        """Return the effect that explains most, and the camera with it.
-
-        `besides`: numbers with what was taken in beside this state, if any; then something else is
-        asked for, which gains at `least` so much.
-        """
-        if self.setting.large and self.least > SURE_GAIN:  # what is weaker is sought later
-            least = max(least, self.least)
-        left, self.predicted = self._left(), None
+    def _best(self, state: State) -> tuple[Named, Camera] | None:
+        """Return the effect that explains most, and the camera with it."""
+        left = self._left()
         off = {m.statistic for m in state.mismatches}
-        bent = "dual_gain" in left and "pixel_variance" in off and not besides
-        path = self.path(state) if bent else None
+        path = self.path(state) if "dual_gain" in left and "pixel_variance" in off else None
         silent = spiky(state, path)  # its variances say nothing yet, unless there is nothing else
-        fitted = self._decided(state, None if silent else path, besides, least)
+        fitted = self._decided(state, None if silent else path)
         if (fitted and silent) or any(pair[1] is path for pair in self.ties):
             path = None
         most = fitted[0].gain if fitted else 0.0
         fits = [one for pair in self.ties for one in pair if one.kind in CANDIDATES]
-        bends = [one.gain for one in fits if "pixel_variance" in CANDIDATES[one.kind].calls]
-        tied = max(bends, default=0.0)
+        bent = [one.gain for one in fits if "pixel_variance" in CANDIDATES[one.kind].calls]
+        tied = max(bent, default=0.0)
         if path is not None and path.gain > max(self.least, most, tied):
             rivals = behind(path.kind, path.gain, fitted)
             error = {"switch_dn": path.error_dn}
@@ -114,7 +101,7 @@ class Choice(Fitted):
             return found, path.camera
         if not fitted or most < self._least(state, fitted[0].kind):
             return None
-        best, self.predicted = fitted[0], fitted[0].mean
+        best = fitted[0]
         camera = joined(state.camera, best.polished.effects, self.setting.given)
         rivals = behind(best.kind, best.gain, fitted[1:])
         if path is not None:
@@ -152,13 +139,7 @@ class Choice(Fitted):
     def _done(self) -> frozenset[str]:
         return frozenset({*(n.name for n in self.named), *self.refused})
 
-    def _decided(
-        self,
-        state: State,
-        path: Path | None = None,
-        besides: Sequence[Array] = (),
-        least: float = 0.0,
-    ) -> list[Ranked]:
+    def _decided(self, state: State, path: Path | None = None) -> list[Ranked]:
         """Return the effects that may be claimed; the best of pairs that tie are put aside.
 
         Neither of two that tie over the same numbers is claimed, nor what explains the same, and
@@ -166,11 +147,12 @@ class Choice(Fitted):
         """
         self.ties, self.doubted, self.apart = [], {}, []
         while True:
-            apart = [*besides, *self.apart, *(one.mean for pair in self.ties for one in pair)]
+            apart = [*self.apart, *(one.mean for pair in self.ties for one in pair)]
             settled = tuple(self.settled)
             left = self._left() - self.doubted.keys() - akin(self.ties)
-            shows = self._possible, self._shown
-            fitted = ranked(state, left, self.memory, self.step, settled, apart, *shows, least)
+            fitted = ranked(
+                state, left, self.memory, self.step, settled, apart, self._possible, self._shown
+            )
             if len(self.settled) > len(settled):
                 continue  # a line was refused: behind it another may be
             before = len(self.doubted)

@@ -45,7 +45,8 @@ def lit(camera: Camera, layout: Layout, levels: Mapping[str, Array]) -> dict[str
     if full is None or not dim:
         return found
     line = camera.segments.variance_dn2(np.array([0.0, full], np.float32))
-    sd = float(max(line[1] - line[0], 0.0)) ** 0.5
+    spreads = [e.spread_percent for e in camera.effect if isinstance(e, Saturation)]
+    sd = float(np.hypot(max(line[1] - line[0], 0.0) ** 0.5, max(spreads) / 100 * full))
     hidden = {name: levels[name] > full - _HALF * sd for name in dim}
     for name in dim:
         own = levels[name].copy()

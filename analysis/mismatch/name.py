@@ -15,18 +15,14 @@ from analysis.mismatch.judge import INSTEAD, NEEDLESS, NOTHING, Judge
 from analysis.mismatch.memory import Memory
 from analysis.mismatch.named import Named
 from analysis.mismatch.phase import ABSENT
-from analysis.mismatch.polish import with_effects
-from analysis.mismatch.rank import cosine, replicates_for
+from analysis.mismatch.rank import replicates_for
 from analysis.mismatch.resolved import differ, gained, opened
 from analysis.mismatch.state import State
-from dsis.camera import Camera
 
 Array = NDArray[np.float64]
 _MOST_EFFECTS = 20  # some may have to go again
 _CHOSEN = frozenset({"adc_memory", "dual_gain"})  # a period, a gap between levels
 _ROUNDS, _FEW_ROUNDS = 6, 3  # of a search that goes on; of a large recording
-_SURE = 100.0  # gain that an effect keeps, whatever is taken in with it
-_APART = 0.1  # cosine of what two predictions change, up to which they change other numbers
 _FORGIVING = 2  # rounds after which what was dropped may come back
 
 
@@ -146,39 +142,11 @@ class Search(Choice):
             self._take(added[0])
             self.named = kept_up(self.named, added[1], self.setting.given)
             self.rough |= added[0].gain >= WEAK
-            camera = self._besides(state, added[1]) if self.setting.large else added[1]
-            state = State.of(self.setting, camera, self.step, draft=True, near=state)
+            state = State.of(self.setting, added[1], self.step, draft=True, near=state)
         if not state.mismatches:
             self.ties = []  # what was undecided on the way is explained
             self.doubted = {}
         return state
-
-    def _besides(self, state: State, camera: Camera) -> Camera:
-        """Return a camera with what is strong and changes other numbers than all taken in with it.
-
-        Of a large recording, where simulations take long: what was tried beside a state is known
-        there, and would be simulated again beside the next one.
-        """
-        means: list[Array] = []
-        while self.predicted is not None and len(self.named) < _MOST_EFFECTS:
-            means.append(self.predicted)
-            found = self._best(state, means, _SURE)
-            if found is None or self.predicted is None or found[0].gain < _SURE:
-                break
-            named, alone = found
-            apart = all(abs(cosine(state, self.predicted, one)) < _APART for one in means)
-            if (
-                not apart
-                or self._own(named) is not None
-                or len(alone.effect) != len(state.camera.effect) + 1
-            ):
-                break
-            both = None if named.effect is None else with_effects(camera, [named.effect])
-            if both is None:
-                break
-            self._take(named)
-            camera = both
-        return camera
 
     def _take(self, named: Named) -> None:
         self.named.append(named)

@@ -22,6 +22,7 @@ SHAPES = frozenset(
         "period_codes",
         "full_well_dn",
         "softness_dn",
+        "spread_percent",
         "exponent",
         "seam",
         "anisotropy",

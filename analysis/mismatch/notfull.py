@@ -10,6 +10,7 @@ from dsis.effects import Effect
 from dsis.effects.saturation import Saturation
 
 _BRIGHTEST = 3.0  # standard deviations of noise: of many pixels some have as much
+_FULLEST = 3.0  # standard deviations of full wells that differ: of many pixels some have so little
 _BENT = 0.9  # of charge that comes, that a pixel still keeps where a limit is near
 
 
@@ -35,7 +36,8 @@ def far_below(state: State, effect: Effect) -> Denial | None:
         ),
         default=np.inf,
     )
-    kept = float(expit((effect.full_well_dn - most) / effect.softness_dn))
+    least = effect.full_well_dn * (1 - _FULLEST * effect.spread_percent / 100)
+    kept = float(expit((least - most) / effect.softness_dn))
     if kept < _BENT:
         return None
     return Denial(1 - kept, "no level is near the full well: levels bend as of any response")

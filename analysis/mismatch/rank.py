@@ -101,7 +101,6 @@ def ranked(
     apart: Sequence[Array] = (),
     possible: Callable[[Effect], bool] = lambda _: True,
     shown: Callable[[Effect], float] = lambda _: -np.inf,
-    least: float = 0.0,
 ) -> list[Ranked]:
     """Return the effects among `kinds` that mismatches call for, fitted one at a time.
 
@@ -111,7 +110,7 @@ def ranked(
     """
     predictor = state.predictor()
     before = predictor.loglik(state.null.mean)
-    tried = _tried(state, kinds, memory, step, settled, apart, possible, least)
+    tried = _tried(state, kinds, memory, step, settled, apart, possible)
     told = partial(_at_once, shown)
     tried = [  # frames tell jumps of few pixels from what has the same sums, and waves from noise
         (max(value, before + _gained(state, own, told)), kind, own) for value, kind, own in tried
@@ -119,12 +118,18 @@ def ranked(
     for value, kind, own in tried:
         memory.gains_at_least(kind, own.effect, value - before)
     tried.sort(key=lambda one: -one[0])
-    best = max((value for value, _, _ in tried), default=-np.inf)
-    if best - before < least:
-        return []
+    best = max((value for value, _, _ in tried), default=0.0)
     far = max(_FAR, _SHARE * (best - before))
     likely = _likely(tried, best - far)
-    _readied(state, likely)
+    by_count: dict[int, list[Proposal]] = {}
+    for start in likely:
+        by_count.setdefault(replicates_for(state.setting, [start.effect]), []).append(start)
+    for count, starts in by_count.items():
+        asked = state.predictor(count)
+        fits = [together(state.camera, start, state.setting.given) for start in starts]
+        asked.ready(camera for fit in fits for camera in needed(*fit))
+        if state.setting.jobs > 1 and len(starts) > 1:
+            asked.ready(stepped(asked, *fit) for fit in fits)
     found: list[Fit] = []
     strange: set[str] = set()
     made = side_by_side(partial(_fitted, state), likely, state.setting.jobs)
@@ -143,22 +148,9 @@ def ranked(
             found.append((kind, proposal, polished))
     if strange and not found:  # nothing that they were likelier than was fitted
         left = frozenset(kinds) - strange
-        return ranked(state, left, memory, step, settled, apart, possible, shown, least)
+        return ranked(state, left, memory, step, settled, apart, possible, shown)
     fitted = _in_order(state, found, shown)
     return _in_order(state, _once_more(state, found), shown) if _unsure(state, fitted) else fitted
-
-
-def _readied(state: State, likely: Sequence[Proposal]) -> None:
-    """Simulate side by side what fits of some proposals begin with."""
-    by_count: dict[int, list[Proposal]] = {}
-    for start in likely:
-        by_count.setdefault(replicates_for(state.setting, [start.effect]), []).append(start)
-    for count, starts in by_count.items():
-        asked = state.predictor(count)
-        fits = [together(state.camera, start, state.setting.given) for start in starts]
-        asked.ready(camera for fit in fits for camera in needed(*fit))
-        if state.setting.jobs > 1 and len(starts) > 1:
-            asked.ready(stepped(asked, *fit) for fit in fits)
 
 
 def _unsure(state: State, fitted: Sequence[Ranked]) -> bool:
@@ -272,13 +264,11 @@ def _tried(
     settled: tuple[tuple[str, Frequency], ...],
     apart: Sequence[Array],
     possible: Callable[[Effect], bool],
-    least: float,
 ) -> list[tuple[float, str, Proposal]]:
     """Return the best proposals of each kind as they are proposed, the most likely first.
 
     Beside one that gains much, what gained little before is not tried anew: what others explain
-    gains no more than before, as a rule, and is tried once nothing gains much. Where at `least` so
-    much is asked for, what gained little of that is not tried anew either.
+    gains no more than before, as a rule, and is tried once nothing gains much.
     """
     off = {m.statistic for m in state.mismatches}
     clues = state.clues(settled)
@@ -287,11 +277,9 @@ def _tried(
     known = {kind: CANDIDATES[kind] for kind in kinds if kind in CANDIDATES}
     left = {kind for kind, own in known.items() if off & {*own.calls, *own.hints}}
     best = max((memory.gained(kind, 0.0) for kind in left), default=0.0)
-    strong = SURE_GAIN if state.setting.large else _STRONG
     found: list[tuple[float, str, Proposal, Array]] = []
     while True:
-        much = max(least, best if best > strong else 0.0)
-        worth = _WORTH_IT * much if much else -np.inf
+        worth = _WORTH_IT * best if best > _STRONG else -np.inf
         chosen = sorted(kind for kind in left if memory.gained(kind, np.inf) >= worth)
         if not chosen:
             break
@@ -360,15 +348,10 @@ def _means(
 
 def alike(state: State, one: Array, other: Array) -> bool:
     """Return whether two predictions change the state's numbers in the same way."""
-    return cosine(state, one, other) > _COSINE
-
-
-def cosine(state: State, one: Array, other: Array) -> float:
-    """Return the cosine between what two predictions change, in standard deviations."""
     null = state.null
     a, b = (
         np.where(null.known, np.nan_to_num((mean - null.mean) / null.sd), 0.0)
         for mean in (one, other)
     )
     size = float(np.linalg.norm(a) * np.linalg.norm(b))
-    return float(a @ b) / size if size > 0 else 0.0
+    return size > 0 and float(a @ b) / size > _COSINE

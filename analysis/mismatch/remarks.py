@@ -8,7 +8,7 @@ from analysis.mismatch.wholecells import Cropped
 from analysis.mismatch.words import statistic_words
 from dsis.recording import Recording
 
-NO_FLATS = "There are no flats: noise that grows with light and the response to it are not judged."
+NO_FLATS = "No flat could be judged: noise that grows with light, and the response, are unknown."
 _SHOWN = 8
 
 

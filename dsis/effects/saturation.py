@@ -30,7 +30,7 @@ class Saturation(Effect):
     spread_percent: Annotated[float, Field(ge=0, le=20, exclude_if=not_)] = 0.0
 
     stage: ClassVar[Stage] = Stage.CHARGE
-    draws: ClassVar[bool] = False
+    draws: ClassVar[bool] = False  # its size, the mean, is the same on every sensor
     reference: ClassVar[str] = "Janesick, Photon Transfer, SPIE Press, 2007"
     measures: ClassVar[frozenset[str]] = (
         frozenset(
@@ -64,7 +64,7 @@ class Saturation(Effect):
         full = np.asarray(np.float32(self.full_well_dn))
         if self.spread_percent:
             own = exposure.sensor.fixed("full_well", exposure.grid, threads=exposure.threads)
-            full = full * (1 + np.float32(self.spread_percent / 100) * own)
+            full = full * np.maximum(1 + np.float32(self.spread_percent / 100) * own, 0)
         return self._limited(image, full)
 
     def _limited(self, image: Image, full: Image) -> Image:

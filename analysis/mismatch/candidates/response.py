@@ -21,7 +21,7 @@ _BEYOND = np.linspace(-1.0, 6.0, 22)
 _LEFT = 0.05  # of shot noise, at a full well that is far below the light
 _BELOW = np.linspace(1.0, 8.0, 71)  # standard deviations of a full well below the light
 _DIFFERENT = 5.0  # standard errors by which pixels' levels differ
-_SPREADS = (0.05, 10.0)  # of full wells, per cent
+_SPREADS, _MOST_SPREAD = (0.05, 10.0), 20.0  # of full wells, per cent
 _FARTHER = np.array([1.0, 1.2, 1.4, 1.7, 2.2])  # times what levels show, where not all are full
 _FIXED, _OF_FIXED = "fixed_pixel_variance", 3
 _ROUNDING = 1 / 12  # of variance, DN^2
@@ -104,7 +104,10 @@ def _saturation(clues: Clues) -> Sequence[Proposal]:
     found = _limits(clues)
     top = max(clues.places, key=clues.signal)
     apart, error = clues.excess(_FIXED).get(top, (0.0, np.inf))
-    if apart < _DIFFERENT * error or not np.isfinite(error):
+    less, of_less = clues.excess("pixel_variance").get(top, (0.0, np.inf))
+    if not clues.signal(top) > 0 or not np.isfinite(error) or apart < _DIFFERENT * error:
+        return found
+    if less > -_DIFFERENT * of_less:  # gains that differ leave all of the noise
         return found
     spread = float(np.clip(100 * apart**0.5 / clues.signal(top), *_SPREADS))
     hard = [one for one in found if "softness_dn" not in one.free]
@@ -210,14 +213,16 @@ def _soft_limits(
             (float(full), float(softness), float(apart))
             for softness in some
             for full in level + np.sqrt(unit * max(softness, unit)) * _BEYOND
-            for apart in (spread * _FARTHER if spread else (0.0,))
+            for apart in (np.minimum(spread * _FARTHER, _MOST_SPREAD) if spread else (0.0,))
         )
         return min((misfit(*one), one) for one in tried)
 
     best, found = least(unit * _SOFTNESS)
-    as_hard = np.inf if hard is None else misfit(hard, unit * _HARD, 0.0)
+    as_hard = np.inf
     if spread:
         as_hard, _ = least(unit * np.array([_HARD]))
+    elif hard is not None:
+        as_hard = misfit(hard, unit * _HARD, 0.0)
     if as_hard < best + _TOLD_APART:
         return []
     full, softness, apart = found

@@ -95,7 +95,7 @@ def fractional_step(some: Collection[Middle], never: Collection[int]) -> tuple[f
     halves are rounded up, which is a phase of a quarter. How many are left out tells the step
     roughly, and which are left out, of exposures ever farther from one another, ever more exactly.
     It must foretell both kinds but for a hundredth. Of steps that do as well a ratio of small
-    numbers is taken, and the phase 0.
+    numbers is taken, else hundredths or 1 / 128 and the like, and the phase 0.
 
     Parameters
     ----------

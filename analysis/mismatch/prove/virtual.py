@@ -91,14 +91,17 @@ def filled(camera: Camera, held: Held, signals: Signals) -> frozenset[str]:
 
     The share is that of the clean signal with the base model's noise, of all pixels.
     """
-    wells = [own.full_well_dn for own in camera.effect if isinstance(own, Saturation)]
+    limits = [own for own in camera.effect if isinstance(own, Saturation)]
+    wells = [own.full_well_dn for own in limits]
     wells += [camera.saturation_dn] if camera.saturation_dn else []
     if not wells:
         return frozenset()
+    apart_dn2 = sum((own.full_well_dn * own.spread_percent / 100) ** 2 for own in limits)
     found = set()
     for exposure in held.exposures:
         clean = clean_signal(held, exposure, signals)
-        sd = np.sqrt(np.maximum(base_of(camera).segments.variance_dn2(clean), LEAST_DN2))
+        noise = np.maximum(base_of(camera).segments.variance_dn2(clean), LEAST_DN2)
+        sd = np.sqrt(noise + apart_dn2)
         if float(ndtr((clean - min(wells)) / sd).mean()) > MOST_CLIPPED:
             found.add(exposure.name)
     return frozenset(found)

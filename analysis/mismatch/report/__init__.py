@@ -43,7 +43,10 @@ HEADLINES = {
     "omitted_physics": "The simulation leaves out physics",
     "unexplained": "Something differs that is not explained",
 }
-DARKS_AGREE = "In darks simulation and recording agree"
+IN_DARKS = {
+    "match": "In darks simulation and recording agree",
+    "parameters": "In darks the physics is complete, its numbers are off",
+}
 LOCATED = "Simulation and recording differ"
 TEMPLATE = Path(__file__).with_name("report.html.jinja")
 _FIRST_PAGE = 8  # kinds of departure listed before the details
@@ -54,8 +57,8 @@ def headline(finding: Finding) -> str:
     """Return the verdict in a line."""
     if finding.verdict == "unexplained" and not finding.searched:
         return LOCATED
-    if finding.verdict == "match" and NO_FLATS in finding.remarks:
-        return DARKS_AGREE
+    if NO_FLATS in finding.remarks and finding.verdict in IN_DARKS:
+        return IN_DARKS[finding.verdict]
     return HEADLINES[finding.verdict]
 
 

@@ -21,6 +21,8 @@ from analysis.mismatch.words import effect_words, place, statistic_words, unit
 
 _AGREE = "Simulation and recording agree: nothing differs by more than chance."
 _IN_DARKS = "In darks simulation and recording agree; no flat could be judged."
+_OFF = "The physics is complete; its numbers are off."
+_OFF_IN_DARKS = "In darks the physics is complete, its numbers are off; no flat could be judged."
 _NAMED = 3
 _TOGETHER = "all that is named, together"
 _IN_FULL = 4  # effects that one sentence can hold with their numbers
@@ -32,7 +34,7 @@ def verdict(finding: Finding) -> tuple[str, ...]:
         case "match":
             said = [_IN_DARKS if NO_FLATS in finding.remarks else _AGREE]
         case "parameters":
-            said = ["The physics is complete; its numbers are off."]
+            said = [_OFF_IN_DARKS if NO_FLATS in finding.remarks else _OFF]
         case "omitted_physics":
             names = _in_short(finding.omitted_physics)
             said = [f"The camera model leaves out {names}.", *unproven(finding)]

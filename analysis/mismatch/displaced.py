@@ -56,12 +56,13 @@ def displaced(state: State, kind: str, mean: Array, without: Array | None = None
     of noise that leans. Where that leaves half of the misfit or less, there may be no bend; nor
     where variances scatter no more than codes that are not equally wide make them, or are those of
     codes that come in steps. Of a bend that levels show is asked whether it is smooth, or begins
-    where a read-out path does. Of filters, crosstalk and charge that repels charge, how alike neighbours are at each level; of
-    counted photons and amplifiers of greens, by how much levels show them; of noise of whole lines,
-    how alike samples along them are; of greens that differ, what other colours share with them; of
-    frames that move as a whole, whether their parts do so alike. Of widths of codes, whether it is
-    codes that never occur which make them differ; of lag, whether darks are alike; of memory,
-    whether samples are alike at other lags as well; of pixels, whether those side by side do alike.
+    where a read-out path does. Of filters, crosstalk and charge that repels charge, how alike
+    neighbours are at each level; of counted photons and amplifiers of greens, by how much levels
+    show them; of noise of whole lines, how alike samples along them are; of greens that differ,
+    what other colours share with them; of frames that move as a whole, whether their parts do so
+    alike. Of widths of codes, whether it is codes that never occur which make them differ; of lag,
+    whether darks are alike; of memory, whether samples are alike at other lags as well; of pixels,
+    whether those side by side do alike.
 
     Parameters
     ----------

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from analysis.mismatch import name
+from analysis.mismatch import choice
 from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.rowtold import AS_WELL
 
@@ -46,18 +46,18 @@ def test_a_stand_in_is_not_claimed_for_two_that_frames_show_alike(
     def denied(_state: Any, _lines: Any, best: Any, _others: Any) -> Denial | None:
         return Denial(0.0, why) if best.kind == "row_banding" else None
 
-    monkeypatch.setattr(name, "ranked", ranked)
-    monkeypatch.setattr(name, "unlike_frames", denied)
+    monkeypatch.setattr(choice, "ranked", ranked)
+    monkeypatch.setattr(choice, "unlike_frames", denied)
     for told in ("refuted", "displaced", "twin"):
-        monkeypatch.setattr(name, told, lambda *_: None)
+        monkeypatch.setattr(choice, told, lambda *_: None)
     for order in ("as_shown", "in_form", "plainest"):
-        monkeypatch.setattr(name, order, lambda *asked: list(asked[-1]))
-    search: Any = object.__new__(name.Search)
+        monkeypatch.setattr(choice, order, lambda *asked: list(asked[-1]))
+    search: Any = object.__new__(choice.Choice)
     search.__dict__.update(
         vocabulary=frozenset(one.kind for one in found), named=[], refused={}, settled=[], tied={},
         lines=None, memory=None, step=None, camera=None, setting=None,
     )  # fmt: skip
-    monkeypatch.setattr(name, "replicates_for", lambda *_: 2)
-    monkeypatch.setattr(name.Search, "_shown", lambda *_: -np.inf)
+    monkeypatch.setattr(choice, "replicates_for", lambda *_: 2)
+    monkeypatch.setattr(choice.Choice, "_shown", lambda *_: -np.inf)
     state: Any = SimpleNamespace(predictor=lambda _count: None)
     assert [one.kind for one in search._decided(state)] == [left]

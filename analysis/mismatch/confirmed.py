@@ -64,9 +64,8 @@ def proven(
     while True:
         final = final if judged else undenied(search, final)
         gained = _gained(search, final, trial)
-        named = search.named
-        why_small = ((one, small(final, one, gained.get(one.name))) for one in named)
-        least = next(((one, why) for one, why in why_small if why), None)
+        sizes = [(one, small(final, one, gained.get(one.name))) for one in search.named]
+        least = next((pair for pair in sizes if pair[1]), None)
         if least is not None:
             final = _without(search, final, least, judged=judged)
             continue

@@ -1,8 +1,10 @@
 """Who is asked whether the locked frames confirm an effect, and who has the last word."""
 
+from dataclasses import dataclass
 from types import SimpleNamespace as Stub
 from typing import Any
 
+import numpy as np
 import pytest
 
 from analysis.mismatch import confirmed
@@ -79,3 +81,56 @@ def test_odds_count_where_nothing_that_calls_for_the_effect_is_left(
     final: Any = Stub(mismatches=(Stub(statistic=left),))
     spikes: Any = Stub(kind="impulse")
     assert confirmed._believed(final, spikes, told).certain is certain
+
+
+@dataclass(frozen=True)
+class _Key:
+    statistic: str
+
+
+def _beside(left: str, why: dict[str, str], kind: str = "nonlinearity") -> Any:
+    """Return what is said of one effect beside row noise, that explains what `why` says."""
+    own = {
+        "nonlinearity": effect("nonlinearity", percent_full_scale=1.0),
+        "periodic_noise": effect("periodic_noise", amplitude_dn=1.0, frequency=(0.1, 0.2)),
+    }
+    some = [
+        Stub(name=name, kind=name, effect=one, proposal=Stub(effect=one))
+        for name, one in ((kind, own[kind]), ("row_noise", effect("row_noise", sigma_dn=1.0)))
+    ]
+    keys = ["level", "spectral_peak", "row_mean_variance"]
+    z = np.array([20.0, 12.0, 30.0])
+    states = [
+        Stub(
+            null=Stub(
+                keys=[_Key(key) for key in keys],
+                contrasts=Stub(matrix=np.zeros((0, 3))),
+                contrast_sd=np.ones(0),
+            ),
+            departures=departures,
+            chances=np.zeros(3),
+            mismatches=[Stub(statistic=key) for key in off],
+        )
+        for departures, off in ((z, keys), (z * [key == left for key in keys], [left]))
+    ]
+    changes = {
+        one.name: np.array([z[i] * (why.get(key) == one.name) for i, key in enumerate(keys)])
+        for one in some
+    }
+    search: Any = Stub(named=some)
+    first, last = states
+    return confirmed.idle(search, first, last, changes)
+
+
+def test_what_explains_nothing_goes_where_what_calls_for_it_is_left() -> None:
+    nothing = {"row_mean_variance": "row_noise", "level": "row_noise"}
+    found = _beside("level", nothing)
+    assert found is not None
+    assert (found[0].kind, found[1]) == ("nonlinearity", confirmed.IDLE)
+    assert _beside("spectral_peak", nothing) is None  # that calls for others
+    assert _beside("level", {**nothing, "spectral_peak": "nonlinearity"}) is None
+
+
+def test_lines_behind_a_stronger_one_may_explain_nothing() -> None:
+    nothing = {"row_mean_variance": "row_noise", "level": "row_noise"}
+    assert _beside("spectral_peak", nothing, "periodic_noise") is None

@@ -1,14 +1,18 @@
 """What a search found, confirmed or dropped: by all frames together, and by the locked ones."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
+import numpy as np
+from numpy.typing import NDArray
+
 from analysis.mismatch.allframes import shown_by_all
 from analysis.mismatch.candidates import CANDIDATES
+from analysis.mismatch.explain import because, changes, explained
 from analysis.mismatch.finding import Gain
 from analysis.mismatch.fixedforetold import FIXED_LINES
-from analysis.mismatch.instance import same_place
+from analysis.mismatch.instance import LINES, same_place
 from analysis.mismatch.judge import Judge
 from analysis.mismatch.model import side_by_side
 from analysis.mismatch.name import Search
@@ -17,6 +21,8 @@ from analysis.mismatch.state import State
 from analysis.mismatch.trial import Gained, Trial, denied
 from dsis.camera import Camera
 
+Array = NDArray[np.float64]
+IDLE = "explains nothing of what differed, and what calls for it is left"
 _DOUBTFUL = 30.0  # gain of log-likelihood below which locked frames may not confirm an effect
 
 
@@ -37,21 +43,58 @@ def denied_by_rest(search: Search, state: State, base: State) -> tuple[Named, st
     return judge.denied_by_rest(search.named, first)
 
 
+def idle(
+    search: Search, base: State, final: State, known: Mapping[str, Array] | None = None
+) -> tuple[Named, str] | None:
+    """Return an effect that explains nothing where what calls for it is left; None: there is none.
+
+    It fits beside something else, that no effect explains. Lines are shown by whole frames: where
+    spectra peak only the strongest is located. `known` is what each effect changes in the numbers
+    of `base`, if that was asked for already.
+    """
+    if not any(n.kind not in LINES and _calls_left(final, n) for n in search.named):
+        return None
+    if known is None:
+        known = changes(base, final, search.named, partial(search.without, final))
+    told = explained(base, final, {n.name: known[n.name] for n in search.named})
+    for one in search.named:
+        if one.kind not in LINES and _calls_left(final, one) and not because(told, one.name):
+            return one, IDLE
+    return None
+
+
 def undenied_by_all(
     search: Search, final: State, gains: dict[str, Gain], trial: Trial, whole: State
 ) -> tuple[State, dict[str, Gain], State | None]:
-    """Drop, one by one, what all frames of a small recording deny; see `denied_by_rest`.
+    """Drop, one by one, what all frames of a small recording deny; see `denied_by_rest`, `idle`.
 
     The last is the final state of all frames; None where nothing is named.
     """
     while search.named:
         everything = search.of_all(final.camera)
         denied = denied_by_rest(search, everything, whole)
+        denied = denied or idle(search, search.rebased(whole), everything)
         if denied is None:
             return final, gains, everything
         final = search.fitted_anew(search.further(search.drop(final, *denied)))
         final, gains = proven(search, search.settle(final), trial, judged=False)
     return final, gains, None
+
+
+def undenied_by_many(search: Search, final: State, whole: State) -> tuple[State, dict[str, Array]]:
+    """Drop, one by one, what all frames of a large recording deny, as some did not.
+
+    Also returned is what each effect left changes in the numbers of `whole`: see `idle`.
+    """
+    final = undenied(search, final)
+    while (denied := denied_by_rest(search, final, whole)) is not None:
+        final = search.drop(final, *denied)
+    while True:
+        known = changes(whole, final, search.named, partial(search.without, final))
+        nothing = idle(search, whole, final, known)
+        if nothing is None:
+            return final, known
+        final = search.drop(final, *nothing)
 
 
 def proven(

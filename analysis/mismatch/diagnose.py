@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from analysis.mismatch.apart import wrong_spread
 from analysis.mismatch.candidates import CANDIDATES
-from analysis.mismatch.confirmed import denied_by_rest, proven, undenied, undenied_by_all
+from analysis.mismatch.confirmed import proven, undenied_by_all, undenied_by_many
 from analysis.mismatch.evidence import Evidence
 from analysis.mismatch.explain import because, changes, explained
 from analysis.mismatch.finding import (
@@ -151,10 +151,7 @@ def _found(
     known: dict[str, Array] = {}
     if large:  # simulations of large recordings tell more, and cost more
         search.setting = replace(setting, nulls=setting.drafts)
-        final = undenied(search, final)  # all frames may deny what some showed
-        while (denied := denied_by_rest(search, final, whole)) is not None:
-            final = search.drop(final, *denied)
-        known = changes(whole, final, search.named, partial(search.without, final))
+        final, known = undenied_by_many(search, final, whole)
     final, gains = proven(search, search.settle(final), trial, judged=large)
     everything: State | None = None
     if not large:

@@ -88,14 +88,14 @@ class _Key:
     statistic: str
 
 
-def _beside(left: str, why: dict[str, str], kind: str = "nonlinearity") -> Any:
+def _beside(left: str, why: dict[str, str], kind: str = "nonlinearity", gain: float = 15.0) -> Any:
     """Return what is said of one effect beside row noise, that explains what `why` says."""
     own = {
         "nonlinearity": effect("nonlinearity", percent_full_scale=1.0),
         "periodic_noise": effect("periodic_noise", amplitude_dn=1.0, frequency=(0.1, 0.2)),
     }
     some = [
-        Stub(name=name, kind=name, effect=one, proposal=Stub(effect=one))
+        Stub(name=name, kind=name, effect=one, proposal=Stub(effect=one), gain=gain)
         for name, one in ((kind, own[kind]), ("row_noise", effect("row_noise", sigma_dn=1.0)))
     ]
     keys = ["level", "spectral_peak", "row_mean_variance"]
@@ -128,6 +128,7 @@ def test_what_explains_nothing_goes_where_what_calls_for_it_is_left() -> None:
     assert found is not None
     assert (found[0].kind, found[1]) == ("nonlinearity", confirmed.IDLE)
     assert _beside("spectral_peak", nothing) is None  # that calls for others
+    assert _beside("level", nothing, gain=100.0) is None
     assert _beside("level", {**nothing, "spectral_peak": "nonlinearity"}) is None
 
 

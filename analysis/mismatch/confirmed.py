@@ -48,19 +48,19 @@ def idle(
 ) -> tuple[Named, str] | None:
     """Return an effect that explains nothing where what calls for it is left; None: there is none.
 
-    It fits beside something else, that no effect explains. Lines are shown by whole frames: where
-    spectra peak only the strongest is located. `known` is what each effect changes in the numbers
-    of `base`, if that was asked for already.
+    It gained little, and fits beside something else that no effect explains. Lines are shown by
+    whole frames: where spectra peak only the strongest is located. `known` is what each effect
+    changes in the numbers of `base`, if that was asked for already.
     """
-    if not any(n.kind not in LINES and _calls_left(final, n) for n in search.named):
+    little = [n for n in search.named if n.gain < _DOUBTFUL and n.kind not in LINES]
+    asked = [n for n in little if _calls_left(final, n)]
+    if not asked:
         return None
     if known is None:
         known = changes(base, final, search.named, partial(search.without, final))
     told = explained(base, final, {n.name: known[n.name] for n in search.named})
-    for one in search.named:
-        if one.kind not in LINES and _calls_left(final, one) and not because(told, one.name):
-            return one, IDLE
-    return None
+    nothing = next((n for n in asked if not because(told, n.name)), None)
+    return None if nothing is None else (nothing, IDLE)
 
 
 def undenied_by_all(

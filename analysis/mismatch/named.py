@@ -50,6 +50,10 @@ class Named:
         Log-likelihood of the bank's numbers that it is worth beside the others.
     rivals
         Other effects tried in its place: kind, and by how much they were worse.
+    switch_dn
+        Of a second read-out segment.
+    plain
+        The effect with its errors where a shape that adds nothing clear is none: see `settle`.
     """
 
     kind: str
@@ -58,6 +62,7 @@ class Named:
     gain: float
     rivals: tuple[tuple[str, float], ...]
     switch_dn: float = float("nan")
+    plain: tuple[Effect, dict[str, float]] | None = None
 
     @property
     def effect(self) -> Effect | None:
@@ -93,10 +98,13 @@ def unclear(named: Named, *, at_random: bool = False) -> str:
 
     Asked of what draws nothing at random, whose size is known as a mean is; of the rest only
     where `at_random`, and only whether the interval of 95 % reaches none. Where an error is
-    unknown, or is that of a shape which is sure itself, nothing is said.
+    unknown, or is that of a shape which is sure itself, nothing is said. What is sure of a `plain`
+    shape is there, whatever else its shape may be.
     """
     effect = named.effect
     if named.proposal is None or effect is None or effect.draws > at_random:
+        return ""
+    if named.plain is not None and not unclear(_plain(named, *named.plain), at_random=at_random):
         return ""
     clear = _APART if effect.draws else _CLEAR
     free = named.proposal.free
@@ -114,6 +122,23 @@ def unclear(named: Named, *, at_random: bool = False) -> str:
         for name, (value, error) in sizes.items()
     )
     return f"its size is less than {clear:g} of its standard errors ({said})"
+
+
+def beside_plain(named: Named, effect: Effect, errors: dict[str, float]) -> Named:
+    """Return an effect named with what it is where its shape stays, unless that was all."""
+    proposal = named.proposal
+    alike = proposal is None or errors.keys() == set(proposal.free)
+    return replace(named, plain=None if alike else (effect, errors))
+
+
+def _plain(named: Named, effect: Effect, errors: dict[str, float]) -> Named:
+    """Return an effect of a plain shape: of its parameters those are free that have an error."""
+    proposal = (
+        None
+        if named.proposal is None
+        else replace(named.proposal, effect=effect, free=tuple(errors))
+    )
+    return replace(named, proposal=proposal, errors=errors, plain=None)
 
 
 def _sure(named: Named, effect: Effect, shape: str) -> bool:

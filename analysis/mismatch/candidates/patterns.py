@@ -99,6 +99,12 @@ def of_any_shape(proposal: Proposal) -> Proposal:
     )
 
 
+def of_plain_shape(proposal: Proposal) -> Proposal:
+    """Return a fall of light whose shape between centre and corner stays as it is."""
+    free = tuple(name for name in proposal.free if name != _RING)
+    return proposal if free == proposal.free else replace(proposal, free=free)
+
+
 def _fitted(clues: Clues, names: Sequence[str]) -> tuple[dict[str, float], set[str]]:
     """Return what the gain has of each surface, per cent, and which are clear.
 

@@ -22,6 +22,8 @@ FLICKER = registry()["flicker"](sigma_percent=0.12)
 DRIFT = registry()["black_level_drift"](sigma_dn=0.4)
 # Its power at its frequency is a^2 / 4 of 3072 pixels: four times the noise's in darks, 20 DN^2.
 WAVE = registry()["periodic_noise"](amplitude_dn=0.32, frequency=(0.2, 0.3))
+# 30 pixels, whose jumps are three times the noise of darks.
+JUMPS = registry()["rts"](pixel_fraction=0.01, amplitude_dn=14.0)
 BANDS = registry()["line_flicker"](depth_percent=0.2, cycles_per_frame=5.3)
 
 
@@ -62,6 +64,7 @@ def shown(
         (DRIFT, ("sigma_dn",)),
         (WAVE, ()),
         (BANDS, ("depth_percent",)),
+        (JUMPS, ("pixel_fraction", "amplitude_dn")),
     ],
 )
 @pytest.mark.parametrize("there", [True, False])
@@ -85,6 +88,13 @@ def test_a_wave_that_the_camera_has_already_is_not_shown_again(own: Effect, aske
 
 def test_what_is_another_is_not_shown() -> None:
     assert not shown(DRIFT, FLICKER, ("sigma_percent",))
+    noisy = registry()["read_noise_spread"](log_sigma=0.3)
+    assert not shown(noisy, JUMPS, ("pixel_fraction", "amplitude_dn"))
+
+
+def test_jumps_that_the_camera_has_already_are_not_shown_again() -> None:
+    few = registry()["rts"](pixel_fraction=0.001, amplitude_dn=14.0)
+    assert not shown(JUMPS, few, ("pixel_fraction", "amplitude_dn"), own=(JUMPS,))
 
 
 def test_of_large_recordings_locked_frames_tell_enough() -> None:

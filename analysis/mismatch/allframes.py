@@ -4,12 +4,14 @@ What draws one number a frame shows as many in the locked frames as these are: t
 where it may be seen in one exposure only. The odds of locked frames alone then scatter by more than
 they are worth. Those of all frames are their product with those of the frames before: asked for is
 what takes an effect into a search, once the numbers that were chosen are paid for.
+
+Few pixels that jump are as rarely seen: most stay where they are in two frames.
 """
 
 from analysis.mismatch.instance import LINES, same_place
 from analysis.mismatch.name import Search
 from analysis.mismatch.named import Named
-from analysis.mismatch.rank import SURE_GAIN, replicates_for
+from analysis.mismatch.rank import SURE_GAIN, TOLD_APART, replicates_for
 from analysis.mismatch.resolved import gained
 from analysis.mismatch.state import State
 from analysis.mismatch.trial import Trial
@@ -17,6 +19,7 @@ from dsis.camera import Camera
 from dsis.effects import Effect
 
 _OF_FRAMES = frozenset({"frame_variance"})
+_JUMPS = "rts"
 _ONE_PHASE = LINES | {"line_flicker"}
 
 
@@ -26,7 +29,11 @@ def shown_by_all(search: Search, final: State, named: Named, without: Camera, tr
     `without` is the camera without it.
     """
     own = named.proposal
-    if own is None or search.whole is None or not once_a_frame(own.effect):
+    if own is None or search.whole is None:
+        return False
+    if own.effect.kind == _JUMPS:
+        return _jumps_shown(without, trial)
+    if not once_a_frame(own.effect):
         return False
     alone = not any(same_place(own.effect, one, search.whole.layout) for one in without.effect)
     # Of its amplitude; its place is paid for.
@@ -38,6 +45,14 @@ def shown_by_all(search: Search, final: State, named: Named, without: Camera, tr
     bare = State.of(search.whole, without, search.step, near=state)
     replicates = replicates_for(search.setting, [own.effect])
     return gained(state, bare, own.effect, replicates) - own.price >= SURE_GAIN
+
+
+def _jumps_shown(without: Camera, trial: Trial) -> bool:
+    """Return whether all frames show pixels that jump, rather than are noisy otherwise."""
+    seen = trial.lines.telegraph
+    if seen is None or any(one.kind == _JUMPS for one in without.effect):
+        return False
+    return seen.gain >= SURE_GAIN and seen.jumping > TOLD_APART
 
 
 def once_a_frame(effect: Effect) -> bool:

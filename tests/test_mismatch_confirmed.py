@@ -25,8 +25,19 @@ def _asked(
 ) -> Gained:
     """Return what is said of bands of light by pixels, by other frames' phases and by all."""
     monkeypatch.setattr(confirmed, "shown_by_all", lambda *_: by_all)
-    one = Stub(name="line_flicker", kind="line_flicker", gain=10.0, proposal=Stub(effect=BANDS))
-    search: Any = Stub(named=[one], setting=Stub(jobs=1), fitted_without=lambda *_: Stub(effect=()))
+    one = Stub(
+        name="line_flicker",
+        kind="line_flicker",
+        gain=10.0,
+        effect=BANDS,
+        proposal=Stub(effect=BANDS),
+    )
+    search: Any = Stub(
+        named=[one],
+        setting=Stub(jobs=1),
+        whole=None,
+        fitted_without=lambda *_: Stub(effect=()),
+    )
     trial: Any = Stub(
         gains=lambda _, without: dict.fromkeys(without, pixels),
         foretold=lambda _: foretold,

@@ -17,6 +17,7 @@ from analysis.mismatch.judge import Judge
 from analysis.mismatch.model import side_by_side
 from analysis.mismatch.name import Search
 from analysis.mismatch.named import Named, unclear
+from analysis.mismatch.relit import relit
 from analysis.mismatch.state import State
 from analysis.mismatch.trial import Gained, Trial, denied
 from dsis.camera import Camera
@@ -164,8 +165,8 @@ def _gained(search: Search, final: State, trial: Trial) -> dict[str, Gained]:
     """Return the gains of all effects; of those that chance could feign, where one of them fails.
 
     What gained little when it was taken in is asked first: the others change with it. Where the
-    locked frames gain more than their error by an effect, and leave it open, all frames may show
-    it.
+    locked frames leave open an effect that moves whole frames, each frame is judged by all others;
+    of what else they gain by, if within their error, all frames may show it.
     """
     found: dict[str, Gained] = {}
     little = [named for named in search.named if named.gain < _DOUBTFUL]
@@ -177,8 +178,9 @@ def _gained(search: Search, final: State, trial: Trial) -> dict[str, Gained]:
             if one.certain:
                 continue
             other = _foretold(search, named, cameras[named.name], trial, one)
-            if other.certain:
-                told[named.name] = other
+            moved = _frame_by_frame(search, final, named, cameras[named.name], trial)
+            if other.certain or moved is not None:
+                told[named.name] = other if moved is None else moved
             elif max(one.gain.nats_per_frame, other.gain.nats_per_frame) > 0 and shown_by_all(
                 search, final, named, cameras[named.name], trial
             ):
@@ -225,6 +227,24 @@ def _foretold(search: Search, named: Named, without: Camera, trial: Trial, told:
         bare = State.of(search.whole, without, search.step, near=search.of_whole)
         return trial.fixed_foretold(bare, effect) or told
     return trial.foretold(effect) or told
+
+
+def _frame_by_frame(
+    search: Search, final: State, named: Named, without: Camera, trial: Trial
+) -> Gained | None:
+    """Return what frames of a small recording gain, each told by the others; None: nothing sure.
+
+    Nothing is said where what calls for the effect is left, nor beside one of its kind.
+    """
+    effect = named.effect
+    if effect is None or search.whole is None or _calls_left(final, named):
+        return None
+    if any(one.kind == effect.kind for one in without.effect):
+        return None
+    told = trial.frame_by_frame(
+        relit(final.calibrated.model, without, final.setting.layout), effect
+    )
+    return told if told is not None and told.certain else None
 
 
 def _fitted_without(search: Search, final: State, some: Sequence[Named]) -> dict[str, Camera]:

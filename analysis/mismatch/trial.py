@@ -10,15 +10,16 @@ from numpy.typing import NDArray
 from analysis.mismatch.bandgain import foretold
 from analysis.mismatch.finding import Change, Gain, Proof
 from analysis.mismatch.fixedforetold import fixed_foretold
+from analysis.mismatch.framebyframe import SIZES, frame_by_frame
 from analysis.mismatch.given import Ratio
 from analysis.mismatch.heldnumbers import HeldNumbers
 from analysis.mismatch.instance import frequency_of
 from analysis.mismatch.lineforetold import line_foretold
-from analysis.mismatch.model import each, simulate
+from analysis.mismatch.model import Model, each, simulate
 from analysis.mismatch.null import null_of
 from analysis.mismatch.observe import observe
 from analysis.mismatch.phase import WholeFrames
-from analysis.mismatch.prove.gain import heldout_gain, telling
+from analysis.mismatch.prove.gain import gain_of, heldout_gain, telling
 from analysis.mismatch.prove.gap import gap_closed
 from analysis.mismatch.prove.held import Held, hold
 from analysis.mismatch.prove.likelihood import Loglik
@@ -180,6 +181,24 @@ class Trial:
         found = _of_pixels(_per_frame(told, frames), frames)
         shown = told.nats > _BARE and float(odds.all.sum()) - 1 >= SURE_GAIN
         return replace(found, certain=shown and float(odds.own.sum()) >= TOLD_APART)
+
+    def frame_by_frame(self, bare: Model, effect: Effect) -> Gained | None:
+        """Return what each frame gains by an effect that moves whole frames, told by the others.
+
+        None: it is another, or nothing is told. `bare` is the model without it. All frames had a
+        say in what is looked for: chance is ruled out at the odds that take an effect into a
+        search, by frames of which no single one decides.
+        """
+        if effect.kind not in SIZES:
+            return None
+        layout, frames_of = self.lines.layout, self.lines.frames_of
+        told = frame_by_frame(layout, frames_of, bare, effect, self.seed)
+        frames = sum(own.size for own in told.gains)
+        if not frames:
+            return None
+        gain = gain_of(told.gains, np.zeros(0), seed=self.seed)
+        sure = gain.nats_per_frame * frames >= SURE_GAIN and told.least >= TOLD_APART
+        return Gained(gain, certain=gain.ci95[0] > 0 and sure)
 
     def gains(self, final: State, without: Mapping[str, Camera]) -> dict[str, Gained]:
         """Return what the final model gains over cameras without an effect, by effect."""

@@ -29,14 +29,30 @@ def heldout_gain(before: Loglik, after: Loglik, *, seed: int) -> Gain:
     Only exposures that tell count, see `telling`.
     """
     names = telling(before, after)
-    strata = _strata([after.frames[name] - before.frames[name] for name in names])
-    frames = sum(gains.size for gains in strata)
-    strata.append(np.array([after.levels[name] - before.levels[name] for name in names]))
-    mean = float(sum(float(gains.sum()) for gains in strata) / frames)
+    levels = np.array([after.levels[name] - before.levels[name] for name in names])
+    return gain_of([after.frames[name] - before.frames[name] for name in names], levels, seed=seed)
+
+
+def gain_of(gains: list[Array], levels: Array, *, seed: int) -> Gain:
+    """Return the mean gain per frame and its interval, see `heldout_gain`.
+
+    Parameters
+    ----------
+    gains
+        Of the frames of each exposure: (frame,), nats.
+    levels
+        Of the exposures' levels: (exposure,), or none.
+    seed
+        Of the bootstrap.
+    """
+    strata = _strata(gains)
+    frames = sum(own.size for own in strata)
+    strata.append(levels)
+    mean = float(sum(float(own.sum()) for own in strata) / frames)
     if frames < 2:
         return Gain(mean, (-np.inf, np.inf))
     rng = np.random.default_rng([seed, frames])
-    drawn = np.sum([gains.size * _drawn_means(gains, rng) for gains in strata], 0) / frames
+    drawn = np.sum([own.size * _drawn_means(own, rng) for own in strata], 0) / frames
     low, high = (float(q) for q in np.percentile(drawn, [2.5, 97.5]))
     return Gain(mean, (low, high))
 

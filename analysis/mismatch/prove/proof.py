@@ -2,12 +2,13 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.finding import Change, Gain
-from analysis.mismatch.model import in_threads
+from analysis.mismatch.model import each
 from analysis.mismatch.prove.classifier import Auc, auc_of
 from analysis.mismatch.prove.gain import heldout_gain
 from analysis.mismatch.prove.held import MOST_SEEN, Held, hold
@@ -84,7 +85,7 @@ def prove(
     seed
         Fixes every number.
     jobs
-        Threads: the two models need no more than two.
+        The two models need no more than two: processes where there are, see `each`.
 
     The result does not depend on `jobs`. A large sensor is seen through a window at its centre, and
     gains are those of the window; the classifier's is larger, most often the whole sensor.
@@ -117,15 +118,9 @@ def prove_held(
     `seen` are those that the classifier looks at; None: the same. `known` is the log-likelihood
     under `after`; None: it was not asked for yet.
     """
-
-    def judged(camera: Camera) -> tuple[Loglik, Auc | None]:
-        told = known if camera == after else None
-        return (
-            told or loglik_of(held, camera, signals, seed=seed),
-            auc_of(held if seen is None else seen, camera, signals, seed=seed),
-        )
-
-    made = in_threads(judged, (before,) if after == before else (before, after), jobs)
+    judged = partial(_judged, held, held if seen is None else seen, signals, seed)
+    cameras = [(after, known)] if after == before else [(before, None), (after, known)]
+    made = each(judged, cameras, jobs)
     (one, told), (two, told_after) = made[0], made[-1]
     change = Change(told.value, told_after.value) if told and told_after else None
     return ProofNumbers(
@@ -139,6 +134,15 @@ def prove_held(
         held.left_out,
         held.shape,
     )
+
+
+def _judged(
+    held: Held, seen: Held, signals: Signals, seed: int, which: tuple[Camera, Loglik | None]
+) -> tuple[Loglik, Auc | None]:
+    """Return what locked frames say of a camera; last its log-likelihood, if that is known."""
+    camera, known = which
+    told = loglik_of(held, camera, signals, seed=seed) if known is None else known
+    return told, auc_of(seen, camera, signals, seed=seed)
 
 
 def loglik_of(held: Held, camera: Camera, signals: Signals, *, seed: int) -> Loglik:

@@ -3,6 +3,7 @@
 from types import SimpleNamespace as Stub
 from typing import Any
 
+import numpy as np
 import pytest
 
 import analysis.mismatch.fitted as fitted_module
@@ -192,6 +193,18 @@ def test_what_draws_nothing_must_exceed_its_own_errors(error: float, clear: bool
     assert unclear(few) == ""  # of few frames, and certain
 
 
+@pytest.mark.parametrize(("error", "clear"), [(0.1, True), (0.49, True), (0.65, False)])
+def test_a_size_whose_logarithm_is_fitted_is_told_by_errors_of_that(
+    error: float, clear: bool
+) -> None:
+    """1.96 errors reach to the farther end of its interval: from 1 to e^(1.96 / z), z of them."""
+    share = registry()["crosstalk"](fraction=0.01)
+    errors = {"fraction": 0.01 * np.expm1(1.96 * error / 1.5) / 1.96}
+    named = Named("crosstalk", Proposal(share, ("fraction",)), errors, 9.0, ())
+    assert (unclear(named) == "") == (1.5 / error > 3)
+    assert clear == (1.5 / error > 3)
+
+
 def test_a_bend_at_full_scale_is_known_no_better_than_its_exponent() -> None:
     bend = registry()["nonlinearity"](percent_full_scale=0.4, exponent=4.0)
     errors = {"percent_full_scale": 0.2, "exponent": 1.0}
@@ -209,11 +222,11 @@ def test_a_bend_at_full_scale_is_known_no_better_than_its_exponent() -> None:
 def test_what_draws_must_exceed_its_errors_where_what_calls_for_it_is_left(left: bool) -> None:
     """A camera averages frames: pixels that jump fit a little of it, and frames gain by that."""
     jumps = registry()["rts"](pixel_fraction=0.16, amplitude_dn=0.7, switch_probability=0.1)
-    errors = {"pixel_fraction": 0.61, "amplitude_dn": 0.47}
+    errors = {"pixel_fraction": 1.1, "amplitude_dn": 0.7}
     named = Named("rts", Proposal(jumps, tuple(errors)), errors, 90.0, ())
     surely: Any = Stub(certain=True, gain=Stub(nats_per_frame=1.6, ci95=(1.3, 1.9)))
     state: Any = Stub(mismatches=[Stub(statistic="frame_correlation")] if left else [])
-    assert ("pixel fraction 0.16 ± 0.61" in small(state, named, surely)) == left
+    assert ("pixel fraction 0.16 ± 1.1" in small(state, named, surely)) == left
     sure = Named("rts", Proposal(jumps, tuple(errors)), {**errors, "amplitude_dn": 0.1}, 90.0, ())
     assert small(state, sure, surely) == ""
 

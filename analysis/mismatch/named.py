@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import inf, isfinite
+from math import inf, isfinite, log1p
 
 from analysis.mismatch.candidates import Proposal
 from analysis.mismatch.instance import LINES, instance
@@ -113,8 +113,10 @@ def unclear(named: Named, *, at_random: bool = False) -> str:
         for name in free
         if name not in SHAPES and not _sure(named, effect, _FAR_FROM_LEVELS.get(name, ""))
     }
+    signed = named.proposal.signed
     if not sizes or any(
-        not isfinite(error) or abs(value) > clear * error for value, error in sizes.values()
+        not isfinite(error) or _errors_of(value, error, signed=name in signed) > clear
+        for name, (value, error) in sizes.items()
     ):
         return ""
     said = ", ".join(
@@ -139,6 +141,18 @@ def _plain(named: Named, effect: Effect, errors: dict[str, float]) -> Named:
         else replace(named.proposal, effect=effect, free=tuple(errors))
     )
     return replace(named, proposal=proposal, errors=errors, plain=None)
+
+
+def _errors_of(value: float, error: float, *, signed: bool) -> float:
+    """Return how many standard errors a size is from none.
+
+    Of its logarithm, where that is fitted: the error reaches to the farther end of its interval.
+    """
+    if not error > 0:
+        return inf if value else 0.0
+    if signed:
+        return abs(value) / error
+    return _APART / log1p(_APART * error / abs(value)) if value else 0.0
 
 
 def _sure(named: Named, effect: Effect, shape: str) -> bool:

@@ -46,8 +46,9 @@ def settled(
     """Return effects and standard errors of their free parameters.
 
     1.96 errors are half the 95 % interval: by Student's law, for the variance is known from few
-    simulations, and of a parameter whose logarithm is fitted as long as its own interval. Numbers
-    that tell a parameter and are off by far more than chance make its error larger, see `_misfit`.
+    simulations, and of a parameter whose logarithm is fitted to the farther end of its own
+    interval. Numbers that tell a parameter and are off by far more than chance make its error
+    larger, see `_misfit`.
 
     Parameters
     ----------
@@ -86,7 +87,7 @@ def settled(
         corrected = effects
     for (i, name, signed), half in zip(free, reach, strict=True):
         value = abs(float(getattr(corrected[i], name)))
-        far = value * np.sinh(half) if half < _FARTHEST else np.inf
+        far = value * np.expm1(half) if half < _FARTHEST else np.inf
         own = half if signed else far
         form = value * form_of(corrected[i], name, state.setting.layout)
         errors[i][name] = float(np.hypot(own / _NORMAL, form))

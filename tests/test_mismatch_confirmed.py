@@ -1,5 +1,6 @@
 """Who is asked whether the locked frames confirm an effect, and who has the last word."""
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from types import SimpleNamespace as Stub
 from typing import Any
@@ -99,30 +100,44 @@ class _Key:
     statistic: str
 
 
-def _beside(left: str, why: dict[str, str], kind: str = "nonlinearity", gain: float = 15.0) -> Any:
+def _beside(
+    left: Collection[str],
+    why: dict[str, str],
+    kind: str = "nonlinearity",
+    gain: float = 15.0,
+    *,
+    measured: bool = False,
+) -> Any:
     """Return what is said of one effect beside row noise, that explains what `why` says."""
     own = {
         "nonlinearity": effect("nonlinearity", percent_full_scale=1.0),
         "periodic_noise": effect("periodic_noise", amplitude_dn=1.0, frequency=(0.1, 0.2)),
     }
     some = [
-        Stub(name=name, kind=name, effect=one, proposal=Stub(effect=one), gain=gain)
+        Stub(
+            name=name,
+            kind=name,
+            effect=one,
+            proposal=Stub(effect=one),
+            gain=gain,
+            measured=measured,
+        )
         for name, one in ((kind, own[kind]), ("row_noise", effect("row_noise", sigma_dn=1.0)))
     ]
-    keys = ["level", "spectral_peak", "row_mean_variance"]
-    z = np.array([20.0, 12.0, 30.0])
+    keys = ["level", "pixel_variance", "spectral_peak", "row_mean_variance"]
+    z = np.array([20.0, 9.0, 12.0, 30.0])
     states = [
         Stub(
             null=Stub(
                 keys=[_Key(key) for key in keys],
-                contrasts=Stub(matrix=np.zeros((0, 3))),
+                contrasts=Stub(matrix=np.zeros((0, 4))),
                 contrast_sd=np.ones(0),
             ),
             departures=departures,
-            chances=np.zeros(3),
+            chances=np.zeros(4),
             mismatches=[Stub(statistic=key) for key in off],
         )
-        for departures, off in ((z, keys), (z * [key == left for key in keys], [left]))
+        for departures, off in ((z, keys), (z * [key in left for key in keys], left))
     ]
     changes = {
         one.name: np.array([z[i] * (why.get(key) == one.name) for i, key in enumerate(keys)])
@@ -133,16 +148,23 @@ def _beside(left: str, why: dict[str, str], kind: str = "nonlinearity", gain: fl
     return confirmed.idle(search, first, last, changes)
 
 
-def test_what_explains_nothing_goes_where_what_calls_for_it_is_left() -> None:
+def test_what_explains_nothing_goes_where_all_that_calls_for_it_is_left() -> None:
     nothing = {"row_mean_variance": "row_noise", "level": "row_noise"}
-    found = _beside("level", nothing)
+    both = ["level", "pixel_variance"]
+    found = _beside(both, nothing)
     assert found is not None
     assert (found[0].kind, found[1]) == ("nonlinearity", confirmed.IDLE)
-    assert _beside("spectral_peak", nothing) is None  # that calls for others
-    assert _beside("level", nothing, gain=100.0) is None
-    assert _beside("level", {**nothing, "spectral_peak": "nonlinearity"}) is None
+    assert _beside(["spectral_peak"], nothing) is None  # that calls for others
+    assert _beside(both, nothing, gain=100.0) is None
+    assert _beside(both, nothing, measured=True) is None  # whole frames show it
+    assert _beside(both, {**nothing, "spectral_peak": "nonlinearity"}) is None
+
+
+def test_what_calls_for_an_effect_may_be_explained_with_a_stronger_one() -> None:
+    nothing = {"row_mean_variance": "row_noise", "pixel_variance": "row_noise"}
+    assert _beside(["level"], nothing) is None
 
 
 def test_lines_behind_a_stronger_one_may_explain_nothing() -> None:
     nothing = {"row_mean_variance": "row_noise", "level": "row_noise"}
-    assert _beside("spectral_peak", nothing, "periodic_noise") is None
+    assert _beside(["spectral_peak"], nothing, "periodic_noise") is None

@@ -1,18 +1,62 @@
 """Whether light falls to the corners at all, where the shape of its fall is not clear."""
 
-from collections.abc import Sequence
 from types import SimpleNamespace as Stub
 from typing import Any
 
+import numpy as np
 import pytest
 
-from analysis.mismatch import fitted
 from analysis.mismatch.candidates import Proposal
-from analysis.mismatch.named import Named, beside_plain, unclear
-from dsis.effects import Effect
+from analysis.mismatch.named import Named, unclear
+from analysis.mismatch.polish import Free
+from analysis.mismatch.uncertainty import _plain
 from exposing import effect
 
-RING = "ring_percent"
+NORMAL = 1.96
+FREE: list[Free] = [(0, "falloff_percent", False), (0, "ring_percent", True)]
+LAYOUT: Any = Stub()
+
+
+def _fitted(ring: float) -> tuple[float, float, np.ndarray, float, float]:
+    """Return logarithm of a fall and ring by least squares, their covariance, and the fall alone.
+
+    Last the error of that. Both shapes are much alike.
+    """
+    rng = np.random.default_rng(3)
+    x = rng.normal(size=(200, 2)) @ np.array([[1.0, 0.6], [0.0, 0.3]])
+    y = x @ [np.log(0.06), ring] + 0.5 * rng.normal(size=200)
+    covariance = 0.25 * np.linalg.inv(x.T @ x)
+    fall, bend = np.linalg.solve(x.T @ x, x.T @ y)
+    (alone,), *_ = np.linalg.lstsq(x[:, :1], y, rcond=None)
+    return fall, bend, covariance, alone, 0.5 / np.sqrt((x[:, 0] ** 2).sum())
+
+
+def test_without_a_ring_a_fall_is_what_a_fit_of_it_alone_finds() -> None:
+    fall, ring, covariance, alone, error = _fitted(0.0)
+    both = effect("shading", falloff_percent=np.exp(fall), ring_percent=ring)
+    found = _plain(both, 0, FREE, NORMAL**2 * covariance, LAYOUT)
+    assert found is not None
+    plain, errors = found
+    value = float(np.exp(alone))
+    expected = effect("shading", falloff_percent=value).model_dump()
+    assert plain.model_dump() == {**expected, "falloff_percent": pytest.approx(value, rel=1e-9)}
+    farther = value * np.expm1(NORMAL * error) / NORMAL
+    assert errors == {"falloff_percent": pytest.approx(farther, rel=1e-9)}
+
+
+def test_a_ring_that_is_clear_is_there() -> None:
+    fall, ring, covariance, _, _ = _fitted(3.0)
+    both = effect("shading", falloff_percent=np.exp(fall), ring_percent=ring)
+    assert _plain(both, 0, FREE, NORMAL**2 * covariance, LAYOUT) is None
+
+
+def test_without_a_ring_that_is_fitted_nothing_is_said() -> None:
+    alone = effect("shading", falloff_percent=0.06)
+    assert _plain(alone, 0, FREE[:1], np.eye(1), LAYOUT) is None
+    assert (
+        _plain(effect("row_noise", sigma_dn=1.0), 0, [(0, "sigma_dn", False)], np.eye(1), LAYOUT)
+        is None
+    )
 
 
 @pytest.mark.parametrize(("alone", "clear"), [(0.01, True), (0.03, False)])
@@ -21,42 +65,8 @@ def test_a_fall_is_there_where_that_of_a_plain_shape_is_sure(alone: float, clear
     fall = effect("shading", falloff_percent=0.06, ring_percent=0.01)
     errors = {"falloff_percent": 0.031, "ring_percent": 0.05}
     proposal = Proposal(fall, tuple(errors), frozenset({"ring_percent"}))
-    named = Named("shading", proposal, errors, 17.0, ())
-    assert "falloff percent 0.06 ± 0.031" in unclear(named)
-    plain = effect("shading", falloff_percent=0.056)
-    beside = beside_plain(named, plain, {"falloff_percent": alone})
-    assert (unclear(beside) == "") == clear
-    assert beside_plain(named, fall, errors).plain is None  # no shape that was held
-
-
-def test_the_plain_fall_is_asked_for_beside_the_users_sizes(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """The user's own sizes come first, and all are fitted together."""
-    users = Proposal(effect("row_noise", sigma_dn=2.0), ("sigma_dn",))
-    fall = Proposal(effect("shading", falloff_percent=0.06), ("falloff_percent", RING))
-    other = Proposal(effect("crosstalk", fraction=0.01), ("fraction",))
-    asked: list[Sequence[Proposal]] = []
-
-    def settled(
-        _state: object, _bare: object, some: Sequence[Proposal]
-    ) -> tuple[tuple[Effect, ...], tuple[dict[str, float], ...]]:
-        asked.append(some)
-        return tuple(p.effect for p in some), tuple(dict.fromkeys(p.free, 0.01) for p in some)
-
-    monkeypatch.setattr(fitted, "settled", settled)
-    search: Any = Stub(_parts=lambda _: ("camera", [users, other, fall]))
-    path = Named("dual_gain", None, {}, 90.0, ())
-    shaped = [
-        path,
-        *(Named(p.effect.kind, p, dict.fromkeys(p.free, 0.05), 17.0, ()) for p in (other, fall)),
-    ]
-    one, beside, light = fitted.Fitted._with_plain(search, "state", shaped)  # type: ignore[arg-type]
-    (some,) = asked
-    assert [p.free for p in some] == [("sigma_dn",), ("fraction",), ("falloff_percent",)]
-    assert (one.plain, beside.plain) == (None, None)
-    assert light.plain == (fall.effect, {"falloff_percent": 0.01})
-    assert unclear(light) == ""
-    # Where no shape is free nothing is asked for.
-    assert fitted.Fitted._with_plain(search, "state", shaped[:2]) == shaped[:2]  # type: ignore[arg-type]
-    assert len(asked) == 1
+    unknown = Named("shading", proposal, errors, 17.0, ())
+    assert "falloff percent 0.06 ± 0.031" in unclear(unknown)
+    plain = effect("shading", falloff_percent=0.056), {"falloff_percent": alone}
+    named = Named("shading", proposal, errors, 17.0, (), plain=plain)
+    assert (unclear(named) == "") == clear

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from math import isfinite
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from analysis.mismatch.candidates import CANDIDATES
 from analysis.mismatch.explain import because, changes, explained
 from analysis.mismatch.finding import Gain
 from analysis.mismatch.fixedforetold import FIXED_LINES
+from analysis.mismatch.framebyframe import SIZES
 from analysis.mismatch.instance import LINES, same_place
 from analysis.mismatch.judge import Judge
 from analysis.mismatch.model import side_by_side
@@ -23,7 +25,7 @@ from analysis.mismatch.trial import Gained, Trial, denied
 from dsis.camera import Camera
 
 Array = NDArray[np.float64]
-IDLE = "explains nothing of what differed, and what calls for it is left"
+IDLE = "all that called for it is left, and nothing that differed is explained by it alone or best"
 _DOUBTFUL = 30.0  # gain of log-likelihood below which locked frames may not confirm an effect
 
 
@@ -47,14 +49,21 @@ def denied_by_rest(search: Search, state: State, base: State) -> tuple[Named, st
 def idle(
     search: Search, base: State, final: State, known: Mapping[str, Array] | None = None
 ) -> tuple[Named, str] | None:
-    """Return an effect that explains nothing where what calls for it is left; None: there is none.
+    """Return an effect to which nothing that differed is put down; None: there is none.
 
-    It gained little, and fits beside something else that no effect explains. Lines are shown by
-    whole frames: where spectra peak only the strongest is located. `known` is what each effect
-    changes in the numbers of `base`, if that was asked for already.
+    It gained little, and all that called for it is left: it fits beside something else, that no
+    effect explains. Lines, and what else is measured, are shown by whole frames: where spectra peak
+    only the strongest is located. `known` is what each effect changes in the numbers of `base`, if
+    that was asked for already.
     """
-    little = [n for n in search.named if n.gain < _DOUBTFUL and n.kind not in LINES]
-    asked = [n for n in little if _calls_left(final, n)]
+    first, left = ({m.statistic for m in own.mismatches} for own in (base, final))
+    asked = [
+        n
+        for n in search.named
+        if n.gain < _DOUBTFUL and n.kind in CANDIDATES and not (n.kind in LINES or n.measured)
+        if (calls := left.intersection(CANDIDATES[n.kind].calls))
+        and calls >= first.intersection(CANDIDATES[n.kind].calls)
+    ]
     if not asked:
         return None
     if known is None:
@@ -74,7 +83,7 @@ def undenied_by_all(
     while search.named:
         everything = search.of_all(final.camera)
         denied = denied_by_rest(search, everything, whole)
-        denied = denied or idle(search, search.rebased(whole), everything)
+        denied = denied or idle(search, whole, everything)
         if denied is None:
             return final, gains, everything
         final = search.fitted_anew(search.further(search.drop(final, *denied)))
@@ -95,7 +104,7 @@ def undenied_by_many(search: Search, final: State, whole: State) -> tuple[State,
         nothing = idle(search, whole, final, known)
         if nothing is None:
             return final, known
-        final = search.drop(final, *nothing)
+        final = undenied(search, search.drop(final, *nothing))
 
 
 def proven(
@@ -178,9 +187,12 @@ def _gained(search: Search, final: State, trial: Trial) -> dict[str, Gained]:
             if one.certain:
                 continue
             other = _foretold(search, named, cameras[named.name], trial, one)
-            moved = _frame_by_frame(search, final, named, cameras[named.name], trial)
-            if other.certain or moved is not None:
-                told[named.name] = other if moved is None else moved
+            if other.certain:
+                told[named.name] = other
+                continue
+            moved = _frame_by_frame(search, final, named, cameras[named.name], trial, one)
+            if moved is not None:
+                told[named.name] = moved
             elif max(one.gain.nats_per_frame, other.gain.nats_per_frame) > 0 and shown_by_all(
                 search, final, named, cameras[named.name], trial
             ):
@@ -230,16 +242,18 @@ def _foretold(search: Search, named: Named, without: Camera, trial: Trial, told:
 
 
 def _frame_by_frame(
-    search: Search, final: State, named: Named, without: Camera, trial: Trial
+    search: Search, final: State, named: Named, without: Camera, trial: Trial, known: Gained
 ) -> Gained | None:
     """Return what frames of a small recording gain, each told by the others; None: nothing sure.
 
-    Nothing is said where what calls for the effect is left, nor beside one of its kind.
+    Nothing is said where what calls for the effect is left, beside one of its kind, nor where no
+    locked frame says anything; `known` is what these gain.
     """
     effect = named.effect
-    if effect is None or search.whole is None or _calls_left(final, named):
+    if effect is None or effect.kind not in SIZES or search.whole is None:
         return None
-    if any(one.kind == effect.kind for one in without.effect):
+    beside = any(one.kind == effect.kind for one in without.effect)
+    if beside or _calls_left(final, named) or not isfinite(known.gain.nats_per_frame):
         return None
     told = trial.frame_by_frame(
         relit(final.calibrated.model, without, final.setting.layout), effect

@@ -5,11 +5,11 @@ from dataclasses import dataclass, field, replace
 
 from analysis.mismatch.apart import Apart, apart_of_users, as_far_apart, with_apart
 from analysis.mismatch.candidates import CANDIDATES, Proposal
-from analysis.mismatch.candidates.patterns import of_any_shape, of_plain_shape
+from analysis.mismatch.candidates.patterns import of_any_shape
 from analysis.mismatch.credited import given_back
 from analysis.mismatch.displaced import displaced
 from analysis.mismatch.lightfield import measured_light
-from analysis.mismatch.named import Named, beside_plain, camera_without, renewed
+from analysis.mismatch.named import Named, camera_without, renewed
 from analysis.mismatch.own import Own, called, explained, refitted, resized, sizes, without_own
 from analysis.mismatch.polish import polish, with_effects
 from analysis.mismatch.predict import Predictor
@@ -120,33 +120,26 @@ class Fitted:
         all is asked of the fall alone, see `unclear`.
         """
         state = self._resized(state, self._called(state))
-        shaped = [
+        self.named = [
             n if n.proposal is None else replace(n, proposal=of_any_shape(n.proposal))
             for n in self.named
         ]
-        self.named = self._with_plain(state, shaped)
         bare, mine = self._parts(state)
         if not mine:
             return state
-        camera = self._fitted(bare, *settled(state, bare, mine))
+        found = settled(state, bare, mine)
+        camera = self._fitted(bare, found.effects, found.errors)
         if camera is None:
             return state
+        plain = iter(found.plain[len(self.own) :])
+        self.named = [
+            n if n.proposal is None else replace(n, plain=next(plain)) for n in self.named
+        ]
         # Beside what is named now, the user's sizes may do.
         good = [own.users for own in self.own if not own.contradicted]
         self.own = [own for own in self.own if own.contradicted]
         self.camera = resized(self.camera, good)
         return State.of(self.setting, resized(camera, good), self.step, near=state)
-
-    def _with_plain(self, state: State, shaped: list[Named]) -> list[Named]:
-        """Return effects of any shape, each with what it is if its shape stays as it is."""
-        own = [one.proposal for one in shaped if one.proposal is not None]
-        if all(of_plain_shape(one) == one for one in own):
-            return shaped
-        bare, mine = self._parts(state)
-        users = mine[: len(mine) - len(own)]
-        asked = [*users, *map(of_plain_shape, own)]
-        plain = iter(list(zip(*settled(state, bare, asked), strict=True))[len(users) :])
-        return [n if n.proposal is None else beside_plain(n, *next(plain)) for n in shaped]
 
     def of_all(self, camera: Camera) -> State:
         """Return the state of all frames of a small recording beside a camera."""

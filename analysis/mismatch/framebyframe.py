@@ -27,7 +27,7 @@ _SCALES: Array = np.geomspace(0.125, 8.0, 61)  # of the size that was fitted
 
 
 @dataclass(frozen=True)
-class Held:
+class FrameByFrame:
     """What frames gain by an effect, each told by the others.
 
     Attributes
@@ -44,13 +44,14 @@ class Held:
 
 def frame_by_frame(
     layout: Layout, frames_of: FramesOf, bare: Model, effect: Effect, seed: int
-) -> Held:
+) -> FrameByFrame:
     """Return what frames gain by an effect.
 
     Parameters
     ----------
     layout, frames_of
-        All frames that are asked; exposures of fewer than three are not.
+        All frames that are asked; exposures of fewer than three, whose frames tell nothing but
+        levels, or whose pixels are full, are not.
     bare
         The model without the effect.
     effect
@@ -58,13 +59,16 @@ def frame_by_frame(
     seed
         Of the simulations.
     """
-    asked = [e for e in layout.uniform if len(e.numbers) >= _LEAST]
+    dumb = {name for name, _ in layout.still | layout.full}
+    asked = [e for e in layout.uniform if len(e.numbers) >= _LEAST and e.name not in dumb]
     size: float = getattr(effect, SIZES[effect.kind])
     replicates = [bare.frames(layout, number, seed) for number in range(_REPLICATES)]
     likely, total = [], np.zeros(_SCALES.size)
     for exposure in asked:
         name, count = exposure.name, len(exposure.numbers)
         new = float(np.mean([_means(made, name).var(ddof=1) for made in replicates]))
+        if not new > 0:  # the model's frames are alike: no law tells how far their means scatter
+            continue
         signals = [layout.signal_dn[name, channel] for channel in layout.channels]
         reach = float(np.mean(signals)) / 100 if effect.kind == "flicker" else 1.0
         square = new + (_SCALES * size * reach) ** 2
@@ -76,7 +80,7 @@ def frame_by_frame(
         total += (float(((means - means.mean()) ** 2).sum()) * less - (count - 1) * more) / 2
     others = [total - one for one in likely]
     gains = [_at(one, rest.argmax(1)) for one, rest in zip(likely, others, strict=True)]
-    return Held(gains, min((float(rest.max(1).min()) for rest in others), default=0.0))
+    return FrameByFrame(gains, min((float(rest.max(1).min()) for rest in others), default=0.0))
 
 
 def _at(likely: Array, best: NDArray[np.intp]) -> Array:

@@ -34,6 +34,10 @@ SHAPES = frozenset(
 _FAR_FROM_LEVELS = {"percent_full_scale": "exponent"}
 
 
+Plain = tuple[Effect, dict[str, float]]
+"""An effect of a plain shape, and standard errors of its sizes."""
+
+
 @dataclass(frozen=True)
 class Named:
     """An effect taken in.
@@ -53,7 +57,8 @@ class Named:
     switch_dn
         Of a second read-out segment.
     plain
-        The effect with its errors where a shape that adds nothing clear is none: see `settle`.
+        The effect with its errors as it is without a shape that may as well be none: see
+        `uncertainty.settled`.
     """
 
     kind: str
@@ -62,7 +67,7 @@ class Named:
     gain: float
     rivals: tuple[tuple[str, float], ...]
     switch_dn: float = float("nan")
-    plain: tuple[Effect, dict[str, float]] | None = None
+    plain: Plain | None = None
 
     @property
     def effect(self) -> Effect | None:
@@ -124,13 +129,6 @@ def unclear(named: Named, *, at_random: bool = False) -> str:
         for name, (value, error) in sizes.items()
     )
     return f"its size is less than {clear:g} of its standard errors ({said})"
-
-
-def beside_plain(named: Named, effect: Effect, errors: dict[str, float]) -> Named:
-    """Return an effect named with what it is where its shape stays, unless that was all."""
-    proposal = named.proposal
-    alike = proposal is None or errors.keys() == set(proposal.free)
-    return replace(named, plain=None if alike else (effect, errors))
 
 
 def _plain(named: Named, effect: Effect, errors: dict[str, float]) -> Named:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from analysis.mismatch.bandgain import foretold
 from analysis.mismatch.finding import Change, Gain, Proof
 from analysis.mismatch.fixedforetold import fixed_foretold
-from analysis.mismatch.framebyframe import SIZES, frame_by_frame
+from analysis.mismatch.framebyframe import frame_by_frame
 from analysis.mismatch.given import Ratio
 from analysis.mismatch.heldnumbers import HeldNumbers
 from analysis.mismatch.instance import frequency_of
@@ -185,11 +185,11 @@ class Trial:
     def frame_by_frame(self, bare: Model, effect: Effect) -> Gained | None:
         """Return what each frame gains by an effect that moves whole frames, told by the others.
 
-        None: it is another, or nothing is told. `bare` is the model without it. All frames had a
+        None: nothing is locked, or told. `bare` is the model without it. All frames had a
         say in what is looked for: chance is ruled out at the odds that take an effect into a
         search, by frames of which no single one decides.
         """
-        if effect.kind not in SIZES:
+        if self.held is None:
             return None
         layout, frames_of = self.lines.layout, self.lines.frames_of
         told = frame_by_frame(layout, frames_of, bare, effect, self.seed)

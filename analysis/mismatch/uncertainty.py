@@ -10,13 +10,17 @@ has.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.stats
 from numpy.typing import NDArray
 
 from analysis.mismatch.candidates import Proposal
+from analysis.mismatch.candidates.patterns import FALL_SIZE, RING_SIZE
 from analysis.mismatch.formerror import form_of
+from analysis.mismatch.layout import Layout
+from analysis.mismatch.named import Plain
 from analysis.mismatch.polish import (
     Free,
     free_of,
@@ -40,9 +44,27 @@ _NORMAL = 1.96
 _FARTHEST = 7.0  # end of a logarithm's interval: beyond a factor of 1000 nothing is known
 
 
-def settled(
-    state: State, bare: Camera, proposals: Sequence[Proposal]
-) -> tuple[tuple[Effect, ...], tuple[dict[str, float], ...]]:
+@dataclass(frozen=True)
+class Settled:
+    """What was fitted, in the end.
+
+    Attributes
+    ----------
+    effects
+        In the order of their proposals.
+    errors
+        Standard errors of their free parameters.
+    plain
+        Effects of a shape that may as well be none, as they are with none, and errors of their
+        sizes then; None: all others.
+    """
+
+    effects: tuple[Effect, ...]
+    errors: tuple[dict[str, float], ...]
+    plain: tuple[Plain | None, ...]
+
+
+def settled(state: State, bare: Camera, proposals: Sequence[Proposal]) -> Settled:
     """Return effects and standard errors of their free parameters.
 
     1.96 errors are half the 95 % interval: by Student's law, for the variance is known from few
@@ -63,7 +85,7 @@ def settled(
     free = free_of(proposals)
     errors: tuple[dict[str, float], ...] = tuple({} for _ in proposals)
     if not free:
-        return effects, errors
+        return Settled(effects, errors, (None,) * len(effects))
     mean, known = state.null.mean, state.null.known
     score, inverse, weights = _information(state, bare, effects, free)
     rest = np.where(known, state.vector.values - mean, 0.0)
@@ -72,10 +94,12 @@ def settled(
     covariance = np.atleast_2d(np.cov(simulated, rowvar=False)) * (1 + 1 / count)
     sandwich = inverse @ covariance @ inverse
     step = inverse @ (score @ rest)
-    reach = float(scipy.stats.t.ppf(0.975, count - 1)) * np.sqrt(np.diag(sandwich))
+    student = float(scipy.stats.t.ppf(0.975, count - 1))
+    reach = student * np.sqrt(np.diag(sandwich))
     _, sd, _ = state.predictor().weights(mean)
     slopes = np.divide(score, weights, out=np.zeros_like(score), where=weights > 0).T
-    reach *= _misfit(slopes, sd, np.where(weights > 0, rest - slopes @ step, 0.0))
+    wider = _misfit(slopes, sd, np.where(weights > 0, rest - slopes @ step, 0.0))
+    reach *= wider
     corrected = effects
     for (i, name, signed), delta in zip(free, step, strict=True):
         limited = float(delta if signed else np.clip(delta, -_LARGEST, _LARGEST))
@@ -85,13 +109,46 @@ def settled(
     predictor, camera = state.predictor(), with_effects(bare, corrected)
     if camera is None or predictor.loglik(predictor.mean(camera)) < predictor.loglik(mean):
         corrected = effects
+    layout = state.setting.layout
     for (i, name, signed), half in zip(free, reach, strict=True):
-        value = abs(float(getattr(corrected[i], name)))
-        far = value * np.expm1(half) if half < _FARTHEST else np.inf
-        own = half if signed else far
-        form = value * form_of(corrected[i], name, state.setting.layout)
-        errors[i][name] = float(np.hypot(own / _NORMAL, form))
-    return corrected, errors
+        errors[i][name] = _error(corrected[i], name, half, layout, signed=signed)
+    square = student**2 * sandwich * np.outer(wider, wider)
+    plain = [_plain(effect, i, free, square, layout) for i, effect in enumerate(corrected)]
+    return Settled(corrected, errors, tuple(plain))
+
+
+def _error(effect: Effect, name: str, half: float, layout: Layout, *, signed: bool) -> float:
+    """Return the standard error of a parameter from half the interval of what was fitted."""
+    value = abs(float(getattr(effect, name)))
+    far = value * np.expm1(half) if half < _FARTHEST else np.inf
+    own = half if signed else far
+    return float(np.hypot(own / _NORMAL, value * form_of(effect, name, layout)))
+
+
+def _plain(
+    effect: Effect, which: int, free: Sequence[Free], square: Array, layout: Layout
+) -> Plain | None:
+    """Return a fall of light as it is without a ring, if that may as well be none.
+
+    By the regression of one on the other; `square` is the covariance of what was fitted, in halves
+    of 95 % intervals.
+    """
+    own = {name: k for k, (i, name, _) in enumerate(free) if i == which}
+    if not {FALL_SIZE, RING_SIZE} <= own.keys():
+        return None
+    fall, ring = own[FALL_SIZE], own[RING_SIZE]
+    off = float(getattr(effect, RING_SIZE))
+    if not abs(off) <= np.sqrt(square[ring, ring]):
+        return None
+    share = float(square[fall, ring] / square[ring, ring])
+    half = float(np.sqrt(max(square[fall, fall] - share**2 * square[ring, ring], 0.0)))
+    signed = free[fall][2]
+    changed = moved((effect,), 0, FALL_SIZE, signed, -share * off, as_is=True)
+    if changed is None:
+        return None
+    values = changed[0][0].model_dump() | {RING_SIZE: 0.0}
+    alone = type(effect)(**values)
+    return alone, {FALL_SIZE: _error(alone, FALL_SIZE, half, layout, signed=signed)}
 
 
 def _information(

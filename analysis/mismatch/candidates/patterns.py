@@ -22,11 +22,11 @@ from dsis.effects.shading import Shading
 from dsis.measures.fixed_pattern import Smooth
 
 Array = NDArray[np.float64]
-_FALL = "falloff_percent"
+FALL_SIZE = "falloff_percent"
 _TILTS = ("tilt_down_percent", "tilt_right_percent")
 _BOWS = ("bow_down_percent", "bow_right_percent")
-_RING = "ring_percent"
-_ROUND, _RINGED, _BOWED = (_FALL, *_TILTS), (_FALL, *_TILTS, _RING), (*_TILTS, *_BOWS)
+RING_SIZE = "ring_percent"
+_ROUND, _RINGED, _BOWED = (FALL_SIZE, *_TILTS), (FALL_SIZE, *_TILTS, RING_SIZE), (*_TILTS, *_BOWS)
 SURFACES = frozenset({*_RINGED, *_BOWED})
 _BOWS_DEGREE = 2
 _MOST, _MOST_RING = 90.0, 390.0  # per cent
@@ -76,11 +76,11 @@ def _shading(clues: Clues) -> Sequence[Proposal]:
     round_, clear = _fitted(clues, _ROUND)
     leaning = [name for name in _TILTS if name in clear]
     found: list[Proposal] = []
-    for names in ([_FALL], leaning, [_FALL, *leaning] if leaning else []):
+    for names in ([FALL_SIZE], leaning, [FALL_SIZE, *leaning] if leaning else []):
         found += _of_light(round_, names)
     ringed, clear = _fitted(clues, _RINGED)
-    if _RING in clear:
-        found += _of_light(ringed, [_FALL, *leaning, _RING])
+    if RING_SIZE in clear:
+        found += _of_light(ringed, [FALL_SIZE, *leaning, RING_SIZE])
     bowed, clear = _fitted(clues, _BOWED)
     if any(name in clear and bowed[name] > 0 for name in _BOWS):  # no fall rises to the ends
         found += _of_light(bowed, [name for name in _BOWED if name in clear])
@@ -92,17 +92,11 @@ def of_any_shape(proposal: Proposal) -> Proposal:
 
     Where it is not clear, how far the light falls in the corners is the less known for it.
     """
-    if _FALL not in proposal.free or _RING in proposal.free:
+    if FALL_SIZE not in proposal.free or RING_SIZE in proposal.free:
         return proposal
     return replace(
-        proposal, free=(*proposal.free, _RING), signed=frozenset({*proposal.signed, _RING})
+        proposal, free=(*proposal.free, RING_SIZE), signed=frozenset({*proposal.signed, RING_SIZE})
     )
-
-
-def of_plain_shape(proposal: Proposal) -> Proposal:
-    """Return a fall of light whose shape between centre and corner stays as it is."""
-    free = tuple(name for name in proposal.free if name != _RING)
-    return proposal if free == proposal.free else replace(proposal, free=free)
 
 
 def _fitted(clues: Clues, names: Sequence[str]) -> tuple[dict[str, float], set[str]]:
@@ -120,7 +114,7 @@ def _fitted(clues: Clues, names: Sequence[str]) -> tuple[dict[str, float], set[s
         own = inverse @ shapes @ rest
         values += own
         scatter = scale * noise
-        if _RING in names:
+        if RING_SIZE in names:
             scatter = max(scatter, _smooth_scatter((rest - own @ shapes).reshape(image.shape)))
         errors = np.hypot(errors, scatter * np.sqrt(np.diag(inverse)))
     found = dict(zip(names, values.tolist(), strict=True))
@@ -142,8 +136,8 @@ def _of_strength(clues: Clues) -> Sequence[Proposal]:
     variance, _ = clues.amplitude("fixed_smooth_variance", _squared(clues))
     if variance <= 0:
         return []
-    spread = float(surfaces((clues.layout.rows, clues.layout.columns), (_FALL,)).var())
-    return _of_light({_FALL: 100 * sqrt(variance / spread)}, (_FALL,))
+    spread = float(surfaces((clues.layout.rows, clues.layout.columns), (FALL_SIZE,)).var())
+    return _of_light({FALL_SIZE: 100 * sqrt(variance / spread)}, (FALL_SIZE,))
 
 
 def had(clues: Clues, channel: str) -> Array:
@@ -170,13 +164,13 @@ def made_of_light(clues: Clues, channel: str) -> Array:
 
 def _of_light(own: Mapping[str, float], names: Sequence[str]) -> list[Proposal]:
     """Return the proposal with some of the surfaces, none where a fall is a rise."""
-    if not names or (_FALL in names and own[_FALL] <= 0):
+    if not names or (FALL_SIZE in names and own[FALL_SIZE] <= 0):
         return []
-    start = {_FALL: 0.0}
+    start = {FALL_SIZE: 0.0}
     for name in names:
-        most = _MOST_RING if name == _RING else _MOST
+        most = _MOST_RING if name == RING_SIZE else _MOST
         start[name] = float(np.clip(own[name], -most, most))
-    return proposals("shading", names, [n for n in names if n != _FALL], **start)
+    return proposals("shading", names, [n for n in names if n != FALL_SIZE], **start)
 
 
 def surfaces(shape: tuple[int, ...], names: Sequence[str]) -> Array:
@@ -186,7 +180,7 @@ def surfaces(shape: tuple[int, ...], names: Sequence[str]) -> Array:
     y = y[:, None]
     fall = -((n * y) ** 2 + (m * x) ** 2) / (n**2 + m**2)
     own = fall, -fall * (1 + fall), y, x, y**2, x**2
-    every = dict(zip((_FALL, _RING, *_BOWED), own, strict=True))
+    every = dict(zip((FALL_SIZE, RING_SIZE, *_BOWED), own, strict=True))
     made = np.stack([np.broadcast_to(every[name], shape).ravel() for name in names])
     return np.asarray(made - made.mean(1, keepdims=True))
 

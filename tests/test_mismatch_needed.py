@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from analysis.mismatch.asked import FramesAsked
 from analysis.mismatch.candidates import Proposal
 from analysis.mismatch.finding import Mismatch, Where
 from analysis.mismatch.judge import LITTLE, NEEDLESS
@@ -28,7 +29,7 @@ def test_what_a_state_without_an_effect_would_take_in_is_needed(there: bool) -> 
     gain = gained(state, bare, ROW_NOISE, 2)
     assert gain > 50 if there else gain == 0
     search: Any = SimpleNamespace(
-        setting=state.setting, _least=lambda *_: SURE_GAIN, _shown=lambda *_: -inf
+        setting=state.setting, _jumping=False, _least=lambda *_: SURE_GAIN, _shown=lambda *_: -inf
     )
     named = Named("row_noise", Proposal(ROW_NOISE, ("sigma_dn",)), {}, gain, ())
     for why, left, needed in (
@@ -39,6 +40,40 @@ def test_what_a_state_without_an_effect_would_take_in_is_needed(there: bool) -> 
     ):
         one, other = _with(state, *left), _with(bare, "row_variance")
         assert Search._needed(search, one, other, named, why) is needed
+
+
+@pytest.mark.parametrize(
+    ("kind", "shown", "why", "needed"),
+    [
+        ("rts", True, f"{LITTLE} 0%", True),
+        ("rts", True, NEEDLESS, True),
+        ("rts", True, "the recording shows none", False),
+        ("rts", False, f"{LITTLE} 0%", False),
+        ("rts", None, f"{LITTLE} 0%", False),
+        ("row_noise", True, f"{LITTLE} 0%", False),
+    ],
+)
+def test_jumps_that_whole_frames_show_are_needed_whatever_numbers_of_few_pixels_say(
+    kind: str, shown: bool | None, why: str, needed: bool
+) -> None:
+    effect = registry()["rts"](pixel_fraction=0.003, amplitude_dn=5.0)
+    effect = effect if kind == "rts" else ROW_NOISE
+    lines = None if shown is None else SimpleNamespace(jumping=shown)
+    search: Any = SimpleNamespace(_jumping=Search._jumping.fget(SimpleNamespace(lines=lines)))  # type: ignore[attr-defined]
+    nothing: Any = SimpleNamespace(mismatches=())
+    named = Named(kind, Proposal(effect, ("amplitude_dn",)), {}, 9.0, ())
+    assert Search._needed(search, nothing, nothing, named, why) is needed
+
+
+@pytest.mark.parametrize(
+    ("gain", "jumping", "shown"), [(20.0, 6.0, True), (20.0, 2.0, False), (5.0, 5.0, False)]
+)
+def test_whole_frames_show_jumps_by_odds_of_both(gain: float, jumping: float, shown: bool) -> None:
+    """Of jumps, and of these rather than of noise as strong."""
+    seen = SimpleNamespace(telegraph=SimpleNamespace(gain=gain, jumping=jumping))
+    told = FramesAsked.jumping.fget  # type: ignore[attr-defined]
+    assert told(seen) is shown
+    assert told(SimpleNamespace(telegraph=None)) is False
 
 
 def test_what_is_left_for_another_cause_denies_nothing_that_the_rest_shows() -> None:

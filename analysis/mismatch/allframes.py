@@ -11,7 +11,7 @@ Few pixels that jump are as rarely seen: most stay where they are in two frames.
 from analysis.mismatch.instance import LINES, same_place
 from analysis.mismatch.name import Search
 from analysis.mismatch.named import Named
-from analysis.mismatch.rank import SURE_GAIN, TOLD_APART, replicates_for
+from analysis.mismatch.rank import SURE_GAIN, replicates_for
 from analysis.mismatch.resolved import gained
 from analysis.mismatch.state import State
 from analysis.mismatch.trial import Trial
@@ -32,7 +32,7 @@ def shown_by_all(search: Search, final: State, named: Named, without: Camera, tr
     if own is None or search.whole is None:
         return False
     if own.effect.kind == _JUMPS:
-        return _jumps_shown(without, trial)
+        return trial.lines.jumping and all(one.kind != _JUMPS for one in without.effect)
     if not once_a_frame(own.effect):
         return False
     alone = not any(same_place(own.effect, one, search.whole.layout) for one in without.effect)
@@ -45,14 +45,6 @@ def shown_by_all(search: Search, final: State, named: Named, without: Camera, tr
     bare = State.of(search.whole, without, search.step, near=state)
     replicates = replicates_for(search.setting, [own.effect])
     return gained(state, bare, own.effect, replicates) - own.price >= SURE_GAIN
-
-
-def _jumps_shown(without: Camera, trial: Trial) -> bool:
-    """Return whether all frames show pixels that jump, rather than are noisy otherwise."""
-    seen = trial.lines.telegraph
-    if seen is None or any(one.kind == _JUMPS for one in without.effect):
-        return False
-    return seen.gain >= SURE_GAIN and seen.jumping > TOLD_APART
 
 
 def once_a_frame(effect: Effect) -> bool:

@@ -8,7 +8,7 @@ from analysis.mismatch.burst import Bursts, bursts_of
 from analysis.mismatch.layout import Layout
 from analysis.mismatch.paired import Pairs, pairs_of
 from analysis.mismatch.projections import FramesOf
-from analysis.mismatch.rank import TOLD_APART
+from analysis.mismatch.rank import SURE_GAIN, TOLD_APART
 from analysis.mismatch.repeated import Repeated, repeats_of
 from analysis.mismatch.rowlaw import RowLaw
 from analysis.mismatch.rowpower import Size, row_powers
@@ -55,6 +55,12 @@ class FramesAsked:
     def no_jumps(self, sure: float) -> bool:
         """Return whether frames are `sure` that noisy pixels do not jump, nats."""
         return self.telegraph is not None and self.telegraph.jumping < -sure
+
+    @property
+    def jumping(self) -> bool:
+        """Whether frames show pixels that jump, surely, and rather than are noisy otherwise."""
+        seen = self.telegraph
+        return seen is not None and seen.gain >= SURE_GAIN and seen.jumping > TOLD_APART
 
     @property
     def jumps(self) -> Rts | None:

@@ -101,7 +101,10 @@ class FittedParameter:
 
 @dataclass(frozen=True)
 class Gain:
-    """Gain of log-likelihood on the locked frames, nats per frame, with its 95 % interval."""
+    """Gain of log-likelihood on the locked frames, nats per frame, with its 95 % interval.
+
+    Of what moves whole frames, where few locked ones leave it open: of all, each told by the rest.
+    """
 
     nats_per_frame: float
     ci95: Interval

@@ -11,7 +11,7 @@ from analysis.mismatch.credited import kept_up
 from analysis.mismatch.fitted import WEAK
 from analysis.mismatch.forgiving import to_forgive
 from analysis.mismatch.instance import LINES, frequency_of
-from analysis.mismatch.judge import INSTEAD, NEEDLESS, NOTHING, Judge
+from analysis.mismatch.judge import INSTEAD, LITTLE, NEEDLESS, NOTHING, Judge
 from analysis.mismatch.memory import Memory
 from analysis.mismatch.named import Named
 from analysis.mismatch.phase import ABSENT
@@ -210,10 +210,17 @@ class Search(Choice):
             return self.explained_by(named, state, bare)
         if why.startswith((NEEDLESS, INSTEAD)) and opened(state, bare):
             return True
+        if named.kind == "rts" and why.startswith((NEEDLESS, LITTLE)) and self._jumping:
+            return True  # numbers of few pixels scatter
         if why != NEEDLESS or (own := named.proposal) is None:
             return False
         gain = gained(state, bare, own.effect, replicates_for(self.setting, [own.effect]))
         return max(gain, self._shown(own.effect, bare)) - own.price >= self._least(bare, named.kind)
+
+    @property
+    def _jumping(self) -> bool:
+        """Whether whole frames show pixels that jump."""
+        return self.lines is not None and self.lines.jumping
 
     def _judge(self, state: State) -> Judge:
         return Judge(state, lambda named: self.without(state, named), self.setting.nulls)

@@ -9,9 +9,10 @@ import scipy.stats
 
 from analysis.mismatch.bank.key import Key
 from analysis.mismatch.flattened import flattened
+from analysis.mismatch.null import _grown
 from analysis.mismatch.uneven import uneven
 from analysis.mismatch.unmet import _of_its_map
-from analysis.mismatch.wander import wandering_dn2
+from analysis.mismatch.wander import by_lines, wandering_dn2
 from dsis.effects import registry
 from mismatch_recordings import camera
 
@@ -108,6 +109,44 @@ def test_levels_are_known_no_better_than_frames_that_wander_allow() -> None:
     frames = rng.normal(0, np.sqrt(9 * 50 / 200), (4000, 8))
     assert frames.mean(1).var() == pytest.approx(50 / 200 / 8 + added[1], rel=0.1)
     assert wandering_dn2(layout, keys, model, np.array([0.5, 3.0, 0.0])) == pytest.approx([0, 0, 0])
+
+
+def test_a_level_scatters_by_the_noise_of_rows_and_columns_too() -> None:
+    """Means of frames with noise of lines, drawn: their own number counts from there on."""
+    rows, columns, frames, pixel, row, column = 12, 20, 8, 50.0, 1.5, 0.8
+    rng = np.random.default_rng(4)
+    shape = (4000, frames)
+    means = np.sqrt(pixel / rows / columns) * rng.standard_normal(shape)
+    means += row * rng.standard_normal((*shape, rows)).mean(2)
+    means += column * rng.standard_normal((*shape, columns)).mean(2)
+    place = ("dark", "MONO")
+    ratios = {
+        "frame_variance": 1.0,
+        "row_variance": 1 + columns * row**2 / pixel,
+        "column_variance": 1 + rows * column**2 / pixel,
+    }
+    keys = [*(Key(name, "exposure", *place) for name in ratios), Key("level", "exposure", *place)]
+    model = np.array([*np.cbrt(list(ratios.values())), 0.0])
+    still = by_lines(keys, model)[place]
+    grown = _grown(keys, model)[-1]
+    assert grown == pytest.approx(np.sqrt(still), rel=1e-12)
+    alone = pixel / rows / columns / frames
+    assert means.mean(1).var() == pytest.approx(alone * grown**2, rel=0.06)
+    # Frames that wander besides do so beyond all of this.
+    model[0] = np.cbrt(1 + 0.6**2 * rows * columns / pixel / still)
+    wander = 0.6 * rng.standard_normal(shape)
+    scatter = (means + wander).mean(1).var()
+    assert scatter == pytest.approx(alone * _grown(keys, model)[-1] ** 2, rel=0.06)
+    layout: Any = SimpleNamespace(
+        uniform=[SimpleNamespace(name="dark", numbers=range(frames))],
+        channels=("MONO",),
+        rows=rows,
+        columns=columns,
+        variance_dn2={place: pixel},
+    )
+    recorded, model = model.copy(), np.where(np.arange(4) == 0, 1.0, model)
+    added = wandering_dn2(layout, keys, model, recorded)[-1]
+    assert added == pytest.approx(0.6**2 / frames, rel=1e-9)
 
 
 def test_what_stays_of_offsets_says_nothing_of_gains() -> None:

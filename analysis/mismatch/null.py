@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import exp, log
+from math import exp, log, sqrt
 
 import numpy as np
 import scipy.optimize
@@ -16,7 +16,7 @@ from analysis.mismatch.contrasts import Contrasts, contrasts
 from analysis.mismatch.fewpairs import widening
 from analysis.mismatch.layout import Layout
 from analysis.mismatch.vector import Vector
-from analysis.mismatch.wander import wandering_dn2
+from analysis.mismatch.wander import by_lines, wandering_dn2
 
 Array = NDArray[np.float64]
 _OWN = 40.0  # degrees of freedom that the closed form, scaled by name, is worth for a number
@@ -189,10 +189,11 @@ def _grown(keys: Sequence[Key], mean: Array) -> Array:
     """Return by how much closed-form errors grow where a model has more than white noise.
 
     The cube root of a mean square scatters in proportion to itself. A level moves as the means of
-    its frames do, whose variance has a number of its own.
+    its frames do, whose variance has a number of its own, beside that of lines.
     """
+    lines = by_lines(keys, mean)
     frames = {
-        key.place: max(float(value), 1.0) ** 1.5
+        key.place: sqrt(max(float(value), 1.0) ** 3 * lines.get(key.place, 1.0))
         for key, value in zip(keys, mean, strict=True)
         if key.statistic == "frame_variance" and key.scope == "exposure"
     }

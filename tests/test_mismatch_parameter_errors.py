@@ -70,7 +70,8 @@ def test_few_hot_pixels_tell_their_law_no_better_than_their_number_allows() -> N
     state = _state(camera(hot), camera(hot), 5)
     bare = state.camera.model_copy(update={"effect": ()})
     free = ("pixel_fraction", "mean_dn_per_s")
-    (found,), (errors,) = settled(state, bare, [Proposal(hot, free)])
+    told = settled(state, bare, [Proposal(hot, free)])
+    (found,), (errors,) = told.effects, told.errors
     bound = 1 / sqrt(share * ROWS * COLUMNS)
     for name, true in zip(free, (share, mean), strict=True):
         value = getattr(found, name)

@@ -74,10 +74,11 @@ def frame_by_frame(
         square = new + (_SCALES * size * reach) ** 2
         more, less = np.log(square / new), 1 / new - 1 / square
         means = _means(frames_of, name)
-        off = (means - means.mean()) ** 2 * count / (count - 1)  # from the mean of the others
-        likely.append((off[:, np.newaxis] * less - more) / 2)
+        off = (means - means.mean()) ** 2
         # Of all frames: of their contrasts, for nobody knows the mean.
-        total += (float(((means - means.mean()) ** 2).sum()) * less - (count - 1) * more) / 2
+        total += (off.sum() * less - (count - 1) * more) / 2
+        off *= count / (count - 1)  # from the mean of the others, which is as unsure
+        likely.append((off[:, np.newaxis] * less - more) / 2)
     others = [total - one for one in likely]
     gains = [_at(one, rest.argmax(1)) for one, rest in zip(likely, others, strict=True)]
     return FrameByFrame(gains, min((float(rest.max(1).min()) for rest in others), default=0.0))

@@ -20,10 +20,10 @@ from scipy.stats import chi2
 from analysis.mismatch.layout import Layout
 from analysis.mismatch.pixellaw import MOST_FRAMES, of_jumps, of_spikes, of_variances
 from analysis.mismatch.projections import FramesOf
+from analysis.mismatch.rank import TOLD_APART
 from dsis.recording.ahead import in_order
 
 Array = NDArray[np.float64]
-_TOLD_APART = 3.0  # of log-likelihood: odds of 20
 _APART = 3.0  # standard deviations of noise between levels that frames show one by one
 _LEAST_FRAMES = 3  # of which a median pixel tells the noise
 _COARSE = 1.0  # step between codes, in standard deviations, from which on codes jump by themselves
@@ -305,7 +305,7 @@ def _fitted(jumps: Array, others: _Others, weight: Array, heights: Array) -> Tel
           for a in amplitudes] for w in range(_SWITCHING.size)]
     )  # fmt: skip
     more = _mean(equal) - _mean(sizes)
-    if more > _TOLD_APART:
+    if more > TOLD_APART:
         told = _told(equal, amplitudes, (gain + more, gains[1], gains[2]))
         if told is not None and told.amplitude_dn > _APART * heights[0] / _HEIGHTS[0]:
             return replace(told, equal=True)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from analysis.mismatch.candidates import CANDIDATES
 from analysis.mismatch.contradicted import Denial
+from analysis.mismatch.rank import TOLD_APART
 from analysis.mismatch.recalibrate import code_step
 from analysis.mismatch.resolved import FAR_OFF
 from analysis.mismatch.state import State
@@ -17,7 +18,6 @@ from dsis.effects.adc_dnl import AdcDnl
 Array = NDArray[np.float64]
 _DEGREES = (2, 3)  # of a response: bent one way, or by more in one half than in the other
 _LEAST_FLATS = 2  # levels on each side of a switch
-_TOLD_APART = 3.0  # of log-likelihood: odds of 20
 _AT_SWITCH = "levels change where a read-out path begins"
 _MOST = 0.5  # of what levels are off, that is left where they show an effect
 
@@ -136,9 +136,9 @@ def by_levels(state: State, kind: str, without: Array, mean: Array) -> tuple[boo
     values, sd = state.vector.values[levels], state.null.sd[levels]
     before, after = np.abs(values - without[levels]), np.abs(values - mean[levels])
     seen = bool(((before > FAR_OFF * sd) & (after < _MOST * before)).any())
-    if seen and kind == "dual_gain_mismatch" and behind_smooth(state, mean) >= _TOLD_APART:
+    if seen and kind == "dual_gain_mismatch" and behind_smooth(state, mean) >= TOLD_APART:
         return seen, Denial(0.0, "levels bend smoothly, not where a read-out path begins")
-    if kind == "nonlinearity" and behind_switch(state, mean) >= _TOLD_APART:
+    if kind == "nonlinearity" and behind_switch(state, mean) >= TOLD_APART:
         return seen, Denial(0.0, f"{_AT_SWITCH}, and do not bend smoothly")
     moved = float(np.abs(mean[levels] - without[levels]).max(initial=0.0))
     if seen and moved <= _of_widths(state):
@@ -169,7 +169,7 @@ def at_a_switch(state: State, kind: str, mean: Array) -> Denial | None:
     called = {m.statistic for m in state.mismatches}
     if kind != "adc_memory" or not called.isdisjoint(CANDIDATES[kind].calls):
         return None
-    return Denial(0.0, _AT_SWITCH) if behind_switch(state, mean) >= _TOLD_APART else None
+    return Denial(0.0, _AT_SWITCH) if behind_switch(state, mean) >= TOLD_APART else None
 
 
 def smooth_as_well(state: State, mean: Array, kind: str, other: str) -> bool:
@@ -179,4 +179,4 @@ def smooth_as_well(state: State, mean: Array, kind: str, other: str) -> bool:
     """
     if (kind, other) != ("dual_gain_mismatch", "nonlinearity"):
         return False
-    return 0 <= behind_smooth(state, mean) < _TOLD_APART
+    return 0 <= behind_smooth(state, mean) < TOLD_APART

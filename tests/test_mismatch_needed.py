@@ -29,7 +29,10 @@ def test_what_a_state_without_an_effect_would_take_in_is_needed(there: bool) -> 
     gain = gained(state, bare, ROW_NOISE, 2)
     assert gain > 50 if there else gain == 0
     search: Any = SimpleNamespace(
-        setting=state.setting, _jumping=False, _least=lambda *_: SURE_GAIN, _shown=lambda *_: -inf
+        setting=state.setting,
+        _jumping=False,
+        least_gain=lambda *_: SURE_GAIN,
+        _shown=lambda *_: -inf,
     )
     named = Named("row_noise", Proposal(ROW_NOISE, ("sigma_dn",)), {}, gain, ())
     for why, left, needed in (
@@ -58,8 +61,9 @@ def test_jumps_that_whole_frames_show_are_needed_whatever_numbers_of_few_pixels_
 ) -> None:
     effect = registry()["rts"](pixel_fraction=0.003, amplitude_dn=5.0)
     effect = effect if kind == "rts" else ROW_NOISE
-    lines = None if shown is None else SimpleNamespace(jumping=shown)
-    search: Any = SimpleNamespace(_jumping=Search._jumping.fget(SimpleNamespace(lines=lines)))  # type: ignore[attr-defined]
+    lines = None if shown is None else SimpleNamespace(jumping=lambda least: shown and least == 5)
+    asked = SimpleNamespace(lines=lines, base=None, least_gain=lambda *_: 5)
+    search: Any = SimpleNamespace(_jumping=Search._jumping.fget(asked))  # type: ignore[attr-defined]
     nothing: Any = SimpleNamespace(mismatches=())
     named = Named(kind, Proposal(effect, ("amplitude_dn",)), {}, 9.0, ())
     assert Search._needed(search, nothing, nothing, named, why) is needed
@@ -71,9 +75,9 @@ def test_jumps_that_whole_frames_show_are_needed_whatever_numbers_of_few_pixels_
 def test_whole_frames_show_jumps_by_odds_of_both(gain: float, jumping: float, shown: bool) -> None:
     """Of jumps, and of these rather than of noise as strong."""
     seen = SimpleNamespace(telegraph=SimpleNamespace(gain=gain, jumping=jumping))
-    told = FramesAsked.jumping.fget  # type: ignore[attr-defined]
-    assert told(seen) is shown
-    assert told(SimpleNamespace(telegraph=None)) is False
+    assert FramesAsked.jumping(seen, SURE_GAIN) is shown  # type: ignore[arg-type] # a stub
+    none: Any = SimpleNamespace(telegraph=None)
+    assert FramesAsked.jumping(none, 0.0) is False
 
 
 def test_what_is_left_for_another_cause_denies_nothing_that_the_rest_shows() -> None:

@@ -13,7 +13,7 @@ from scipy.stats import multivariate_normal
 from analysis.mismatch.layout import Layout, Taken
 from analysis.mismatch.phase import WholeFrames
 from analysis.mismatch.pixellaw import of_jumps, of_spikes, of_variances
-from analysis.mismatch.telegraph import Telegraph, telegraph
+from analysis.mismatch.telegraph import Telegraph, could_jump, telegraph
 from dsis.cfa import Cfa
 from dsis.effects.rts import Rts
 
@@ -70,6 +70,12 @@ NOISE = (2.0, 2.0, 3.0, 6.0)  # DN, of four exposures: two darks, two flats
 @cache  # two promises are about a noise that spreads
 def _recorded(seed: int, kind: str, **how: float) -> Telegraph | None:
     """Return what is told of frames whose single pixels are noisy in one way."""
+    layout, stacks = _frames(seed, kind, **how)
+    return telegraph(layout, stacks.__getitem__)
+
+
+@cache
+def _frames(seed: int, kind: str, **how: float) -> tuple[Layout, dict[str, list[np.ndarray]]]:
     rng = np.random.default_rng(seed)
     pixels = SHAPE[0] * SHAPE[1]
     stacks = {}
@@ -102,8 +108,7 @@ def _recorded(seed: int, kind: str, **how: float) -> Telegraph | None:
         stacks[f"e{i}"] = frames
         taken.append(Taken(f"e{i}", "flat" if i > 1 else "dark", 0.01 * (1 + i), None,
                            tuple(range(STACK))))  # fmt: skip
-    layout = Layout(tuple(taken), *SHAPE, Cfa.MONO, 64.0, 4095.0, {}, {})
-    return telegraph(layout, stacks.__getitem__)
+    return Layout(tuple(taken), *SHAPE, Cfa.MONO, 64.0, 4095.0, {}, {}), stacks
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -192,3 +197,29 @@ def test_coarse_codes_tell_nothing() -> None:
     effect = Rts(pixel_fraction=0.01, amplitude_dn=3.0)
     assert whole.gain(effect) == -np.inf
     assert whole.measured(effect) is None
+
+
+@pytest.mark.parametrize(
+    ("kind", "how"),
+    [
+        ("alike", {}),
+        ("spread", {"log_sigma": 0.3}),
+        ("telegraph", {"share": 0.008, "amplitude": 12.0, "switching": 0.15}),
+        ("telegraph", {"share": 0.004, "amplitude": 5.0, "switching": 0.4}),
+        ("telegraph", {"share": 0.002, "amplitude": 9.0, "switching": 0.3}),
+        ("equal", {"share": 0.008, "amplitude": 12.0, "switching": 0.3}),
+    ],
+)
+@pytest.mark.parametrize("seed", range(3))
+def test_frames_are_asked_in_full_where_pixels_could_jump(
+    kind: str, how: dict[str, float], seed: int
+) -> None:
+    """What a first look leaves out no second one would find."""
+    least = 5.1
+    layout, stacks = _frames(seed, kind, **how)
+    told = _recorded(seed, kind, **how)
+    assert told is not None
+    could = could_jump(layout, stacks.__getitem__, least)
+    assert could or told.gain < least or told.jumping < np.log(20)
+    if kind == "spread":
+        assert not could

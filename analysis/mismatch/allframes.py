@@ -32,7 +32,8 @@ def shown_by_all(search: Search, final: State, named: Named, without: Camera, tr
     if own is None or search.whole is None:
         return False
     if own.effect.kind == _JUMPS:
-        return trial.lines.jumping and all(one.kind != _JUMPS for one in without.effect)
+        least = search.least_gain(search.base, _JUMPS)
+        return trial.lines.jumping(least) and all(one.kind != _JUMPS for one in without.effect)
     if not once_a_frame(own.effect):
         return False
     alone = not any(same_place(own.effect, one, search.whole.layout) for one in without.effect)

@@ -5,14 +5,15 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from analysis.mismatch.burst import Bursts, bursts_of
+from analysis.mismatch.jumping import LEAST, Jumping
 from analysis.mismatch.layout import Layout
 from analysis.mismatch.paired import Pairs, pairs_of
 from analysis.mismatch.projections import FramesOf
-from analysis.mismatch.rank import SURE_GAIN, TOLD_APART
+from analysis.mismatch.rank import TOLD_APART
 from analysis.mismatch.repeated import Repeated, repeats_of
 from analysis.mismatch.rowlaw import RowLaw
 from analysis.mismatch.rowpower import Size, row_powers
-from analysis.mismatch.telegraph import Telegraph
+from analysis.mismatch.telegraph import Telegraph, could_jump
 from analysis.mismatch.telegraph import telegraph as find_telegraph
 from dsis.effects.rts import Rts
 
@@ -56,11 +57,23 @@ class FramesAsked:
         """Return whether frames are `sure` that noisy pixels do not jump, nats."""
         return self.telegraph is not None and self.telegraph.jumping < -sure
 
-    @property
-    def jumping(self) -> bool:
-        """Whether frames show pixels that jump, surely, and rather than are noisy otherwise."""
+    def jumping(self, least: float) -> bool:
+        """Return whether frames show pixels that jump, and rather than are noisy otherwise.
+
+        `least` is by how much they must be likelier with them, nats.
+        """
         seen = self.telegraph
-        return seen is not None and seen.gain >= SURE_GAIN and seen.jumping > TOLD_APART
+        return seen is not None and seen.gain >= least and seen.jumping > TOLD_APART
+
+    @property
+    def located(self) -> Jumping | None:
+        """That few pixels of a small recording jump; None: frames do not show it."""
+        if self.layout.large or not could_jump(self.layout, self.frames_of, LEAST):
+            return None
+        seen, jumps = self.telegraph, self.jumps
+        if seen is None or jumps is None or not self.jumping(LEAST):
+            return None
+        return Jumping.of(seen.gain, jumps, [exposure.name for exposure in self.layout.uniform])
 
     @property
     def jumps(self) -> Rts | None:

@@ -18,7 +18,7 @@ from analysis.mismatch.instance import LINES, Frequency, frequency_of, instance
 from analysis.mismatch.instep import in_step
 from analysis.mismatch.memory import Memory
 from analysis.mismatch.named import Named
-from analysis.mismatch.phase import ABSENT, WholeFrames
+from analysis.mismatch.phase import ABSENT, Measured, WholeFrames
 from analysis.mismatch.polish import with_effects
 from analysis.mismatch.rank import (
     LEAST_GAIN,
@@ -36,6 +36,7 @@ from analysis.mismatch.state import State
 from analysis.mismatch.ties import akin, bends_as_well, by_numbers, plainest, ties, twin
 from dsis.camera import Camera
 from dsis.effects import Effect
+from dsis.effects.rts import Rts
 
 Array = NDArray[np.float64]
 _MOST_LINES = 5  # further ones stay unexplained, located
@@ -99,7 +100,7 @@ class Choice(Fitted):
             error = {"switch_dn": path.error_dn}
             found = Named(path.kind, None, error, path.gain, rivals, path.switch_dn)
             return found, path.camera
-        if not fitted or most < self._least(state, fitted[0].kind):
+        if not fitted or most < self.least_gain(state, fitted[0].kind):
             return None
         best = fitted[0]
         camera = joined(state.camera, best.polished.effects, self.setting.given)
@@ -109,6 +110,7 @@ class Choice(Fitted):
         proposal = replace(best.proposal, effect=best.polished.effects[0])
         errors = best.polished.errors[0]
         known = None if self.measuring is None else self.measuring.measured(proposal.effect)
+        known = known or self._jumps(state, proposal.effect)
         if known is not None:  # better than from the heights of peaks, or sums over pixels
             proposal = measured(proposal, *known)
             errors = dict(proposal.errors)
@@ -116,7 +118,17 @@ class Choice(Fitted):
         named = Named(best.kind, proposal, errors, best.gain, rivals)
         return None if camera is None else (named, camera)
 
-    def _least(self, state: State, kind: str) -> float:
+    def _jumps(self, state: State, effect: Effect) -> Measured | None:
+        """Return what frames say of pixels that jump, where all show them; else None.
+
+        Numbers, which are sums over pixels, say less of few.
+        """
+        if not isinstance(effect, Rts) or state.setting.jumping is None or self.measuring is None:
+            return None
+        seen = self.measuring.telegraph
+        return None if seen is None else (seen.values, seen.errors)
+
+    def least_gain(self, state: State, kind: str) -> float:
         """Return the gain from which an effect is taken in: at odds of 20 against none.
 
         Of all kinds of the vocabulary; where what calls for it is sure, of those that this calls

@@ -15,6 +15,7 @@ from analysis.mismatch.null import Null
 from analysis.mismatch.observe import Observation
 from analysis.mismatch.vector import Vector
 from dsis.camera import Camera
+from dsis.effects.rts import Rts
 from dsis.measures.fixed_pattern import Smooth
 
 Array = NDArray[np.float64]
@@ -44,6 +45,8 @@ class Clues:
     settled
         Lines that an effect of a kind needs no trial for, (kind, frequency): they were named as one
         or the other, or refused to this one; of `NO_LINE` no effect needs one.
+    jumps
+        Pixels that jump, as whole frames show them; None: they do not.
     """
 
     layout: Layout
@@ -53,6 +56,7 @@ class Clues:
     null: Null
     camera: Camera
     settled: tuple[tuple[str, Frequency], ...] = ()
+    jumps: Rts | None = None
 
     @property
     def places(self) -> tuple[Place, ...]:

@@ -48,6 +48,7 @@ from analysis.mismatch.unsettled import told_beside, unsettled, with_first_frame
 from analysis.mismatch.wholecells import whole_cells
 from dsis.blas import one_thread
 from dsis.camera import Camera
+from dsis.effects.rts import Rts
 from dsis.freed import keep_freed
 from dsis.recording import Recording
 
@@ -121,6 +122,8 @@ def _found(
     setting = replace(setting, given=len(camera.effect), asked_again=not large)
 
     trial = Trial.of(recording, split, source, setting)
+    jumping = any(isinstance(one, Rts) for one in camera.effect)
+    setting = replace(setting, jumping=None if jumping else trial.lines.located)
     whole = State.of(setting if large else _of_all_frames(setting, trial), camera, step)
     if not (words and whole.mismatches):
         search = Search(setting, camera, whole, words, step)

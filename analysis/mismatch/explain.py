@@ -1,10 +1,14 @@
 """Which effect explains which mismatch: by what each changes in the numbers that are off."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from math import nan
 
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.mismatch.candidates import CANDIDATES
+from analysis.mismatch.finding import Mismatch
+from analysis.mismatch.instance import kind_of
 from analysis.mismatch.locate import FAMILY
 from analysis.mismatch.named import Named
 from analysis.mismatch.segments import bent
@@ -40,6 +44,9 @@ def explained(
             for i, key in enumerate(base.null.keys)
             if key.statistic == mismatch.statistic and base.chances[i] < FAMILY
         ]
+        if not which:  # whole frames show it, and no number of the bank
+            found[mismatch.statistic] = of_frames(mismatch, changes, final)
+            continue
         z = base.departures[which]
         left = max((abs(after.get(base.null.keys[i], 0.0)) for i in which), default=0.0)
         still = any(m.statistic == mismatch.statistic for m in final.mismatches)
@@ -52,6 +59,18 @@ def explained(
         clear = best is not None and score[best] > 0 and (not still or left < _LEFT * top)
         found[mismatch.statistic] = (best if clear else None, left)
     return found
+
+
+def of_frames(mismatch: Mismatch, named: Iterable[str], final: State) -> tuple[str | None, float]:
+    """Return the effect that explains what only whole frames show, and z afterwards, if it is left.
+
+    Of a model that has it no frames were asked: z is not known then.
+    """
+    left = [m.z for m in final.mismatches if m.statistic == mismatch.statistic]
+    if left:
+        return None, left[0]
+    callers = (own for own in named if mismatch.statistic in CANDIDATES[kind_of(own)].calls)
+    return next(callers, None), nan
 
 
 def changes(

@@ -215,12 +215,13 @@ class Search(Choice):
         if why != NEEDLESS or (own := named.proposal) is None:
             return False
         gain = gained(state, bare, own.effect, replicates_for(self.setting, [own.effect]))
-        return max(gain, self._shown(own.effect, bare)) - own.price >= self._least(bare, named.kind)
+        most = max(gain, self._shown(own.effect, bare))
+        return most - own.price >= self.least_gain(bare, named.kind)
 
     @property
     def _jumping(self) -> bool:
         """Whether whole frames show pixels that jump."""
-        return self.lines is not None and self.lines.jumping
+        return self.lines is not None and self.lines.jumping(self.least_gain(self.base, "rts"))
 
     def _judge(self, state: State) -> Judge:
         return Judge(state, lambda named: self.without(state, named), self.setting.nulls)

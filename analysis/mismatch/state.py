@@ -12,6 +12,7 @@ from analysis.mismatch.clues import Clues
 from analysis.mismatch.combs import unknown_combs
 from analysis.mismatch.finding import Mismatch
 from analysis.mismatch.instance import Frequency
+from analysis.mismatch.jumping import Jumping
 from analysis.mismatch.layout import Layout
 from analysis.mismatch.locate import located, tested
 from analysis.mismatch.model import simulate
@@ -52,6 +53,8 @@ class Setting:
         How many effects the user's camera has: they come first, those taken in after them.
     asked_again
         Whether all frames will be asked what these leave undecided.
+    jumping
+        Pixels that jump, as all frames show them; None: they do not.
     """
 
     layout: Layout
@@ -67,6 +70,7 @@ class Setting:
     large: bool = False
     given: int = 0
     asked_again: bool = False
+    jumping: Jumping | None = None
 
     @classmethod
     def of(
@@ -178,6 +182,9 @@ class State:
         )
         its_own = [one.values for one in of_model.vectors[: of_model.own]]
         simulations.keep(calibrated.model.camera, its_own)
+        found = located(layout, seen, null, z, chances)
+        if setting.jumping is not None:
+            found = setting.jumping.beside(found, camera.effect)
         return cls(
             setting,
             calibrated,
@@ -186,7 +193,7 @@ class State:
             of_model,
             z,
             chances,
-            located(layout, seen, null, z, chances),
+            found,
             simulations,
         )
 
@@ -208,7 +215,8 @@ class State:
     def clues(self, settled: tuple[tuple[str, Frequency], ...] = ()) -> Clues:
         """Return what proposals start from; `settled` are lines that need no trial."""
         s = self.setting
-        return Clues(s.layout, s.seen, self.vector, self.fit, self.null, self.camera, settled)
+        own = Clues(s.layout, s.seen, self.vector, self.fit, self.null, self.camera, settled)
+        return own if s.jumping is None else replace(own, jumps=s.jumping.effect)
 
     def predictor(self, replicates: int | None = None) -> Predictor:
         """Return predictions of other cameras beside this one."""

@@ -7,28 +7,25 @@ spread, that grow with time, or with noisier frames now and then. What telegraph
 from the best of these laws, and beside the best of them.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import reduce
-from math import exp, inf, isfinite, log, sqrt
+from math import exp, expm1, inf, isfinite, log, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import logsumexp, ndtr
-from scipy.stats import chi2
 
 from analysis.mismatch.layout import Layout
-from analysis.mismatch.pixellaw import MOST_FRAMES, of_jumps, of_spikes, of_variances
+from analysis.mismatch.pixelframes import blocks_of, chosen
+from analysis.mismatch.pixellaw import of_jumps, of_spikes, of_variances
 from analysis.mismatch.projections import FramesOf
 from analysis.mismatch.rank import TOLD_APART
 from dsis.recording.ahead import in_order
 
 Array = NDArray[np.float64]
 _APART = 3.0  # standard deviations of noise between levels that frames show one by one
-_LEAST_FRAMES = 3  # of which a median pixel tells the noise
-_COARSE = 1.0  # step between codes, in standard deviations, from which on codes jump by themselves
-_MOST_LINES = 160
-_NOISY, _OTHERS = 2.5, 1024  # standard deviations: all such pixels, and so many of the others
+_OTHERS, _FEW_OTHERS = 1024, 512  # pixels that are not noisy
 _HEIGHTS: Array = np.geomspace(0.7, 120.0, 24)  # in standard deviations of the least noise
 _SWITCHING = np.array([0.02, 0.05, 0.1, 0.15, 0.2, 0.27, 0.35, 0.5])
 _RATIOS: Array = np.exp(np.arange(-1.4, 4.3, 0.2))  # of a pixel's variance to that noise
@@ -41,8 +38,9 @@ _PARTS: Array = np.geomspace(1e-4, 0.05, 32)  # of pixels: jumps of more are tol
 _MORE: Array = np.geomspace(0.07, 1.0, 8)  # which what else spreads the noise is told from
 _MANY, _SURELY = 0.03, 0.1  # share of pixels from which they are many, and how likely they may be
 _MOST = 0.5  # share of pixels from which all may be meant
-_GRID = 32  # amplitudes
+_GRID, _FEW_HEIGHTS = 32, 12  # amplitudes
 _STEPS = 200
+_NORMAL = 1.96
 
 
 @dataclass(frozen=True)
@@ -179,17 +177,17 @@ def telegraph(layout: Layout, frames_of: FramesOf, jobs: int = 1) -> Telegraph |
     Kirton & Uren, Advances in Physics 38, 1989 (random telegraphs); Kiefer & Wolfowitz, Annals of
     Mathematical Statistics 27, 1956 (shares of classes that make observations most likely).
     """
-    blocks = list(_blocks(layout, frames_of))
+    blocks = list(blocks_of(layout, frames_of))
     if not blocks:
         return None
     least = min(float(noise.min()) for _, noise, _ in blocks)
-    chosen, weight = _chosen(blocks, least)
+    which, weight = chosen(blocks, least, _OTHERS)
     longest = max(time for *_, time in blocks)
     heights = _HEIGHTS * sqrt(least)
 
     def told(block: tuple[Array, Array, float]) -> tuple[Array, ...]:
         x, noise, time = block
-        some, dn2 = x[chosen], noise[chosen]
+        some, dn2 = x[which], noise[which]
         part = time / longest if longest > 0 else 1.0
         return (
             of_jumps(some, dn2, heights, _SWITCHING),
@@ -207,65 +205,37 @@ def telegraph(layout: Layout, frames_of: FramesOf, jobs: int = 1) -> Telegraph |
     return _fitted(jumps, _Others(*others), weight, heights)
 
 
-def _blocks(layout: Layout, frames_of: FramesOf) -> Iterator[tuple[Array, Array, float]]:
-    """Yield frames of each exposure, a few at a time: (pixel, frame), their noise, DN^2, and time.
+def could_jump(layout: Layout, frames_of: FramesOf, least: float) -> bool:
+    """Return whether `telegraph` may find pixels that jump, of a gain of so many nats.
 
-    Less what rows and columns of a frame have in common. Noise is that of the median pixel.
+    What telegraphs gain at most, on one of the laws of all other pixels, is no less than what they
+    do in the mean, on the best; few of the pixels that are not noisy tell it.
     """
-    window = tuple(_middle(size) for size in (layout.rows, layout.columns))
-    for exposure in layout.uniform:
-        if any((exposure.name, channel) in layout.still for channel in layout.channels):
-            continue
-        frames = [np.asarray(own[window], np.float64) for own in frames_of(exposure.name)]
-        stack = np.stack(frames)
-        parts = -(-len(stack) // MOST_FRAMES)
-        for some in np.array_split(stack, parts):
-            block = _noise(layout, some) if len(some) >= _LEAST_FRAMES else None
-            if block is not None:
-                yield *block, exposure.exposure_time_s
+    blocks = list(blocks_of(layout, frames_of))
+    if not blocks:
+        return False
+    noise = min(float(own.min()) for _, own, _ in blocks)
+    which, weight = chosen(blocks, noise, _FEW_OTHERS)
+    heights, switching = _HEIGHTS[::2] * sqrt(noise), _SWITCHING[::2]
+    amplitudes = np.geomspace(heights[0], heights[-1] / 2, _FEW_HEIGHTS)
+    some = [(x[which], dn2[which]) for x, dn2, _ in blocks]
+    jumps = np.sum([of_jumps(x, dn2, heights, switching) for x, dn2 in some], 0)
+    twins = np.sum([of_variances(x, dn2, heights**2 / 4) for x, dn2 in some], 0)
+    own = np.sum([of_variances(x, dn2, (_RATIOS - 1) * noise) for x, dn2 in some], 0)
+    top = np.maximum(np.max([own.max(1), twins.max(1), jumps.max((1, 2))], 0), 0.0)
+    jumping, still = np.exp(jumps - top[:, None, None]), np.exp(twins - top[:, None])
+    likely = np.exp(own - top[:, None])
+    laws = [np.exp(-top), *(likely @ _log_normal(s, c) for s in _SPREADS for c in _CENTRES)]
+    beside = max(laws, key=lambda one: _sum(one, weight))
+    alone = _sum(beside, weight)
 
+    def most(of: Callable[[Array, Array, float], Array], classes: Array) -> float:
+        shares = (_of_shares(of(classes, heights, a), beside, weight, _PARTS) for a in amplitudes)
+        return max(float(one.max()) for one in shares)
 
-def _middle(size: int) -> slice:
-    """Return the lines in the middle of a sensor: so many pixels tell as much as is asked."""
-    first = max(size - _MOST_LINES, 0) // 4 * 2  # cells of a mosaic stay whole
-    return slice(first, first + _MOST_LINES)
-
-
-def _noise(layout: Layout, stack: Array) -> tuple[Array, Array] | None:
-    """Return a stack about its mean (pixel, frame), and the noise of each pixel; None: coarse."""
-    rest = stack - stack.mean(0)
-    noise = np.empty(rest.shape[1:])
-    step = 1 + (len(layout.sites) > 1)
-    dof = len(stack) - 1
-    for y, x in layout.sites.values():
-        plane = rest[:, y::step, x::step]
-        plane -= plane.mean(2, keepdims=True)
-        plane -= plane.mean(1, keepdims=True)
-        square = float(np.median((plane**2).sum(0))) / chi2.median(dof)
-        codes = np.unique(stack[:, y::step, x::step])
-        step_dn = float(np.median(np.diff(codes))) if codes.size > 1 else np.inf
-        if not (square > 0 and square >= (_COARSE * step_dn) ** 2):
-            return None
-        noise[y::step, x::step] = square
-    return rest.reshape(len(rest), -1).T, noise.reshape(-1)
-
-
-def _chosen(
-    blocks: list[tuple[Array, Array, float]], least: float
-) -> tuple[NDArray[np.intp], Array]:
-    """Return the noisy pixels and some of the others, and for how many each stands."""
-    score, norm = np.zeros(len(blocks[0][0])), 0.0
-    for x, noise, _ in blocks:
-        dof, trust = x.shape[1] - 1, least / noise
-        score += trust * ((x**2).sum(1) / noise - dof)
-        norm += 2 * dof * float((trust**2).mean())
-    noisy = score > _NOISY * sqrt(norm)
-    others = np.flatnonzero(~noisy)
-    some = others[:: max(others.size // _OTHERS, 1)]
-    chosen = np.concatenate([np.flatnonzero(noisy), some])
-    weight = np.ones(chosen.size)
-    weight[chosen.size - some.size :] = others.size / max(some.size, 1)
-    return chosen, weight
+    laws_of = (_of_heights, _of_height)
+    best = max(most(of, jumping[:, :, w]) for of in laws_of for w in range(switching.size))
+    return best - alone >= least and best - most(_of_heights, still) > TOLD_APART
 
 
 def _fitted(jumps: Array, others: _Others, weight: Array, heights: Array) -> Telegraph | None:
@@ -326,8 +296,9 @@ def _of_shares(own: Array, beside: Array, weight: Array, parts: Array) -> Array:
 def _told(likely: Array, amplitudes: Array, gains: tuple[float, float, float]) -> Telegraph | None:
     """Return the mean telegraph, from log-likelihoods (switching, amplitude, share).
 
-    All three are as likely beforehand in their logarithms, and so are means; errors are the root
-    mean squares about them. `gains` are `gain`, `spread` and `jumping`.
+    All three are as likely beforehand in their logarithms, and so are means. Errors are the root
+    mean squares about them, or reach to the farther end of the interval of the logarithm, if that
+    is more. `gains` are `gain`, `spread` and `jumping`.
     """
     gain, spread, jumping = gains
     if not isfinite(gain):
@@ -341,7 +312,10 @@ def _told(likely: Array, amplitudes: Array, gains: tuple[float, float, float]) -
         mean = float(np.clip(exp(float(own @ np.log(places))), places[0], places[-1]))
         # No better than where between two places.
         step = mean * float(np.diff(np.log(places)).mean())
-        found.append((mean, sqrt(float(own @ (places - mean) ** 2) + step**2 / 12)))
+        wide = sqrt(float(own @ (np.log(places) - log(mean)) ** 2))
+        farther = mean * expm1(_NORMAL * wide) / _NORMAL
+        square = max(float(own @ (places - mean) ** 2), farther**2)
+        found.append((mean, sqrt(square + step**2 / 12)))
     (switching, a), (amplitude, b), (share, c) = found
     gain = -inf if many else gain
     return Telegraph(share, c, amplitude, b, switching, a, gain, spread, jumping)

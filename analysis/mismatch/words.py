@@ -45,6 +45,7 @@ STATISTICS = {
     "column_variance_spread": "noise that differs from column to column",
     "noisy_pixels": "few pixels far noisier",
     "outlying_pixels": "few pixels far out",
+    "jumping_pixels": "pixels that jump between two levels",
     "one_off_outliers": "single spikes",
     "code_spacing": "step between the codes that occur",
     "code_imbalance": "uneven use of codes",

@@ -12,6 +12,7 @@ from analysis.mismatch.bank.codephase import KIND as CODES
 from analysis.mismatch.candidates.candidate import Candidate, Proposal, proposals
 from analysis.mismatch.candidates.steps import absent, fractional_step
 from analysis.mismatch.clues import Clues
+from analysis.mismatch.jumping import NAME as JUMPING
 from dsis.measures import Lattice
 
 _SWITCHING = (0.35, 0.1)  # a frame: seen in the noise, and in maps of few frames too
@@ -55,13 +56,19 @@ def _spread(clues: Clues) -> Sequence[Proposal]:
 
 
 def _rts(clues: Clues) -> Sequence[Proposal]:
-    """Start from a share of pixels and the height that the mean excess variance then asks for."""
+    """Start from what frames show, or from shares of pixels.
+
+    And from the height that the mean excess variance then asks for.
+    """
+    found: list[Proposal] = []
+    if clues.jumps is not None:
+        shown = clues.jumps.model_dump(exclude={"kind"})
+        found += proposals("rts", ["pixel_fraction", "amplitude_dn"], **shown)
     k, error = clues.amplitude("kurtosis", lambda place: clues.read_share(place) ** 2)
     k = max(k, error)  # few pixels show in maps before they show in the mean
     if not np.isfinite(k):
-        return []
+        return found
     read = max(float(clues.fit.line_dn2(np.zeros(1))[0]), 0.02)
-    found: list[Proposal] = []
     for fraction in (0.001, 0.003, 0.01, 0.03, 0.1):
         # The kurtosis of a mixture: 3 f E[(a^2/4)^2] / V^2, E[a^4] = 24 A^4.
         height = (k * read**2 / (3 * fraction * 24 / 16)) ** 0.25
@@ -166,7 +173,7 @@ CANDIDATES = (
     Candidate(
         "rts",
         ("variance_spread", "variance_persistence", "kurtosis", "one_off_outliers",
-         "noisy_pixels", "frame_correlation", "outlying_pixels"),
+         "noisy_pixels", "frame_correlation", "outlying_pixels", JUMPING),
         _rts,
     ),
     Candidate("impulse", ("one_off_outliers", "kurtosis", "skewness"), _impulse),

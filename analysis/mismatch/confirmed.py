@@ -26,6 +26,7 @@ from dsis.camera import Camera
 
 Array = NDArray[np.float64]
 IDLE = "all that called for it is left, and nothing that differed is explained by it alone or best"
+UNCALLED = "nothing that differs in all frames calls for it, and locked ones leave it open"
 _DOUBTFUL = 30.0  # gain of log-likelihood below which locked frames may not confirm an effect
 
 
@@ -73,10 +74,34 @@ def idle(
     return None if nothing is None else (nothing, IDLE)
 
 
+def uncalled(
+    search: Search, base: State, final: State, gains: Mapping[str, Gain]
+) -> tuple[Named, str] | None:
+    """Return an effect for which nothing calls in all frames, nor do locked ones; None: none is.
+
+    What hides behind another is called for by nothing at first: locked frames must show it then.
+    """
+    first = {m.statistic for m in base.mismatches}
+    asked = [
+        n
+        for n in search.named
+        if n.kind in CANDIDATES and not (n.kind in LINES or n.measured)
+        if first.isdisjoint({*CANDIDATES[n.kind].calls, *CANDIDATES[n.kind].hints})
+        if n.name in gains and gains[n.name].ci95[0] <= 0
+    ]
+    if not asked:
+        return None
+    told = explained(
+        base, final, changes(base, final, search.named, partial(search.without, final))
+    )
+    nothing = next((n for n in asked if not because(told, n.name)), None)
+    return None if nothing is None else (nothing, UNCALLED)
+
+
 def undenied_by_all(
     search: Search, final: State, gains: dict[str, Gain], trial: Trial, whole: State
 ) -> tuple[State, dict[str, Gain], State | None]:
-    """Drop, one by one, what all frames of a small recording deny; see `denied_by_rest`, `idle`.
+    """Drop, one by one, what all frames of a small recording deny; see `denied_by_rest` and below.
 
     The last is the final state of all frames; None where nothing is named.
     """
@@ -84,6 +109,7 @@ def undenied_by_all(
         everything = search.of_all(final.camera)
         denied = denied_by_rest(search, everything, whole)
         denied = denied or idle(search, whole, everything)
+        denied = denied or uncalled(search, whole, everything, gains)
         if denied is None:
             return final, gains, everything
         final = search.fitted_anew(search.further(search.drop(final, *denied)))

@@ -17,6 +17,7 @@ from analysis.mismatch.straight import curves, misfits, upwards
 Array = NDArray[np.float64]
 _PAIRS = {"correlation_0_1": 2, "correlation_1_0": 2, "correlation_1_1": 4}
 """How many neighbours of a pixel a correlation is that of."""
+_FRAMES = "frame_correlation"
 _ADJACENT = ("correlation_0_1", "correlation_1_0")
 _GRAINS = np.geomspace(1.0, 8.0, 13)  # inverse correlations of neighbours in what they share
 _LEAST = 0.05  # of a variance is other noise
@@ -43,6 +44,22 @@ def of_neighbours(state: State, mean: Array) -> Denial | None:
     if denial is not None and _far_worse(state, mean, factors, left):
         denial = None
     return denial or _of_grains(state, left) or _of_charge(state)
+
+
+def of_frames(state: State) -> Denial | None:
+    """Return how a bend is denied by frames that are alike; None: it is not.
+
+    A filter over frames lessens variances: of noise that follows itself by a share r from frame to
+    frame, the variance of sums over frames, v (1 + r) / (1 - r), remains (an autoregression of the
+    first order; Box & Jenkins, 1970). Where that is left unexplained, and variances times it lie on
+    lines, it is what they lack.
+    """
+    left = left_open(state, (_FRAMES,))
+    factors = {place: (1 + r) / (1 - r) for (place, _), (r, _) in left.items() if 0 < r < 1}
+    why = (
+        "successive frames are alike for another reason, and have as covariance what variances lack"
+    )
+    return straightened(state, factors.get, why) if factors else None
 
 
 def _far_worse(state: State, mean: Array, factors: Mapping[Place, float], left: Left) -> bool:

@@ -15,7 +15,7 @@ from analysis.mismatch.brighter import no_brighter_alike
 from analysis.mismatch.bylevel import otherwise_by_level
 from analysis.mismatch.candidates.response import skewness_below
 from analysis.mismatch.contradicted import Denial, coarse
-from analysis.mismatch.covariances import of_neighbours, straightened
+from analysis.mismatch.covariances import of_frames, of_neighbours, straightened
 from analysis.mismatch.feignedtails import replaced
 from analysis.mismatch.fewlines import of_few_lines
 from analysis.mismatch.framelag import alike_without_light
@@ -79,7 +79,7 @@ def displaced(state: State, kind: str, mean: Array, without: Array | None = None
     if kind in _BENDS:
         seen, denial = by_levels(state, kind, without, mean)
         if denial is None and not seen:
-            denial = of_neighbours(state, mean) or _of_limits(state)
+            denial = of_neighbours(state, mean) or of_frames(state) or _of_limits(state)
             denial = denial or _of_codes(state) or _of_steps(state)
         return denial
     if kind in LINES:

@@ -8,6 +8,7 @@ from analysis.mismatch.basefit import cut_off
 from analysis.mismatch.burst import TAILS
 from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.layout import Place
+from analysis.mismatch.leftopen import left_open
 from analysis.mismatch.recalibrate import code_step
 from analysis.mismatch.resolved import CLEAR, FAR_OFF
 from analysis.mismatch.state import State
@@ -26,6 +27,9 @@ _MOST = 0.5  # of tails, that something else may feign
 _SCATTER = 1.84  # see `coded`
 _OF_PIXELS = frozenset({"variance_spread", "one_off_outliers"})
 _TAILS = TAILS | {"read_noise_spread", "rts"}
+_OF_SAMPLES = frozenset({"heavy_tailed_read_noise", "read_noise_spread"})
+_ADJACENT = ("correlation_0_1", "correlation_1_0")
+_STRONG = 0.1  # a correlation of neighbours
 _LIKELY = 2.0  # standard deviations that chance may well have
 _FEW_ELECTRONS = 1.0  # skewness of shot noise of one electron: read noise beside it lessens it
 
@@ -137,6 +141,26 @@ def placed(state: State, kind: str, without: Array) -> Denial | None:
         return None
     why = f"noise differs from place to place, and single pixels show them by {shown:.1f} errors"
     return Denial(0.0, why)
+
+
+def mixed(state: State, kind: str) -> Denial | None:
+    """Return how the law of single pixels' noise is denied by noise that neighbours share; None.
+
+    Tails, and pixels that are noisier, are of samples drawn each by itself. Where neighbours along
+    rows and along columns are far from that in the dark, and it is left unexplained - a camera that
+    compresses, say - the noise has no such law.
+    """
+    darks = {e.name for e in state.setting.layout.exposures if e.kind == "dark"}
+    if kind not in _OF_SAMPLES or not darks:
+        return None
+    left = left_open(state, _ADJACENT)
+    along = [
+        [rest for (place, name), (rest, _) in left.items() if name == own and place[0] in darks]
+        for own in _ADJACENT
+    ]
+    if not all(along) or min(abs(float(np.mean(own))) for own in along) < _STRONG:
+        return None
+    return Denial(0.0, "in the dark neighbours share much of their noise, and no pixel has its own")
 
 
 def clamped(state: State, kind: str, without: Array) -> Denial | None:

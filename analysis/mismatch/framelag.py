@@ -4,12 +4,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.contradicted import Denial
+from analysis.mismatch.leftopen import left_open
 from analysis.mismatch.state import State
 
 Array = NDArray[np.float64]
 _KIND, _STATISTIC = "image_lag", "frame_correlation"
 _SURE = 5.0  # standard errors by which darks are alike
-_MOST = 0.5  # of how alike lit frames are, that darks may be
+_MOST, _SOME = 0.5, 0.15  # of how alike lit frames are, that darks may be; beyond the model
+_OF_FEW = frozenset({"jumping_pixels", "noisy_pixels", "one_off_outliers", "variance_persistence"})
 
 
 def alike_without_light(state: State, kind: str, without: Array) -> Denial | None:
@@ -17,7 +19,8 @@ def alike_without_light(state: State, kind: str, without: Array) -> Denial | Non
 
     Charge that stays behind correlates shot noise; read noise is new in each frame, and darks are
     not alike. Where they are for certain, half as much as lit frames or more, a filter over frames,
-    say, makes both so, and there may be no lag.
+    say, makes both so, and there may be no lag. Nor where they stay alike beside a lag, by less
+    than that: of a filter that rounds, which is weak where noise is.
 
     Parameters
     ----------
@@ -41,9 +44,28 @@ def alike_without_light(state: State, kind: str, without: Array) -> Denial | Non
     if not all(found.values()):
         return None
     (dark, error), (lit, _) = (_mean(found[place]) for place in (True, False))
-    if dark < _SURE * error or dark < _MOST * lit:
-        return None
-    return Denial(max(1 - dark / max(lit, dark), 0.0), "frames without light are alike as well")
+    share = max(1 - dark / max(lit, dark), 0.0) if dark > 0 else 1.0
+    if dark >= max(_SURE * error, _MOST * lit):
+        return Denial(share, "frames without light are alike as well")
+    if any(one.kind == _KIND for one in state.camera.effect) and _left(state, darks) > _SOME * lit:
+        return Denial(
+            share, "frames without light are alike, more than charge that stays makes them"
+        )
+    return None
+
+
+def _left(state: State, darks: set[str]) -> float:
+    """Return how alike darks are beyond the model, if for certain, and no few pixels are; else 0.
+
+    Few pixels that jump, or are noisy, follow themselves from frame to frame for another reason.
+    """
+    off = {m.statistic for m in state.mismatches}
+    if _STATISTIC not in off or off & _OF_FEW:
+        return 0.0
+    beyond = left_open(state, (_STATISTIC,))
+    dark = [own for (place, _), own in beyond.items() if place[0] in darks]
+    rest, error = _mean(dark) if dark else (0.0, 0.0)
+    return rest if rest >= _SURE * error else 0.0
 
 
 def _mean(pairs: list[tuple[float, float]]) -> tuple[float, float]:

@@ -90,9 +90,51 @@ def test_odds_count_where_nothing_that_calls_for_the_effect_is_left(
 ) -> None:
     """Of the real CCD without its uneven codes, spikes gained 10 nats in 75 frames."""
     told = Gained(Gain(0.13, (low, 0.32)), certain=True)
-    final: Any = Stub(mismatches=(Stub(statistic=left),))
-    spikes: Any = Stub(kind="impulse")
-    assert confirmed._believed(final, spikes, told).certain is certain
+    final = _left_open([left], [1.0])
+    spikes: Any = Stub(kind="impulse", proposal=Stub())
+    search: Any = Stub(without=lambda *_: None)
+    assert confirmed._believed(search, final, spikes, told).certain is certain
+
+
+def _left_open(left: list[str], changes: list[float]) -> Any:
+    """Return a state that leaves numbers open, which an effect changes so far, in departures."""
+    z = np.array([9.0, 6.0][: len(left)])
+    return Stub(
+        mismatches=[Stub(statistic=name) for name in left],
+        departures=z,
+        chances=np.zeros(len(left)),
+        null=Stub(
+            keys=[Stub(statistic=name) for name in left],
+            mean=z * changes,
+            sd=np.ones(len(left)),
+            known=np.ones(len(left), bool),
+            contrasts=Stub(matrix=np.zeros((0, len(left)))),
+            contrast_sd=np.ones(0),
+        ),
+        predictor=lambda: Stub(mean=lambda _: np.zeros(len(left))),
+    )
+
+
+@pytest.mark.parametrize(
+    ("left", "changes", "counts"),
+    [
+        (["level"], [0.1], False),  # darks that warm up are no bend
+        (["level"], [-0.5], True),
+        (["level", "level"], [0.0, 0.4], True),
+        (["kurtosis"], [1.0], False),  # nothing that calls for a bend
+        (["pixel_variance", "kurtosis"], [0.1, 1.0], False),
+        ([], [], False),
+    ],
+)
+def test_what_is_left_counts_where_the_effect_acts(
+    left: list[str], changes: list[float], counts: bool
+) -> None:
+    bend: Any = Stub(kind="nonlinearity", proposal=Stub())
+    search: Any = Stub(without=lambda *_: None)
+    assert confirmed._calls_left(search, _left_open(left, changes), bend) is counts
+    path: Any = Stub(kind="nonlinearity", proposal=None)
+    called = not {"level", "pixel_variance"}.isdisjoint(left)
+    assert confirmed._calls_left(search, _left_open(left, changes), path) is called
 
 
 @dataclass(frozen=True)

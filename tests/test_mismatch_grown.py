@@ -90,3 +90,14 @@ def test_gains_and_other_numbers_are_not_asked() -> None:
     growing = np.array([0.0, 1.5, 0.0, 0.2])
     assert grown(_state(growing, "fixed_row_variance", 0), "row_prnu", np.ones(4)) is None
     assert grown(_state(growing, "fixed_row_variance", 0), "column_fpn", np.ones(4)) is None
+
+
+@pytest.mark.parametrize("alone", [True, False])
+def test_one_channel_by_itself_denies_no_offset(alone: bool) -> None:
+    """No offsets, and a dark of one channel that is far out by chance; or of all of them."""
+    statistic, count = "fixed_column_variance", len(TIMES)
+    own = _state(np.zeros(count), statistic, 3, channels=4)
+    far = [i for i, key in enumerate(own.vector.keys[: 4 * count]) if key.exposure == "dark_1"]
+    own.vector.values[far[:1] if alone else far] += 0.3
+    said = grown(own, "column_fpn", np.ones(len(own.vector.keys)))
+    assert (said is None) is alone

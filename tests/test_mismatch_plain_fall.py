@@ -70,3 +70,24 @@ def test_a_fall_is_there_where_that_of_a_plain_shape_is_sure(alone: float, clear
     plain = effect("shading", falloff_percent=0.056), {"falloff_percent": alone}
     named = Named("shading", proposal, errors, 17.0, (), plain=plain)
     assert (unclear(named) == "") == clear
+
+
+def test_a_bend_whose_exponent_is_open_is_as_sure_as_a_parabola() -> None:
+    rng = np.random.default_rng(5)
+    x = rng.normal(size=(200, 2)) @ np.array([[1.0, 0.6], [0.0, 0.3]])
+    y = x @ [-0.4, 0.0] + 0.5 * rng.normal(size=200)
+    covariance = 0.25 * np.linalg.inv(x.T @ x)
+    size, logarithm = np.linalg.solve(x.T @ x, x.T @ y)
+    (alone,), *_ = np.linalg.lstsq(x[:, :1], y, rcond=None)
+    error = 0.5 / np.sqrt((x[:, 0] ** 2).sum())
+    values = {"percent_full_scale": size, "exponent": float(np.exp(logarithm))}
+    free: list[Free] = [(0, "percent_full_scale", True), (0, "exponent", False)]
+    found = _plain(effect("nonlinearity", **values), 0, free, NORMAL**2 * covariance, LAYOUT)
+    assert found is not None
+    plain, errors = found
+    expected = effect("nonlinearity", percent_full_scale=float(alone)).model_dump()
+    assert plain.model_dump() == {**expected, "percent_full_scale": pytest.approx(alone, rel=1e-9)}
+    assert errors == {"percent_full_scale": pytest.approx(error, rel=1e-9)}
+    sure = NORMAL**2 * np.diag([0.01, 0.01])
+    steep = effect("nonlinearity", percent_full_scale=size, exponent=4.0)
+    assert _plain(steep, 0, free, sure, LAYOUT) is None

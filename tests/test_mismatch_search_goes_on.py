@@ -225,10 +225,15 @@ def test_what_draws_must_exceed_its_errors_where_what_calls_for_it_is_left(left:
     errors = {"pixel_fraction": 1.1, "amplitude_dn": 0.7}
     named = Named("rts", Proposal(jumps, tuple(errors)), errors, 90.0, ())
     surely: Any = Stub(certain=True, gain=Stub(nats_per_frame=1.6, ci95=(1.3, 1.9)))
-    state: Any = Stub(mismatches=[Stub(statistic="frame_correlation")] if left else [])
-    assert ("pixel fraction 0.16 ± 1.1" in small(state, named, surely)) == left
+    state: Any = Stub(
+        mismatches=[Stub(statistic="frame_correlation")] if left else [],
+        chances=np.array([]),
+        null=Stub(keys=()),
+    )
+    search: Any = None  # nothing more is asked: no number of the bank is known
+    assert ("pixel fraction 0.16 ± 1.1" in small(search, state, named, surely)) == left
     sure = Named("rts", Proposal(jumps, tuple(errors)), {**errors, "amplitude_dn": 0.1}, 90.0, ())
-    assert small(state, sure, surely) == ""
+    assert small(search, state, sure, surely) == ""
 
 
 def test_an_effect_within_its_errors_is_dropped_and_what_it_hid_is_looked_for() -> None:

@@ -16,6 +16,7 @@ from analysis.mismatch.fixedforetold import FIXED_LINES
 from analysis.mismatch.framebyframe import SIZES
 from analysis.mismatch.instance import LINES, same_place
 from analysis.mismatch.judge import Judge
+from analysis.mismatch.locate import FAMILY
 from analysis.mismatch.model import side_by_side
 from analysis.mismatch.name import Search
 from analysis.mismatch.named import Named, unclear
@@ -27,6 +28,7 @@ from dsis.camera import Camera
 Array = NDArray[np.float64]
 IDLE = "all that called for it is left, and nothing that differed is explained by it alone or best"
 UNCALLED = "nothing that differs in all frames calls for it, and locked ones leave it open"
+_LITTLE = 0.3  # of what a number differs by, that an effect changes
 _DOUBTFUL = 30.0  # gain of log-likelihood below which locked frames may not confirm an effect
 
 
@@ -143,7 +145,7 @@ def proven(
     while True:
         final = final if judged else undenied(search, final)
         gained = _gained(search, final, trial)
-        sizes = [(one, small(final, one, gained.get(one.name))) for one in search.named]
+        sizes = [(one, small(search, final, one, gained.get(one.name))) for one in search.named]
         least = next((pair for pair in sizes if pair[1]), None)
         if least is not None:
             final = _without(search, final, least, judged=judged)
@@ -158,19 +160,19 @@ def proven(
         worst = min(weak, key=lambda named: gained[named.name].gain.nats_per_frame)
         nats = gained[worst.name].gain.nats_per_frame
         why = f"gains {nats:.3g} nats per locked frame, no more than chance"
-        if _calls_left(final, worst) and gained[worst.name].gain.ci95[0] <= 0 < nats:
+        if _calls_left(search, final, worst) and gained[worst.name].gain.ci95[0] <= 0 < nats:
             why += " may where what calls for it is left"
         final = _without(search, final, (worst, why), judged=judged)
 
 
-def small(state: State, named: Named, told: Gained | None) -> str:
+def small(search: Search, state: State, named: Named, told: Gained | None) -> str:
     """Return why an effect is not told from none by its own size; empty: it is, or frames bear it.
 
     What draws at random is known by what frames gain, whatever its size, unless a statistic that
     calls for it is left: then something else is there, by which frames would gain as well.
     """
     if named.effect is not None and named.effect.draws:
-        return unclear(named, at_random=True) if _calls_left(state, named) else ""
+        return unclear(named, at_random=True) if _calls_left(search, state, named) else ""
     return "" if _borne_out(told) else unclear(named)
 
 
@@ -209,7 +211,7 @@ def _gained(search: Search, final: State, trial: Trial) -> dict[str, Gained]:
         cameras = _fitted_without(search, final, some)
         told = trial.gains(final, cameras)
         for named in some:
-            one = told[named.name] = _believed(final, named, told[named.name])
+            one = told[named.name] = _believed(search, final, named, told[named.name])
             if one.certain:
                 continue
             other = _foretold(search, named, cameras[named.name], trial, one)
@@ -230,7 +232,7 @@ def _gained(search: Search, final: State, trial: Trial) -> dict[str, Gained]:
     return found
 
 
-def _believed(state: State, named: Named, told: Gained) -> Gained:
+def _believed(search: Search, state: State, named: Named, told: Gained) -> Gained:
     """Return a gain, which is chance where only a model that is wrong makes it certain.
 
     Odds that an interval does not bear out are those of a model that is right but for the effect.
@@ -238,15 +240,29 @@ def _believed(state: State, named: Named, told: Gained) -> Gained:
     whatever gives frames another spread or other tails may gain by that. Whole frames may still
     show it.
     """
-    if told.gain.ci95[0] > 0 or not _calls_left(state, named):
+    if told.gain.ci95[0] > 0 or not _calls_left(search, state, named):
         return told
     return replace(told, certain=False)
 
 
-def _calls_left(state: State, named: Named) -> bool:
-    """Return whether a statistic that calls for an effect is left unexplained beside it."""
-    left = {m.statistic for m in state.mismatches}
-    return named.kind in CANDIDATES and not left.isdisjoint(CANDIDATES[named.kind].calls)
+def _calls_left(search: Search, state: State, named: Named) -> bool:
+    """Return whether a statistic that calls for an effect is left unexplained beside it.
+
+    Of numbers that it changes: what darks differ by with time is no matter of a bend.
+    """
+    if named.kind not in CANDIDATES:
+        return False
+    left = {m.statistic for m in state.mismatches}.intersection(CANDIDATES[named.kind].calls)
+    if not left or named.proposal is None:
+        return bool(left)
+    null, keys = state.null, state.null.keys
+    off = [i for i in np.flatnonzero(state.chances < FAMILY) if keys[i].statistic in left]
+    if left - {keys[i].statistic for i in off}:
+        return True  # whole frames show it
+    change = null.mean - state.predictor().mean(search.without(state, named))
+    change = np.where(null.known & np.isfinite(change), change, 0.0) / null.sd
+    both = np.concatenate([change, null.contrasts.matrix @ change / null.contrast_sd])
+    return bool((np.abs(both[off]) > _LITTLE * np.abs(state.departures[off])).any())
 
 
 def _foretold(search: Search, named: Named, without: Camera, trial: Trial, told: Gained) -> Gained:
@@ -279,7 +295,7 @@ def _frame_by_frame(
     if effect is None or effect.kind not in SIZES or search.whole is None:
         return None
     beside = any(one.kind == effect.kind for one in without.effect)
-    if beside or _calls_left(final, named) or not isfinite(known.gain.nats_per_frame):
+    if beside or _calls_left(search, final, named) or not isfinite(known.gain.nats_per_frame):
         return None
     told = trial.frame_by_frame(
         relit(final.calibrated.model, without, final.setting.layout), effect

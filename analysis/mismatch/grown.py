@@ -27,8 +27,8 @@ def grown(state: State, kind: str, without: Array) -> Denial | None:
     Offsets are the same at all times. Where what pixels, lines or frames differ by in single
     exposures goes with the square of the times instead, at odds of 20, and offsets beside that gain
     nothing at such odds, something that needs time makes them differ: trails of pixels that
-    overflow, say, or a sensor that warms up. What moves a frame moves all of its channels: of a
-    mosaic one number an exposure says so.
+    overflow, say, or a sensor that warms up. No channel by itself decides it. What moves a frame
+    moves all of its channels: of a mosaic one number an exposure says so.
 
     Parameters
     ----------
@@ -56,12 +56,21 @@ def grown(state: State, kind: str, without: Array) -> Denial | None:
     seen = (state.vector.values[places] ** 3 - before**3) / error
     alike = (mean**3 - before**3) / error
     growing = alike * np.square([times[key.exposure] for _, key in asked])
-    behind = (_left(seen, alike) - _left(seen, growing)) / 2
-    beside = (_left(seen, growing) - _left(seen, growing, alike)) / 2
-    if not behind > TOLD_APART >= beside:
+    channels = [key.channel for _, key in asked]
+    some = [np.array([own != one for own in channels]) for one in dict.fromkeys(channels)]
+    chosen = [np.ones(len(asked), bool), *(some if len(some) > 1 else ())]
+    odds = [_odds(seen[own], alike[own], growing[own]) for own in chosen]
+    if not all(behind > TOLD_APART >= beside for behind, beside in odds):
         return None
+    behind = odds[0][0]
     why = "it grows with exposure time, as no offset does"
     return Denial(1 / (1 + exp(min(behind, 700.0))), why)
+
+
+def _odds(seen: Array, alike: Array, growing: Array) -> tuple[float, float]:
+    """Return by how much what grows explains more, and what does not beside it, nats."""
+    both = _left(seen, growing)
+    return (_left(seen, alike) - both) / 2, (both - _left(seen, growing, alike)) / 2
 
 
 def _left(seen: Array, *shapes: Array) -> float:

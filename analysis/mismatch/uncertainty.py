@@ -11,6 +11,7 @@ has.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import log
 
 import numpy as np
 import scipy.stats
@@ -35,6 +36,8 @@ from dsis.camera import Camera
 from dsis.effects import Effect
 
 Array = NDArray[np.float64]
+# A size, what shapes it, and of what that is a plain one.
+_PLAIN = ((FALL_SIZE, RING_SIZE, 0.0), ("percent_full_scale", "exponent", 1.0))
 _LARGEST = 0.7  # correction of a logarithm
 _CLEAR = 0.9  # share of what slopes show that is theirs: more sensors are not needed
 _LEAST = 0.05  # of it, from which on errors are said as if it were that much
@@ -128,27 +131,29 @@ def _error(effect: Effect, name: str, half: float, layout: Layout, *, signed: bo
 def _plain(
     effect: Effect, which: int, free: Sequence[Free], square: Array, layout: Layout
 ) -> Plain | None:
-    """Return a fall of light as it is without a ring, if that may as well be none.
+    """Return a fall of light without a ring, or a parabola for a bend, if it may as well be that.
 
-    By the regression of one on the other; `square` is the covariance of what was fitted, in halves
-    of 95 % intervals.
+    By the regression of the size on the shape; `square` is the covariance of what was fitted, in
+    halves of 95 % intervals.
     """
     own = {name: k for k, (i, name, _) in enumerate(free) if i == which}
-    if not {FALL_SIZE, RING_SIZE} <= own.keys():
+    found = next((one for one in _PLAIN if {one[0], one[1]} <= own.keys()), None)
+    if found is None:
         return None
-    fall, ring = own[FALL_SIZE], own[RING_SIZE]
-    off = float(getattr(effect, RING_SIZE))
-    if not abs(off) <= np.sqrt(square[ring, ring]):
+    name, shape, none = found
+    size, other = own[name], own[shape]
+    off = float(getattr(effect, shape))
+    off = off - none if free[other][2] else log(off / none)
+    if not abs(off) <= np.sqrt(square[other, other]):
         return None
-    share = float(square[fall, ring] / square[ring, ring])
-    half = float(np.sqrt(max(square[fall, fall] - share**2 * square[ring, ring], 0.0)))
-    signed = free[fall][2]
-    changed = moved((effect,), 0, FALL_SIZE, signed, -share * off, as_is=True)
+    share = float(square[size, other] / square[other, other])
+    half = float(np.sqrt(max(square[size, size] - share**2 * square[other, other], 0.0)))
+    signed = free[size][2]
+    changed = moved((effect,), 0, name, signed, -share * off, as_is=True)
     if changed is None:
         return None
-    values = changed[0][0].model_dump() | {RING_SIZE: 0.0}
-    alone = type(effect)(**values)
-    return alone, {FALL_SIZE: _error(alone, FALL_SIZE, half, layout, signed=signed)}
+    alone = type(effect)(**(changed[0][0].model_dump() | {shape: none}))
+    return alone, {name: _error(alone, name, half, layout, signed=signed)}
 
 
 def _information(

@@ -34,7 +34,7 @@ from analysis.mismatch.phase import WholeFrames
 from analysis.mismatch.pictures import Album, evidence_of
 from analysis.mismatch.recalibrate import Calibrated
 from analysis.mismatch.remarks import remark_on_sizes, remarks_on
-from analysis.mismatch.segments import second_path
+from analysis.mismatch.segments import as_settled, second_path
 from analysis.mismatch.settle import would_settle
 from analysis.mismatch.source import Source
 from analysis.mismatch.spikes import Spikes, told_besides, with_spikes, without_spikes
@@ -293,7 +293,10 @@ def _finding(
         for m in base.mismatches
         for name, after in [explanations[m.statistic]]
     )
-    omitted = tuple(_omitted(n, because(explanations, n.name), gains[n.name]) for n in search.named)
+    omitted = tuple(
+        _omitted(n, because(explanations, n.name), gains[n.name], final.calibrated)
+        for n in search.named
+    )
     verdict: Verdict = "match"
     if omitted:
         verdict = "omitted_physics"
@@ -326,7 +329,9 @@ def _finding(
     )
 
 
-def _omitted(named: Named, why: tuple[str, ...], gain: Gain) -> OmittedEffect:
+def _omitted(
+    named: Named, why: tuple[str, ...], gain: Gain, calibrated: Calibrated
+) -> OmittedEffect:
     parameters, choices = {}, {}
     if named.proposal is not None:
         effect = named.proposal.effect
@@ -345,7 +350,8 @@ def _omitted(named: Named, why: tuple[str, ...], gain: Gain) -> OmittedEffect:
                 error = named.errors.get(name, known)
                 parameters[name] = FittedParameter(float(value), error)
     else:
-        parameters["switch_dn"] = FittedParameter(named.switch_dn, named.errors["switch_dn"])
+        switch = as_settled(calibrated, named.switch_dn, named.errors["switch_dn"])
+        parameters["switch_dn"] = FittedParameter(*switch)
     rivals = tuple(
         Alternative(
             kind,

@@ -3,7 +3,7 @@
 from collections.abc import Container, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from math import inf, log, nan, sqrt
+from math import inf, isclose, log, nan, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from analysis.mismatch.basefit import BaseFit, fit_base
 from analysis.mismatch.layout import Layout, Place
 from analysis.mismatch.rank import TOLD_APART
-from analysis.mismatch.recalibrate import with_numbers
+from analysis.mismatch.recalibrate import Calibrated, with_numbers
 from analysis.mismatch.scenes import SCENE
 from analysis.mismatch.state import State
 from analysis.mismatch.straight import polynomial
@@ -179,13 +179,33 @@ def _path(state: State, low: float, high: float, beside: Array) -> Path | None:
     gain = _loglik(left / state.null.sd[which]) - before - _PENALTY
     camera = with_numbers(state.camera, fit, (switch,), layout.black_dn)
     # Anywhere between the levels: about the place that is taken, their geometric middle.
-    error = sqrt((high - low) ** 2 / 12 + ((low + high) / 2 - switch) ** 2)
+    error = _anywhere(low, high, switch)
     mean = beside.copy()
     mean[which] = state.null.mean[which] + state.vector.values[which] - left
     for i, key in enumerate(state.vector.keys):
         if key.statistic == "pixel_variance" and key.scope == SCENE and state.null.known[i]:
             mean[i] += _grown(layout, key.place, calibrated.residual, fit)
     return Path(camera, switch, error, gain, mean, gap=(low, high))
+
+
+def as_settled(calibrated: Calibrated, switch_dn: float, error_dn: float) -> tuple[float, float]:
+    """Return the switch of a second segment and its error as the final model has them.
+
+    Levels of single colours may tell another gap than the means of exposures did: it lies anywhere
+    between the two that are next to it.
+    """
+    switches, signals = calibrated.switches, calibrated.fit.signal_dn.values()
+    if len(switches) != 1 or isclose(switches[0], switch_dn):
+        return switch_dn, error_dn
+    (own,) = switches
+    low = max((s for s in signals if s <= own), default=0.0)
+    high = min((s for s in signals if s > own), default=own)
+    return own, _anywhere(low, high, own)
+
+
+def _anywhere(low: float, high: float, place: float) -> float:
+    """Return the root mean square distance from a place to all that lies between two signals."""
+    return sqrt((high - low) ** 2 / 12 + ((low + high) / 2 - place) ** 2)
 
 
 def _squared(state: State, beside: Array) -> float:

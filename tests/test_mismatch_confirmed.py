@@ -210,3 +210,28 @@ def test_what_calls_for_an_effect_may_be_explained_with_a_stronger_one() -> None
 def test_lines_behind_a_stronger_one_may_explain_nothing() -> None:
     nothing = {"row_mean_variance": "row_noise", "level": "row_noise"}
     assert _beside(["spectral_peak"], nothing, "periodic_noise") is None
+
+
+@pytest.mark.parametrize(
+    ("first", "low", "explains", "dropped"),
+    [
+        ("outlying_patch", -0.2, False, True),  # dust, of which columns of some frames had a part
+        ("outlying_patch", 0.1, False, False),  # locked frames show it
+        ("outlying_patch", -0.2, True, False),
+        ("fixed_column_variance", -0.2, False, False),  # something calls for it
+    ],
+)
+def test_what_nothing_calls_for_in_all_frames_must_be_shown_by_locked_ones(
+    first: str, low: float, explains: bool, dropped: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    named: Any = Stub(name="column_prnu", kind="column_prnu", measured=False)
+    search: Any = Stub(named=[named], without=lambda *_: None)
+    base: Any = Stub(mismatches=[Stub(statistic=first)])
+    told = {first: ("column_prnu" if explains else None, 1.0)}
+    monkeypatch.setattr(confirmed, "changes", lambda *_: {})
+    monkeypatch.setattr(confirmed, "explained", lambda *_: told)
+    gains = {"column_prnu": Gain(0.14, (low, 0.5))}
+    found = confirmed.uncalled(search, base, base, gains)
+    assert found == ((named, confirmed.UNCALLED) if dropped else None)
+    named.measured = True
+    assert confirmed.uncalled(search, base, base, gains) is None

@@ -227,11 +227,37 @@ def test_what_nothing_calls_for_in_all_frames_must_be_shown_by_locked_ones(
     named: Any = Stub(name="column_prnu", kind="column_prnu", measured=False)
     search: Any = Stub(named=[named], without=lambda *_: None)
     base: Any = Stub(mismatches=[Stub(statistic=first)])
+    trial: Any = None  # nothing more is asked
     told = {first: ("column_prnu" if explains else None, 1.0)}
     monkeypatch.setattr(confirmed, "changes", lambda *_: {})
     monkeypatch.setattr(confirmed, "explained", lambda *_: told)
     gains = {"column_prnu": Gain(0.14, (low, 0.5))}
-    found = confirmed.uncalled(search, base, base, gains)
+    found = confirmed.uncalled(search, base, base, gains, trial)
     assert found == ((named, confirmed.UNCALLED) if dropped else None)
     named.measured = True
-    assert confirmed.uncalled(search, base, base, gains) is None
+    assert confirmed.uncalled(search, base, base, gains, trial) is None
+
+
+@pytest.mark.parametrize(
+    ("first", "odds", "explains", "dropped"),
+    [
+        ("row_correlation", 5.1, False, True),  # one of 6144 by chance
+        ("row_spectrum_peak", 5.1, False, True),  # of another's rows
+        ("row_correlation", 9.0, False, False),
+        ("spectral_peak", 5.1, True, False),
+    ],
+)
+def test_a_line_that_explains_nothing_must_be_sure(
+    first: str, odds: float, explains: bool, dropped: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    line = effect("periodic_noise", amplitude_dn=1.0, frequency=(0.05, -0.17))
+    named: Any = Stub(name="periodic_noise", kind="periodic_noise", measured=True, effect=line)
+    search: Any = Stub(named=[named], without=lambda *_: None)
+    base: Any = Stub(mismatches=[Stub(statistic=first)])
+    trial: Any = Stub(lines=Stub(gain=lambda _: odds))
+    monkeypatch.setattr(confirmed, "changes", lambda *_: {})
+    told = {first: ("periodic_noise" if explains else None, 5.0)}
+    monkeypatch.setattr(confirmed, "explained", lambda *_: told)
+    gains = {"periodic_noise": Gain(0.3, (0.1, 0.5))}
+    found = confirmed.uncalled(search, base, base, gains, trial)
+    assert found == ((named, confirmed.UNCALLED) if dropped else None)

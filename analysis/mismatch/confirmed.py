@@ -20,6 +20,7 @@ from analysis.mismatch.locate import FAMILY
 from analysis.mismatch.model import side_by_side
 from analysis.mismatch.name import Search
 from analysis.mismatch.named import Named, unclear
+from analysis.mismatch.rank import SURE_GAIN
 from analysis.mismatch.relit import relit
 from analysis.mismatch.state import State
 from analysis.mismatch.trial import Gained, Trial, denied
@@ -27,7 +28,7 @@ from dsis.camera import Camera
 
 Array = NDArray[np.float64]
 IDLE = "all that called for it is left, and nothing that differed is explained by it alone or best"
-UNCALLED = "nothing that differs in all frames calls for it, and locked ones leave it open"
+UNCALLED = "nothing that differs in all frames calls for it, and they leave it open"
 _LITTLE = 0.3  # of what a number differs by, that an effect changes
 _DOUBTFUL = 30.0  # gain of log-likelihood below which locked frames may not confirm an effect
 
@@ -77,19 +78,22 @@ def idle(
 
 
 def uncalled(
-    search: Search, base: State, final: State, gains: Mapping[str, Gain]
+    search: Search, base: State, final: State, gains: Mapping[str, Gain], trial: Trial
 ) -> tuple[Named, str] | None:
     """Return an effect for which nothing calls in all frames, nor do locked ones; None: none is.
 
     What hides behind another is called for by nothing at first: locked frames must show it then.
+    A line that explains nothing must be shown by all frames, at odds that take an effect in: peaks
+    are many, of one axis or of another's.
     """
     first = {m.statistic for m in base.mismatches}
     asked = [
         n
         for n in search.named
-        if n.kind in CANDIDATES and not (n.kind in LINES or n.measured)
-        if first.isdisjoint({*CANDIDATES[n.kind].calls, *CANDIDATES[n.kind].hints})
-        if n.name in gains and gains[n.name].ci95[0] <= 0
+        if n.kind in CANDIDATES and n.name in gains
+        if n.kind in LINES
+        or first.isdisjoint({*CANDIDATES[n.kind].calls, *CANDIDATES[n.kind].hints})
+        if _left_open(n, gains[n.name], trial)
     ]
     if not asked:
         return None
@@ -98,6 +102,13 @@ def uncalled(
     )
     nothing = next((n for n in asked if not because(told, n.name)), None)
     return None if nothing is None else (nothing, UNCALLED)
+
+
+def _left_open(named: Named, gain: Gain, trial: Trial) -> bool:
+    """Return whether frames leave open an effect that explains nothing that differs."""
+    if named.kind in LINES and named.effect is not None:
+        return trial.lines.gain(named.effect) - 1 < SURE_GAIN
+    return not named.measured and gain.ci95[0] <= 0
 
 
 def undenied_by_all(
@@ -111,7 +122,7 @@ def undenied_by_all(
         everything = search.of_all(final.camera)
         denied = denied_by_rest(search, everything, whole)
         denied = denied or idle(search, whole, everything)
-        denied = denied or uncalled(search, whole, everything, gains)
+        denied = denied or uncalled(search, whole, everything, gains, trial)
         if denied is None:
             return final, gains, everything
         final = search.fitted_anew(search.further(search.drop(final, *denied)))

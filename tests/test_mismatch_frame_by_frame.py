@@ -175,6 +175,8 @@ def _confirmed(monkeypatch: pytest.MonkeyPatch, **changes: Any) -> Gained:
     )
     final: Any = Stub(
         mismatches=[Stub(statistic=name) for name in how["left"]],
+        chances=np.array([]),
+        null=Stub(keys=()),
         calibrated=Stub(model=None),
         setting=Stub(layout=None),
     )

@@ -109,6 +109,11 @@ def test_darks_that_stay_alike_beside_a_lag_deny_it(
     assert alike_without_light(state, "rts", np.zeros(4)) is None
 
 
+def test_lit_frames_that_are_unlike_by_chance_deny_no_lag() -> None:
+    state = _state({"frame_correlation": (0.0, 0.0, -0.05, -0.05)}, set(), LAG)
+    assert alike_without_light(state, "image_lag", np.zeros(4)) is None
+
+
 @pytest.mark.parametrize(
     ("kind", "along_rows", "along_columns", "denied"),
     [

@@ -208,6 +208,9 @@ def test_coarse_codes_tell_nothing() -> None:
         ("telegraph", {"share": 0.004, "amplitude": 5.0, "switching": 0.4}),
         ("telegraph", {"share": 0.002, "amplitude": 9.0, "switching": 0.3}),
         ("equal", {"share": 0.008, "amplitude": 12.0, "switching": 0.3}),
+        ("equal", {"share": 0.0007, "amplitude": 41.0, "switching": 0.3}),
+        ("telegraph", {"share": 0.008, "amplitude": 50.7, "switching": 0.5}),
+        ("telegraph", {"share": 0.001, "amplitude": 60.0, "switching": 0.3}),
     ],
 )
 @pytest.mark.parametrize("seed", range(3))

@@ -28,7 +28,7 @@ from dsis.camera import Camera
 
 Array = NDArray[np.float64]
 IDLE = "all that called for it is left, and nothing that differed is explained by it alone or best"
-UNCALLED = "nothing that differs in all frames calls for it, and they leave it open"
+UNCALLED = "it explains nothing that differs in all frames, and frames leave it open"
 _LITTLE = 0.3  # of what a number differs by, that an effect changes
 _DOUBTFUL = 30.0  # gain of log-likelihood below which locked frames may not confirm an effect
 

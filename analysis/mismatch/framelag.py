@@ -47,10 +47,10 @@ def alike_without_light(state: State, kind: str, without: Array) -> Denial | Non
     share = max(1 - dark / max(lit, dark), 0.0) if dark > 0 else 1.0
     if dark >= max(_SURE * error, _MOST * lit):
         return Denial(share, "frames without light are alike as well")
-    if any(one.kind == _KIND for one in state.camera.effect) and _left(state, darks) > _SOME * lit:
-        return Denial(
-            share, "frames without light are alike, more than charge that stays makes them"
-        )
+    lagging = any(one.kind == _KIND for one in state.camera.effect)
+    if lagging and _left(state, darks) > _SOME * max(lit, 0.0):
+        why = "frames without light are alike, more than charge that stays makes them"
+        return Denial(share, why)
     return None
 
 

@@ -7,7 +7,7 @@ spread, that grow with time, or with noisier frames now and then. What telegraph
 from the best of these laws, and beside the best of them.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import reduce
 from math import exp, expm1, inf, isfinite, log, sqrt
@@ -208,8 +208,10 @@ def telegraph(layout: Layout, frames_of: FramesOf, jobs: int = 1) -> Telegraph |
 def could_jump(layout: Layout, frames_of: FramesOf, least: float) -> bool:
     """Return whether `telegraph` may find pixels that jump, of a gain of so many nats.
 
-    What telegraphs gain at most, on one of the laws of all other pixels, is no less than what they
-    do in the mean, on the best; few of the pixels that are not noisy tell it.
+    What telegraphs gain at most, on the best law of a variance for all other pixels, is as a rule
+    no less than what they do in the mean, on the best of all; few of the pixels that are not noisy
+    tell it, and every other height. Noise as strong that does not jump is left to `telegraph`: far
+    from its height a strong jump is less likely than that.
     """
     blocks = list(blocks_of(layout, frames_of))
     if not blocks:
@@ -217,25 +219,20 @@ def could_jump(layout: Layout, frames_of: FramesOf, least: float) -> bool:
     noise = min(float(own.min()) for _, own, _ in blocks)
     which, weight = chosen(blocks, noise, _FEW_OTHERS)
     heights, switching = _HEIGHTS[::2] * sqrt(noise), _SWITCHING[::2]
-    amplitudes = np.geomspace(heights[0], heights[-1] / 2, _FEW_HEIGHTS)
     some = [(x[which], dn2[which]) for x, dn2, _ in blocks]
     jumps = np.sum([of_jumps(x, dn2, heights, switching) for x, dn2 in some], 0)
-    twins = np.sum([of_variances(x, dn2, heights**2 / 4) for x, dn2 in some], 0)
     own = np.sum([of_variances(x, dn2, (_RATIOS - 1) * noise) for x, dn2 in some], 0)
-    top = np.maximum(np.max([own.max(1), twins.max(1), jumps.max((1, 2))], 0), 0.0)
-    jumping, still = np.exp(jumps - top[:, None, None]), np.exp(twins - top[:, None])
-    likely = np.exp(own - top[:, None])
+    top = np.maximum(np.maximum(own.max(1), jumps.max((1, 2))), 0.0)
+    jumping, likely = np.exp(jumps - top[:, None, None]), np.exp(own - top[:, None])
     laws = [np.exp(-top), *(likely @ _log_normal(s, c) for s in _SPREADS for c in _CENTRES)]
     beside = max(laws, key=lambda one: _sum(one, weight))
-    alone = _sum(beside, weight)
-
-    def most(of: Callable[[Array, Array, float], Array], classes: Array) -> float:
-        shares = (_of_shares(of(classes, heights, a), beside, weight, _PARTS) for a in amplitudes)
-        return max(float(one.max()) for one in shares)
-
-    laws_of = (_of_heights, _of_height)
-    best = max(most(of, jumping[:, :, w]) for of in laws_of for w in range(switching.size))
-    return best - alone >= least and best - most(_of_heights, still) > TOLD_APART
+    return any(
+        float(_of_shares(of(jumping[:, :, w], heights, a), beside, weight, _PARTS).max())
+        >= _sum(beside, weight) + least
+        for of in (_of_heights, _of_height)
+        for w in range(switching.size)
+        for a in np.geomspace(heights[0], heights[-1] / 2, _FEW_HEIGHTS)
+    )
 
 
 def _fitted(jumps: Array, others: _Others, weight: Array, heights: Array) -> Telegraph | None:

@@ -229,7 +229,7 @@ def test_what_nothing_calls_for_in_all_frames_must_be_shown_by_locked_ones(
     base: Any = Stub(mismatches=[Stub(statistic=first)])
     trial: Any = None  # nothing more is asked
     told = {first: ("column_prnu" if explains else None, 1.0)}
-    monkeypatch.setattr(confirmed, "changes", lambda *_: {})
+    monkeypatch.setattr(confirmed, "changes", lambda *_: {named.name: None})
     monkeypatch.setattr(confirmed, "explained", lambda *_: told)
     gains = {"column_prnu": Gain(0.14, (low, 0.5))}
     found = confirmed.uncalled(search, base, base, gains, trial)
@@ -255,7 +255,7 @@ def test_a_line_that_explains_nothing_must_be_sure(
     search: Any = Stub(named=[named], without=lambda *_: None)
     base: Any = Stub(mismatches=[Stub(statistic=first)])
     trial: Any = Stub(lines=Stub(gain=lambda _: odds))
-    monkeypatch.setattr(confirmed, "changes", lambda *_: {})
+    monkeypatch.setattr(confirmed, "changes", lambda *_: {named.name: None})
     told = {first: ("periodic_noise" if explains else None, 5.0)}
     monkeypatch.setattr(confirmed, "explained", lambda *_: told)
     gains = {"periodic_noise": Gain(0.3, (0.1, 0.5))}

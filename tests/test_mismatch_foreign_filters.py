@@ -144,11 +144,12 @@ def test_samples_that_share_their_noise_have_no_law_of_their_own(
 def test_a_switch_is_where_the_final_model_has_it() -> None:
     signals = {("a", "B"): 2400.0, ("a", "Gr"): 3500.0, ("b", "B"): 1000.0}
     moved: Any = Stub(switches=(2900.0,), fit=Stub(signal_dn=signals))
-    switch, error = as_settled(moved, 2100.0, 380.0)
+    switch, error = as_settled(moved, 2100.0, 180.0)
     assert switch == 2900.0
     drawn = np.random.default_rng(1).uniform(2400, 3500, 200_000)
     assert error == pytest.approx(np.sqrt(((drawn - 2900) ** 2).mean()), rel=0.01)
     same: Any = Stub(switches=(2100.0,), fit=Stub(signal_dn=signals))
     assert as_settled(same, 2100.0, 380.0) == (2100.0, 380.0)
+    assert as_settled(moved, 2850.0, 900.0) == (2900.0, 900.0)  # other gaps were as likely
     none: Any = Stub(switches=(), fit=Stub(signal_dn=signals))
     assert as_settled(none, 2100.0, 380.0) == (2100.0, 380.0)

@@ -3,7 +3,7 @@
 import json
 from math import exp, isnan, log
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -12,13 +12,17 @@ from hypothesis import strategies as st
 from scipy.stats import norm
 
 from analysis.mismatch.asked import FramesAsked
+from analysis.mismatch.candidates import Proposal, measured
+from analysis.mismatch.choice import Choice
 from analysis.mismatch.diagnose import VOCABULARY, find_mismatch
 from analysis.mismatch.explain import of_frames
 from analysis.mismatch.finding import Mismatch, Where
 from analysis.mismatch.jsonfile import finding_values
 from analysis.mismatch.jumping import LEAST, NAME, Jumping
 from analysis.mismatch.locate import FAMILY
+from analysis.mismatch.name import Search
 from analysis.mismatch.pixelframes import chosen
+from analysis.mismatch.rank import SURE_GAIN
 from dsis.effects import registry
 from mismatch_recordings import camera, recorded
 
@@ -28,7 +32,7 @@ JUMPS = RTS(pixel_fraction=0.003, amplitude_dn=5.0)
 
 @given(st.floats(5.2, 600.0))
 def test_odds_are_a_chance_and_a_departure(gain: float) -> None:
-    found = Jumping.of(gain, JUMPS, ["dark-0", "flat-0"]).mismatch
+    found = Jumping.of(gain, ["dark-0", "flat-0"]).mismatch
     assert found.statistic == NAME
     assert found.p_adjusted == pytest.approx(exp(-gain))
     assert found.where.exposures == ("dark-0", "flat-0")
@@ -39,7 +43,7 @@ def test_odds_are_a_chance_and_a_departure(gain: float) -> None:
 
 
 def test_what_differs_stays_in_order_and_a_camera_with_jumps_has_no_others() -> None:
-    own = Jumping.of(20.0, JUMPS, [])
+    own = Jumping.of(20.0, [])
     far, near = (Mismatch(name, z, 1e-9, Where(), "") for name, z in (("a", -9.0), ("b", 5.1)))
     assert own.beside((far, near), []) == (far, own.mismatch, near)
     assert own.beside((far, near), [JUMPS]) == (far, near)
@@ -64,13 +68,12 @@ def test_frames_show_jumps_where_they_are_likelier_than_all_else(
     monkeypatch.setattr("analysis.mismatch.asked.could_jump", lambda *_: could)
     layout: Any = SimpleNamespace(large=large, uniform=[SimpleNamespace(name="dark-0")])
     asked = FramesAsked(layout, lambda _: ())
-    asked.__dict__["telegraph"] = SimpleNamespace(
-        gain=gain, jumping=jumping, values=JUMPS.model_dump(exclude={"kind"})
-    )
+    asked.__dict__["telegraph"] = SimpleNamespace(gain=gain, jumping=jumping)
     told = asked.located
     assert (told is not None) is found
     if told is not None:
-        assert told.effect == JUMPS
+        assert told.effect is None  # all frames only say that they do
+        assert f"odds of {exp(gain):.1g} to 1" in told.mismatch.says
         assert told.mismatch.where.exposures == ("dark-0",)
     assert -log(FAMILY) == LEAST
 
@@ -82,7 +85,7 @@ def test_frames_show_jumps_where_they_are_likelier_than_all_else(
 def test_what_only_frames_show_is_explained_by_what_it_calls_for(
     left: tuple[str, ...], named: tuple[str, ...], expected: str | None
 ) -> None:
-    mismatch = Jumping.of(20.0, JUMPS, []).mismatch
+    mismatch = Jumping.of(20.0, []).mismatch
     final: Any = SimpleNamespace(mismatches=[SimpleNamespace(statistic=s, z=4.0) for s in left])
     own, after = of_frames(mismatch, named, final)
     assert own == expected
@@ -124,3 +127,32 @@ def test_few_weak_jumps_are_named_or_located(known: bool) -> None:
             assert isinstance(told.value, float)
             assert abs(told.value - value) < 2 * told.standard_error
         assert found.unexplained == ()
+
+
+@pytest.mark.parametrize("least", [SURE_GAIN, 90.0])
+def test_the_odds_that_frames_must_have_forget_what_was_dropped(least: float) -> None:
+    """A search that just dropped an effect of 90 nats takes in less for nothing else."""
+    base: Any = SimpleNamespace(mismatches=())
+    search = Search(cast("Any", None), camera(), base, VOCABULARY, lambda: None, least=least)
+    assert search.least_odds == SURE_GAIN
+    assert search._least(base, "rts") == least
+
+
+@pytest.mark.parametrize("there", [None, "equal", "exponential"])
+def test_sizes_of_jumps_are_those_of_the_frames_that_are_fitted(there: str | None) -> None:
+    """Heights go with the sizes that were found beside them."""
+    values = {"pixel_fraction": 0.002, "amplitude_dn": 9.0, "switch_probability": 0.2}
+    seen = (
+        None if there is None else SimpleNamespace(values={**values, "heights": there}, errors={})
+    )
+    search: Any = SimpleNamespace(measuring=SimpleNamespace(telegraph=seen))
+    state: Any = SimpleNamespace(setting=SimpleNamespace(jumping=Jumping.of(20.0, [])))
+    told = Choice._jumps(search, state, JUMPS)
+    assert (told is None) is (there is None)
+    if told is not None:
+        other = RTS(**values, heights="equal" if there == "exponential" else "exponential")
+        own = measured(Proposal(other, ("pixel_fraction",)), *told)
+        assert own.effect == RTS(**values, heights=there)
+    none: Any = SimpleNamespace(setting=SimpleNamespace(jumping=None))
+    assert Choice._jumps(search, none, JUMPS) is None
+    assert Choice._jumps(search, state, registry()["row_noise"](sigma_dn=1.0)) is None

@@ -31,7 +31,7 @@ def test_what_a_state_without_an_effect_would_take_in_is_needed(there: bool) -> 
     search: Any = SimpleNamespace(
         setting=state.setting,
         _jumping=False,
-        least_gain=lambda *_: SURE_GAIN,
+        _least=lambda *_: SURE_GAIN,
         _shown=lambda *_: -inf,
     )
     named = Named("row_noise", Proposal(ROW_NOISE, ("sigma_dn",)), {}, gain, ())
@@ -62,7 +62,7 @@ def test_jumps_that_whole_frames_show_are_needed_whatever_numbers_of_few_pixels_
     effect = registry()["rts"](pixel_fraction=0.003, amplitude_dn=5.0)
     effect = effect if kind == "rts" else ROW_NOISE
     lines = None if shown is None else SimpleNamespace(jumping=lambda least: shown and least == 5)
-    asked = SimpleNamespace(lines=lines, base=None, least_gain=lambda *_: 5)
+    asked = SimpleNamespace(lines=lines, least_odds=5)
     search: Any = SimpleNamespace(_jumping=Search._jumping.fget(asked))  # type: ignore[attr-defined]
     nothing: Any = SimpleNamespace(mismatches=())
     named = Named(kind, Proposal(effect, ("amplitude_dn",)), {}, 9.0, ())

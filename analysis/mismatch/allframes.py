@@ -32,8 +32,8 @@ def shown_by_all(search: Search, final: State, named: Named, without: Camera, tr
     if own is None or search.whole is None:
         return False
     if own.effect.kind == _JUMPS:
-        least = search.least_gain(search.base, _JUMPS)
-        return trial.lines.jumping(least) and all(one.kind != _JUMPS for one in without.effect)
+        known = any(one.kind == _JUMPS for one in without.effect)
+        return trial.lines.jumping(search.least_odds) and not known
     if not once_a_frame(own.effect):
         return False
     alone = not any(same_place(own.effect, one, search.whole.layout) for one in without.effect)

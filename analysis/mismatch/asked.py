@@ -70,14 +70,14 @@ class FramesAsked:
         """That few pixels of a small recording jump; None: frames do not show it."""
         if self.layout.large or not could_jump(self.layout, self.frames_of, LEAST):
             return None
-        seen, jumps = self.telegraph, self.jumps
-        if seen is None or jumps is None or not self.jumping(LEAST):
+        seen = self.telegraph
+        if seen is None or not self.jumping(LEAST):
             return None
-        return Jumping.of(seen.gain, jumps, [exposure.name for exposure in self.layout.uniform])
+        return Jumping.of(seen.gain, [exposure.name for exposure in self.layout.uniform])
 
     @property
     def jumps(self) -> Rts | None:
-        """The pixels that jump, of the most likely numbers; None: nothing is asked."""
+        """The pixels that jump, of their mean numbers; None: nothing is asked."""
         seen = self.telegraph
         return None if seen is None else Rts.model_validate({"kind": "rts", **seen.values})
 

@@ -100,7 +100,7 @@ class Choice(Fitted):
             error = {"switch_dn": path.error_dn}
             found = Named(path.kind, None, error, path.gain, rivals, path.switch_dn)
             return found, path.camera
-        if not fitted or most < self.least_gain(state, fitted[0].kind):
+        if not fitted or most < self._least(state, fitted[0].kind):
             return None
         best = fitted[0]
         camera = joined(state.camera, best.polished.effects, self.setting.given)
@@ -118,6 +118,14 @@ class Choice(Fitted):
         named = Named(best.kind, proposal, errors, best.gain, rivals)
         return None if camera is None else (named, camera)
 
+    @property
+    def least_odds(self) -> float:
+        """By how much frames must be likelier with pixels that jump for these to be there, nats.
+
+        Whatever went before.
+        """
+        return min(self._least(self.base, "rts"), SURE_GAIN)
+
     def _jumps(self, state: State, effect: Effect) -> Measured | None:
         """Return what frames say of pixels that jump, where all show them; else None.
 
@@ -128,7 +136,7 @@ class Choice(Fitted):
         seen = self.measuring.telegraph
         return None if seen is None else (seen.values, seen.errors)
 
-    def least_gain(self, state: State, kind: str) -> float:
+    def _least(self, state: State, kind: str) -> float:
         """Return the gain from which an effect is taken in: at odds of 20 against none.
 
         Of all kinds of the vocabulary; where what calls for it is sure, of those that this calls

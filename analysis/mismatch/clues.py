@@ -46,7 +46,7 @@ class Clues:
         Lines that an effect of a kind needs no trial for, (kind, frequency): they were named as one
         or the other, or refused to this one; of `NO_LINE` no effect needs one.
     jumps
-        Pixels that jump, as whole frames show them; None: they do not.
+        Pixels that jump, of their mean numbers; None: whole frames do not show them.
     """
 
     layout: Layout

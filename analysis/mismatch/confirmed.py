@@ -68,13 +68,28 @@ def idle(
         if (calls := left.intersection(CANDIDATES[n.kind].calls))
         and calls >= first.intersection(CANDIDATES[n.kind].calls)
     ]
+    return _explaining_nothing(search, base, final, asked, IDLE, known)
+
+
+def _explaining_nothing(
+    search: Search,
+    base: State,
+    final: State,
+    asked: Sequence[Named],
+    why: str,
+    known: Mapping[str, Array] | None = None,
+) -> tuple[Named, str] | None:
+    """Return the first of some effects to which nothing that differed is put down, and why.
+
+    None: there is none. `known` is as in `idle`.
+    """
     if not asked:
         return None
     if known is None:
         known = changes(base, final, search.named, partial(search.without, final))
     told = explained(base, final, {n.name: known[n.name] for n in search.named})
     nothing = next((n for n in asked if not because(told, n.name)), None)
-    return None if nothing is None else (nothing, IDLE)
+    return None if nothing is None else (nothing, why)
 
 
 def uncalled(
@@ -93,18 +108,12 @@ def uncalled(
         if n.kind in CANDIDATES and n.name in gains
         if n.kind in LINES
         or first.isdisjoint({*CANDIDATES[n.kind].calls, *CANDIDATES[n.kind].hints})
-        if _left_open(n, gains[n.name], trial)
+        if _unshown(n, gains[n.name], trial)
     ]
-    if not asked:
-        return None
-    told = explained(
-        base, final, changes(base, final, search.named, partial(search.without, final))
-    )
-    nothing = next((n for n in asked if not because(told, n.name)), None)
-    return None if nothing is None else (nothing, UNCALLED)
+    return _explaining_nothing(search, base, final, asked, UNCALLED)
 
 
-def _left_open(named: Named, gain: Gain, trial: Trial) -> bool:
+def _unshown(named: Named, gain: Gain, trial: Trial) -> bool:
     """Return whether frames leave open an effect that explains nothing that differs."""
     if named.kind in LINES and named.effect is not None:
         return trial.lines.gain(named.effect) - 1 < SURE_GAIN
@@ -269,7 +278,7 @@ def _calls_left(search: Search, state: State, named: Named) -> bool:
     null, keys = state.null, state.null.keys
     off = [i for i in np.flatnonzero(state.chances < FAMILY) if keys[i].statistic in left]
     if left - {keys[i].statistic for i in off}:
-        return True  # whole frames show it
+        return True  # all frames show it, and no number of these does
     change = null.mean - state.predictor().mean(search.without(state, named))
     change = np.where(null.known & np.isfinite(change), change, 0.0) / null.sd
     both = np.concatenate([change, null.contrasts.matrix @ change / null.contrast_sd])

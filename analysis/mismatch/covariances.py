@@ -55,7 +55,7 @@ def of_frames(state: State) -> Denial | None:
     lines, it is what they lack.
     """
     left = left_open(state, (_FRAMES,))
-    factors = {place: (1 + r) / (1 - r) for (place, _), (r, _) in left.items() if 0 < r < 1}
+    factors = {place: (1 + r) / (1 - r) for (place, _), (r, _) in left.items() if -1 < r < 1}
     why = (
         "successive frames are alike for another reason, and have as covariance what variances lack"
     )

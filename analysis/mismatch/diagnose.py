@@ -23,6 +23,7 @@ from analysis.mismatch.finding import (
     Verdict,
 )
 from analysis.mismatch.instance import kind_of
+from analysis.mismatch.jumping import Jumping
 from analysis.mismatch.layout import Layout
 from analysis.mismatch.model import both, processes
 from analysis.mismatch.name import Search
@@ -122,8 +123,9 @@ def _found(
     setting = replace(setting, given=len(camera.effect), asked_again=not large)
 
     trial = Trial.of(recording, split, source, setting)
-    jumping = any(isinstance(one, Rts) for one in camera.effect)
-    setting = replace(setting, jumping=None if jumping else trial.lines.located)
+    # Of a large recording lines are looked for, and measured, in the same frames.
+    frames = WholeFrames(with_all_frames(layout) if large else layout, frames_of, how[1])
+    setting = replace(setting, jumping=_jumping(camera, trial.lines, frames))
     whole = State.of(setting if large else _of_all_frames(setting, trial), camera, step)
     if not (words and whole.mismatches):
         search = Search(setting, camera, whole, words, step)
@@ -138,8 +140,6 @@ def _found(
         found = with_spikes(found, spikes, stored, split, asked)
         return _said(found, remarks, evidence, asked)
     base = whole if large else State.of(setting, camera, step)
-    # Of a large recording lines are looked for, and measured, in the same frames.
-    frames = WholeFrames(with_all_frames(layout) if large else layout, frames_of, how[1])
     search = Search(
         setting,
         camera,
@@ -207,6 +207,17 @@ def _of_all_frames(setting: Setting, trial: Trial) -> Setting:
     """
     layout, seen = trial.numbers.whole
     return replace(setting, layout=layout, seen=seen, asked_again=False)
+
+
+def _jumping(camera: Camera, lines: WholeFrames, measuring: WholeFrames) -> Jumping | None:
+    """Return pixels that jump, as all frames show them, by numbers of those that are not locked.
+
+    None: frames do not show them, or the camera has some.
+    """
+    if any(isinstance(one, Rts) for one in camera.effect):
+        return None
+    found = lines.located
+    return None if found is None else replace(found, effect=measuring.jumps)
 
 
 def _calibrated_to(setting: Setting, whole: State, camera: Camera) -> Calibrated:

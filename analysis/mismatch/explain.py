@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from analysis.mismatch.candidates import CANDIDATES
 from analysis.mismatch.finding import Mismatch
 from analysis.mismatch.instance import kind_of
+from analysis.mismatch.jumping import NAME as JUMPING
 from analysis.mismatch.locate import FAMILY
 from analysis.mismatch.named import Named
 from analysis.mismatch.segments import bent
@@ -44,7 +45,7 @@ def explained(
             for i, key in enumerate(base.null.keys)
             if key.statistic == mismatch.statistic and base.chances[i] < FAMILY
         ]
-        if not which:  # whole frames show it, and no number of the bank
+        if mismatch.statistic == JUMPING:
             found[mismatch.statistic] = of_frames(mismatch, changes, final)
             continue
         z = base.departures[which]

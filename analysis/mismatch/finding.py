@@ -56,7 +56,8 @@ class Mismatch:
     Attributes
     ----------
     statistic
-        Its name: one of `dsis.measures.MEASURES` or of `analysis.mismatch.bank`.
+        Its name: one of `dsis.measures.MEASURES` or of `analysis.mismatch.bank`; or what whole
+        frames show besides, see `jumping`.
     z
         Departure in standard deviations of the null.
     p_adjusted
@@ -66,7 +67,7 @@ class Mismatch:
     explained_by
         The effect that explains it; None: nothing does.
     z_after
-        The departure from the final model; nan where nothing was named.
+        The departure from the final model; nan where nothing was named, or frames alone would say.
     """
 
     statistic: str

@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.contradicted import Denial
+from analysis.mismatch.jumping import NAME as JUMPING
 from analysis.mismatch.leftopen import left_open
 from analysis.mismatch.state import State
 
@@ -11,7 +12,7 @@ Array = NDArray[np.float64]
 _KIND, _STATISTIC = "image_lag", "frame_correlation"
 _SURE = 5.0  # standard errors by which darks are alike
 _MOST, _SOME = 0.5, 0.15  # of how alike lit frames are, that darks may be; beyond the model
-_OF_FEW = frozenset({"jumping_pixels", "noisy_pixels", "one_off_outliers", "variance_persistence"})
+_OF_FEW = frozenset({JUMPING, "noisy_pixels", "one_off_outliers", "variance_persistence"})
 
 
 def alike_without_light(state: State, kind: str, without: Array) -> Denial | None:

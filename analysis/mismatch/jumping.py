@@ -12,7 +12,8 @@ from dsis.effects import Effect
 from dsis.effects.rts import Rts
 
 NAME = "jumping_pixels"
-_MOST = 37.0  # standard errors: beyond that chances are no numbers
+_MOST = 700.0  # nats: beyond that odds are no numbers
+_FARTHEST = 37.0  # standard errors: nor are chances
 LEAST = -log(FAMILY)  # nats
 
 
@@ -23,28 +24,28 @@ class Jumping:
     Attributes
     ----------
     mismatch
-        That they do.
+        That they do, as all frames show it.
     effect
-        The most likely numbers.
+        Their mean numbers, of frames that are not locked; None: these tell none.
     """
 
     mismatch: Mismatch
-    effect: Rts
+    effect: Rts | None = None
 
     @classmethod
-    def of(cls, gain: float, effect: Rts, exposures: Iterable[str]) -> "Jumping":
+    def of(cls, gain: float, exposures: Iterable[str]) -> "Jumping":
         """Return it from the logarithm of the odds that pixels jump, nats.
 
         Frames without such pixels have odds of x in 1 / x of recordings at most (Markov's
-        inequality).
+        inequality), if their noise has one of the laws that jumps are told from.
         """
         chance = exp(-gain)
-        where, z = Where(exposures=tuple(exposures)), min(float(norm.isf(chance / 2)), _MOST)
+        where, z = Where(exposures=tuple(exposures)), min(float(norm.isf(chance / 2)), _FARTHEST)
         says = (
-            "A few pixels jump between two levels from frame to frame: "
-            f"whole frames show it at {z:.3g} standard errors."
+            "A few pixels jump between two levels from frame to frame: whole frames show it at "
+            f"odds of {exp(min(gain, _MOST)):.1g} to 1."
         )
-        return cls(Mismatch(NAME, z, chance, where, says), effect)
+        return cls(Mismatch(NAME, z, chance, where, says))
 
     def beside(
         self, found: tuple[Mismatch, ...], effects: Iterable[Effect]

@@ -216,12 +216,12 @@ class Search(Choice):
             return False
         gain = gained(state, bare, own.effect, replicates_for(self.setting, [own.effect]))
         most = max(gain, self._shown(own.effect, bare))
-        return most - own.price >= self.least_gain(bare, named.kind)
+        return most - own.price >= self._least(bare, named.kind)
 
     @property
     def _jumping(self) -> bool:
         """Whether whole frames show pixels that jump."""
-        return self.lines is not None and self.lines.jumping(self.least_gain(self.base, "rts"))
+        return self.lines is not None and self.lines.jumping(self.least_odds)
 
     def _judge(self, state: State) -> Judge:
         return Judge(state, lambda named: self.without(state, named), self.setting.nulls)

@@ -16,7 +16,7 @@ _LEAST_FRAMES = 3  # of which a median pixel tells the noise
 _COARSE = 1.0  # step between codes, in standard deviations, from which on codes jump by themselves
 _MOST_LINES = 160
 _NOISY = 2.5  # standard deviations: all such pixels are looked at
-_RARE = 3e-3  # and those noisier in one exposure than this share of pixels is by chance
+_RARE = 0.02  # and those noisier in one block than this share of pixels is by chance in any
 
 
 def blocks_of(layout: Layout, frames_of: FramesOf) -> Iterator[tuple[Array, Array, float]]:
@@ -78,7 +78,7 @@ def chosen(
         square = (x**2).sum(1) / noise
         score += trust * (square - dof)
         norm += 2 * dof * float((trust**2).mean())
-        noisy |= square > chi2.isf(_RARE, dof)
+        noisy |= square > chi2.isf(_RARE / len(blocks), dof)
     noisy |= score > _NOISY * sqrt(norm)
     others = np.flatnonzero(~noisy)
     others = others[np.argsort(score[others], kind="stable")]  # each stands for its like

@@ -192,7 +192,7 @@ def as_settled(calibrated: Calibrated, switch_dn: float, error_dn: float) -> tup
     """Return the switch of a second segment and its error as the final model has them.
 
     Levels of single colours may tell another gap than the means of exposures did: it lies anywhere
-    between the two that are next to it.
+    between the two that are next to it, and is known no better than before.
     """
     switches, signals = calibrated.switches, calibrated.fit.signal_dn.values()
     if len(switches) != 1 or isclose(switches[0], switch_dn):
@@ -200,7 +200,7 @@ def as_settled(calibrated: Calibrated, switch_dn: float, error_dn: float) -> tup
     (own,) = switches
     low = max((s for s in signals if s <= own), default=0.0)
     high = min((s for s in signals if s > own), default=own)
-    return own, _anywhere(low, high, own)
+    return own, max(_anywhere(low, high, own), error_dn)
 
 
 def _anywhere(low: float, high: float, place: float) -> float:

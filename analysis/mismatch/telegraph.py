@@ -88,7 +88,8 @@ class Telegraph:
             "pixel_fraction": self.share,
             "amplitude_dn": self.amplitude_dn,
             "switch_probability": self.switching,
-        } | ({"heights": "equal"} if self.equal else {})
+            "heights": "equal" if self.equal else "exponential",
+        }
 
     @property
     def errors(self) -> Mapping[str, float]:
@@ -304,13 +305,14 @@ def _told(likely: Array, amplitudes: Array, gains: tuple[float, float, float]) -
     many = chance[:, :, _PARTS > _MANY].sum() > _SURELY
     found = []
     for axis, places in enumerate((_SWITCHING, amplitudes, _PARTS)):
+        end = _SWITCHING[-1] if axis == 0 else inf  # no frames switch oftener
         own = chance.sum(tuple(k for k in range(chance.ndim) if k != axis))
         # One place's own logarithm, rounded, may be beyond it: half of all frames is the most.
         mean = float(np.clip(exp(float(own @ np.log(places))), places[0], places[-1]))
         # No better than where between two places.
         step = mean * float(np.diff(np.log(places)).mean())
         wide = sqrt(float(own @ (np.log(places) - log(mean)) ** 2))
-        farther = mean * expm1(_NORMAL * wide) / _NORMAL
+        farther = min(mean * expm1(_NORMAL * wide), end - mean) / _NORMAL
         square = max(float(own @ (places - mean) ** 2), farther**2)
         found.append((mean, sqrt(square + step**2 / 12)))
     (switching, a), (amplitude, b), (share, c) = found

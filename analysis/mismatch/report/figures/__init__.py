@@ -17,6 +17,7 @@ from analysis.mismatch.bank.motion import STATISTIC as MOTION
 from analysis.mismatch.bank.standing import NAME as FIXED_WAVE
 from analysis.mismatch.evidence import Array, Evidence, Histogram, Map, Shown
 from analysis.mismatch.finding import Finding, Mismatch
+from analysis.mismatch.jumping import NAME as JUMPING
 from analysis.mismatch.report.figures import (
     codes,
     curves,
@@ -36,7 +37,7 @@ MAPPED = ("fixed_", "half_seam", "parity", "outlying_")
 AXES = {"fixed_row_variance": "rows", "fixed_column_variance": "columns"}
 GROUPS: Mapping[str, profiles.Groups] = {"half_seam": "halves", "parity": "parity"}
 NOISY_PIXELS = frozenset(
-    {"variance_spread", "variance_persistence", "noisy_pixels", "one_off_outliers"}
+    {"variance_spread", "variance_persistence", "noisy_pixels", "one_off_outliers", JUMPING}
 )
 OFF_AXIS = frozenset({"spectral_peak", "phase", "alternation_variance", "patch_variance",
                       ALTERNATING})  # fmt: skip

@@ -12,7 +12,7 @@ from scipy.stats import multivariate_normal
 
 from analysis.mismatch.layout import Layout, Taken
 from analysis.mismatch.phase import WholeFrames
-from analysis.mismatch.pixellaw import of_jumps, of_spikes, of_variances
+from analysis.mismatch.pixellaw import of_drifts, of_jumps, of_spikes, of_variances
 from analysis.mismatch.telegraph import Telegraph, could_jump, telegraph
 from dsis.cfa import Cfa
 from dsis.effects.rts import Rts
@@ -62,6 +62,22 @@ def test_noisy_frames_are_as_likely_as_all_sequences_say(
     assert varied[0, 0] == pytest.approx(other - plain, rel=1e-6, abs=1e-6)
 
 
+@given(SAMPLES, st.floats(0.5, 4), st.floats(0.5, 200))
+def test_frames_that_drift_are_as_likely_as_their_covariance_says(
+    samples: list[float], noise: float, added: float
+) -> None:
+    x, number = np.array(samples), np.arange(FRAMES)
+    found = of_drifts(x[None], np.array([noise]), np.array([added]))
+    for k, course in enumerate([number, np.exp(-4 * number / FRAMES), np.exp(-number)]):
+        way = course - course.mean()
+        way = way * np.sqrt(added / (way**2).mean())
+        plain, own = (
+            multivariate_normal.logpdf(BASIS @ x, cov=BASIS @ covariance @ BASIS.T)
+            for covariance in (noise * np.eye(FRAMES), noise * np.eye(FRAMES) + np.outer(way, way))
+        )
+        assert found[0, 0, k] == pytest.approx(own - plain, rel=1e-6, abs=1e-6)
+
+
 SHAPE, STACK = (72, 96), 8
 SURE = 7.0  # nats
 NOISE = (2.0, 2.0, 3.0, 6.0)  # DN, of four exposures: two darks, two flats
@@ -86,13 +102,14 @@ def _frames(seed: int, kind: str, **how: float) -> tuple[Layout, dict[str, list[
     if kind != "equal":
         height[some] *= rng.exponential(size=int(some.sum()))
     spread = np.exp(how.get("log_sigma", 0.0) * rng.normal(size=pixels))
+    warmed = np.where(rng.random(pixels) < 0.01, rng.exponential(20.0, pixels), 0.0)
     for i, sd in enumerate(NOISE):
         shot = np.sqrt(sd**2 - NOISE[0] ** 2)
         state = rng.random(pixels) < 0.5
         frames = []
         memory = how.get("memory", 0.0)
         white = rng.normal(size=pixels) if memory else np.zeros(pixels)
-        for _ in range(STACK):
+        for k in range(STACK):
             state ^= rng.random(pixels) < how.get("switching", 0.5)
             white = memory * white + np.sqrt(1 - memory**2) * rng.normal(size=pixels)
             read = NOISE[0] * spread * white
@@ -103,6 +120,10 @@ def _frames(seed: int, kind: str, **how: float) -> tuple[Layout, dict[str, list[
             if kind == "spikes":
                 hit = rng.random(pixels) < 2e-3
                 read[hit] += rng.exponential(20.0, int(hit.sum()))
+            if kind == "warming":
+                read += warmed * (0.7 + how["by"] * k / STACK)
+            if kind == "settling":
+                read -= warmed * how["by"] * np.exp(-k / 2)
             signal = 100.0 * i + height * state + read + shot * rng.normal(size=pixels)
             frames.append(np.rint(signal + 64).reshape(SHAPE))
         stacks[f"e{i}"] = frames
@@ -143,7 +164,8 @@ def test_jumps_of_one_height_are_told_from_exponential_ones(seed: int) -> None:
 @pytest.mark.parametrize(
     ("kind", "how"),
     [("alike", {}), ("tails", {}), ("spikes", {}), ("spread", {"log_sigma": 0.3}),
-     ("spread", {"log_sigma": 0.8}), ("many tails", {"log_sigma": 0.4})],
+     ("spread", {"log_sigma": 0.8}), ("many tails", {"log_sigma": 0.4}),
+     ("warming", {"by": 1.0}), ("settling", {"by": 0.7}), ("settling", {"by": -0.3})],
 )  # fmt: skip
 @pytest.mark.parametrize("seed", range(3))
 def test_pixels_that_are_noisy_otherwise_do_not_jump(

@@ -2,7 +2,7 @@
 
 Of x, the frames of one exposure at one pixel, the mean is unknown and integrated out: fixed
 patterns speak for none. Laws are: two levels between which a pixel jumps; another variance; single
-frames of another variance. All sequences of a few frames are summed over one by one.
+frames of another variance; a drift. All sequences of a few frames are summed over one by one.
 """
 
 from math import exp, log
@@ -67,6 +67,22 @@ def of_variances(x: Array, noise_dn2: Array, added_dn2: Array) -> Array:
     ratio = np.maximum(1 + added_dn2 / noise_dn2[:, None], 1e-3)
     dof = x.shape[1] - 1
     return np.asarray(square / noise_dn2[:, None] * (1 - 1 / ratio) / 2 - dof / 2 * np.log(ratio))
+
+
+def of_drifts(x: Array, noise_dn2: Array, added_dn2: Array) -> Array:
+    """Return the log-likelihood of frames that drift one way: (pixel, variance, course).
+
+    The course is even, or settles within a quarter of the frames or within one; how far it goes is
+    normally distributed. `added_dn2`, (variance,), is the mean variance of that over the frames.
+    """
+    frames = x.shape[1]
+    number = np.arange(frames)
+    courses = [number, np.exp(-4.0 * number / frames), np.exp(-1.0 * number)]
+    own = np.stack([course - course.mean() for course in courses], 1)
+    own /= np.linalg.norm(own, axis=0)
+    square = (_centred(x) @ own)[:, None] ** 2 / noise_dn2[:, None, None]
+    ratio = 1 + frames * added_dn2[:, None] / noise_dn2[:, None, None]
+    return np.asarray(square * (1 - 1 / ratio) / 2 - np.log(ratio) / 2)
 
 
 def _centred(x: Array) -> Array:

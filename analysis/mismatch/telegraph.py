@@ -3,7 +3,8 @@
 Some pixels are random telegraphs, whose jumps are exponentially distributed over the pixels, or all
 of one height. All
 others have one of the laws that noise of single pixels may have besides: alike, of variances that
-spread, that grow with time, or with noisier frames now and then. What telegraphs gain is counted
+spread, that grow with time, with noisier frames now and then, or a drift, as of hot pixels that
+warm up. What telegraphs gain is counted
 from the best of these laws, and beside the best of them.
 """
 
@@ -18,7 +19,7 @@ from scipy.special import logsumexp, ndtr
 
 from analysis.mismatch.layout import Layout
 from analysis.mismatch.pixelframes import blocks_of, chosen
-from analysis.mismatch.pixellaw import of_jumps, of_spikes, of_variances
+from analysis.mismatch.pixellaw import of_drifts, of_jumps, of_spikes, of_variances
 from analysis.mismatch.projections import FramesOf
 from analysis.mismatch.rank import TOLD_APART
 from dsis.recording.ahead import in_order
@@ -32,6 +33,7 @@ _RATIOS: Array = np.exp(np.arange(-1.4, 4.3, 0.2))  # of a pixel's variance to t
 _SPREADS = np.geomspace(0.05, 1.5, 18).tolist()  # of the logarithm of such ratios
 _CENTRES = np.arange(-0.1, 0.101, 0.02).tolist()  # the median pixel's is not quite their median
 _ADDED: Array = np.power(2.0, np.arange(-2, 9), dtype=np.float64)
+_DRIFTS: Array = np.power(4.0, np.arange(-1, 7), dtype=np.float64)
 _SPIKES: Array = np.power(4.0, np.arange(6), dtype=np.float64)
 _SPIKY = np.array([1e-3, 0.01, 0.05, 0.15])  # shares of frames
 _PARTS: Array = np.geomspace(1e-4, 0.05, 32)  # of pixels: jumps of more are told by sums
@@ -113,6 +115,8 @@ class _Others:
         Of a variance that grows with exposure time: (pixel, added).
     spikes
         Of single noisy frames: (pixel, added, share).
+    drifts
+        Of frames that drift, as far at all times or in proportion to it: (pixel, added, course).
     twins
         Of the variance that jumps of each height have, without any: (pixel, height).
     """
@@ -120,12 +124,13 @@ class _Others:
     own: Array
     grown: Array
     spikes: Array
+    drifts: Array
     twins: Array
 
     @property
     def most(self) -> Array:
         """The largest of each pixel: (pixel,)."""
-        laws = (self.own, self.grown, self.spikes, self.twins)
+        laws = (self.own, self.grown, self.spikes, self.drifts, self.twins)
         every = [own.reshape(len(own), -1).max(1) for own in laws]
         return np.asarray(np.maximum(np.max(every, 0), 0.0))
 
@@ -133,8 +138,8 @@ class _Others:
         """Yield the likelihood of each pixel, over exp(top), under laws of all pixels: (pixel,).
 
         All alike; of a read noise that spreads log-normally; few that grow noisier with time;
-        frames that are noisier now and then; any mixture of these. Beside each what the best of all
-        spreads gains on their mean, nats; None: the law has none.
+        frames that are noisier now and then; few that drift; any mixture of these. Beside each what
+        the best of all spreads gains on their mean, nats; None: the law has none.
         """
         alike = np.exp(-top)
         yield alike, None
@@ -144,9 +149,9 @@ class _Others:
         spread = some[int(np.argmax(sums))]
         chosen = max(sums) - float(logsumexp(sums)) + log(len(sums))
         yield spread, chosen
-        others = [
-            np.exp(one - top[:, None]) for one in (self.grown, *np.moveaxis(self.spikes, 2, 0))
-        ]
+        drifts = self.drifts.reshape(len(top), -1)
+        some = [self.grown, *np.moveaxis(self.spikes, 2, 0), drifts]
+        others = [np.exp(one - top[:, None]) for one in some]
         for classes in [*([alike, one] for one in others), [spread, *others]]:
             both = np.column_stack(classes)
             yield both @ _shares(both, weight), chosen if classes[0] is spread else None
@@ -195,6 +200,7 @@ def telegraph(layout: Layout, frames_of: FramesOf, jobs: int = 1) -> Telegraph |
             of_variances(some, dn2, (_RATIOS - 1) * least),
             of_variances(some, dn2, _ADDED * least * part),
             of_spikes(some, dn2, _SPIKES * least, _SPIKY),
+            np.hstack([of_drifts(some, dn2, _DRIFTS * least * own) for own in (1.0, part**2)]),
             of_variances(some, dn2, heights**2 / 4),
         )
 

@@ -95,20 +95,16 @@ def _explaining_nothing(
 def uncalled(
     search: Search, base: State, final: State, gains: Mapping[str, Gain], trial: Trial
 ) -> tuple[Named, str] | None:
-    """Return an effect for which nothing calls in all frames, nor do locked ones; None: none is.
+    """Return an effect that nothing in all frames needs, nor locked ones show; None: none is.
 
-    What hides behind another is called for by nothing at first: locked frames must show it then.
-    A line that explains nothing must be shown by all frames, at odds that take an effect in: peaks
-    are many, of one axis or of another's.
+    What hides behind another, or beside what explains all that calls for it, is called for by
+    nothing at first: locked frames must show it then. A line that explains nothing must be shown by
+    all frames, at odds that take an effect in: peaks are many, of one axis or of another's.
     """
-    first = {m.statistic for m in base.mismatches}
     asked = [
         n
         for n in search.named
-        if n.kind in CANDIDATES and n.name in gains
-        if n.kind in LINES
-        or first.isdisjoint({*CANDIDATES[n.kind].calls, *CANDIDATES[n.kind].hints})
-        if _unshown(n, gains[n.name], trial)
+        if n.kind in CANDIDATES and n.name in gains and _unshown(n, gains[n.name], trial)
     ]
     return _explaining_nothing(search, base, final, asked, UNCALLED)
 

@@ -18,7 +18,7 @@ from analysis.mismatch.edged import STATISTIC, edged, single
 from analysis.mismatch.feignedtails import clamped, coded, lopsided, mixed, placed, spiked
 from analysis.mismatch.fewfixed import of_few_that_stand_out
 from analysis.mismatch.flatcolumns import flat_columns
-from analysis.mismatch.grown import grown
+from analysis.mismatch.grown import grown, warmed
 from analysis.mismatch.halves import halved
 from analysis.mismatch.inpatches import in_patches
 from analysis.mismatch.jumped import jumped
@@ -73,6 +73,7 @@ def of_another(state: State, effect: Effect, without: Array) -> Denial | None:
         or coloured(state, kind)
         or stepped(state, kind)
         or grown(state, kind, without)
+        or warmed(state, effect)
         or waved(state, kind)
         or halved(state, effect)
         or edged(state, kind)

@@ -7,7 +7,7 @@ fitted together, by the likelihood of contrasts between the frames of each expos
 maximum likelihood: Patterson & Thompson, Biometrika 58, 1971), whose level nobody knows.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +15,9 @@ from numpy.typing import NDArray
 from scipy.linalg import helmert
 
 from analysis.mismatch.bank.linemeans import AXES, Axis, LineMeans
+from analysis.mismatch.layout import Taken
+from dsis.effects import Effect
+from dsis.effects.flicker import Flicker
 
 Array = NDArray[np.float64]
 _LEAST = 3  # frames of an exposure
@@ -84,13 +87,35 @@ class FrameMeans:
         return cls(np.array(numbers, float), means, float(sum(new) - pixels + light_dn**2))
 
 
+def means_of(
+    lines: Mapping[tuple[str, Axis], LineMeans],
+    exposures: Iterable[Taken],
+    light_dn: Callable[[str], float],
+) -> dict[str, FrameMeans]:
+    """Return the means of the frames of exposures, by name, where they are known.
+
+    `light_dn` gives the standard deviation of an exposure's light.
+    """
+    found = {}
+    for exposure in exposures:
+        own = FrameMeans.of(lines, exposure.name, exposure.numbers, light_dn(exposure.name))
+        if own is not None:
+            found[exposure.name] = own
+    return found
+
+
+def share_of_light(effects: Iterable[Effect]) -> float:
+    """Return by which share of itself light flickers in a camera."""
+    own = [effect.sigma_percent for effect in effects if isinstance(effect, Flicker)]
+    return float(np.linalg.norm(own)) / 100 if own else 0.0
+
+
 def walk_of(exposures: Sequence[FrameMeans]) -> Walk | None:
     """Return the likeliest wander of frames; None where they show none."""
     excess = [float(own.means.var(ddof=1)) - own.new_dn2 for own in exposures]
     if not exposures or max(excess) <= 0:
         return None
-    top = float(np.sqrt(max(excess)))
-    sizes = top * np.geomspace(1 / _WIDEST, _WIDEST, _SIZES)
+    sizes = _sizes(exposures)
     likely = np.zeros((_PERSISTENCES.size, _SIZES))
     for own in exposures:
         likely += _loglik(own, sizes)
@@ -105,6 +130,22 @@ def walk_of(exposures: Sequence[FrameMeans]) -> Walk | None:
     }
     gain = best - float(likely[0].max())
     return Walk(float(sizes[of]), float(_PERSISTENCES[at]), errors, gain)
+
+
+def _sizes(exposures: Sequence[FrameMeans]) -> Array:
+    """Return the standard deviations that are tried, DN."""
+    excess = max((float(own.means.var(ddof=1)) - own.new_dn2 for own in exposures), default=0.0)
+    return float(np.sqrt(max(excess, 0.0))) * np.geomspace(1 / _WIDEST, _WIDEST, _SIZES)
+
+
+def shown(exposures: Sequence[FrameMeans]) -> float:
+    """Return by how much frames within exposures are likelier to wander than not, nats.
+
+    At the likeliest size and persistence.
+    """
+    sizes = np.concatenate([[0.0], _sizes(exposures)])
+    likely = sum((_loglik(own, sizes) for own in exposures), np.zeros((1, sizes.size)))
+    return float(likely.max() - likely[0, 0])
 
 
 def _loglik(own: FrameMeans, sizes: Array) -> Array:

@@ -8,8 +8,11 @@ from scipy.optimize import nnls
 
 from analysis.mismatch.bank.key import MOSAIC
 from analysis.mismatch.contradicted import Denial
+from analysis.mismatch.framewalk import means_of, share_of_light, shown
 from analysis.mismatch.rank import TOLD_APART
 from analysis.mismatch.state import State
+from dsis.effects import Effect
+from dsis.effects.black_level_drift import BlackLevelDrift
 
 Array = NDArray[np.float64]
 _OFFSETS = {
@@ -18,6 +21,7 @@ _OFFSETS = {
     "column_fpn": "fixed_column_variance",
     "black_level_drift": "frame_variance",
 }
+_TIMES = 2  # of darks, that something grows with
 LEAST_NUMBER = 0.5  # of a cube root of a variance: below, its error is another's
 
 
@@ -65,6 +69,51 @@ def grown(state: State, kind: str, without: Array) -> Denial | None:
     behind = odds[0][0]
     why = "it grows with exposure time, as no offset does"
     return Denial(1 / (1 + exp(min(behind, 700.0))), why)
+
+
+def warmed(state: State, effect: Effect) -> Denial | None:
+    """Return how a wander of whole frames is denied by darks that grow with time; None: it is not.
+
+    An offset that stays for long moves the levels of exposures, and so does a dark current. Where
+    frames within exposures do not show that they wander, and levels of darks go with exposure time
+    as well as by chance, at odds of 20, there may be no wander.
+    """
+    layout = state.setting.layout
+    darks = {e.name: e.exposure_time_s for e in layout.uniform if e.kind == "dark"}
+    if not isinstance(effect, BlackLevelDrift) or len(set(darks.values())) < _TIMES:
+        return None
+    share, signal = share_of_light(state.camera.effect), state.calibrated.fit.signal_dn
+
+    def light_dn(exposure: str) -> float:
+        return share * float(np.mean([signal[exposure, channel] for channel in layout.channels]))
+
+    means = means_of(state.setting.seen.lines, layout.uniform, light_dn)
+    own = {name: means[name] for name in darks if name in means}
+    times = np.array([darks[name] for name in own])
+    if len(set(times.tolist())) < _TIMES or shown(list(means.values())) >= TOLD_APART:
+        return None
+    levels = np.array([float(one.means.mean()) for one in own.values()])
+    square = np.array([one.new_dn2 / one.means.size for one in own.values()])
+    plain, growing = (_likely(levels, square, shape) for shape in (None, times))
+    wandering = max(_likely(levels, square + size**2, None) for size in _offsets(levels))
+    if growing - plain < TOLD_APART or wandering > growing + TOLD_APART:
+        return None
+    why = "the levels of darks may as well grow with exposure time, and no frames wander within one"
+    return Denial(0.0, why)
+
+
+def _offsets(levels: Array) -> Array:
+    """Return standard deviations of offsets that are tried, DN."""
+    return np.asarray(np.ptp(levels) * np.geomspace(0.05, 2.0, 40))
+
+
+def _likely(levels: Array, square: Array, shape: Array | None) -> float:
+    """Return the log-likelihood of levels of some variances about their mean, or a line."""
+    free = [np.ones(levels.size), *([] if shape is None else [shape])]
+    design = np.stack(free, 1) / np.sqrt(square)[:, np.newaxis]
+    seen = levels / np.sqrt(square)
+    rest = seen - design @ np.linalg.lstsq(design, seen, rcond=None)[0]
+    return -float(rest @ rest + np.log(square).sum()) / 2
 
 
 def _odds(seen: Array, alike: Array, growing: Array) -> tuple[float, float]:

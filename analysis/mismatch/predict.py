@@ -8,7 +8,8 @@ their cube roots). Counts of pixels have theirs; see `counted`.
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from copy import copy
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -89,6 +90,14 @@ class Predictor:
         layout = simulations.layout
         self.counts = Counted(reference.vector.keys, layout.rows * layout.columns)
         self.few = np.array([key.statistic == _OF_FRAMES for key in reference.vector.keys], bool)
+
+    def beside(self, numbers: Array) -> "Predictor":
+        """Return the predictor of another recording, of these numbers; unknown are as they were."""
+        vector = self.reference.vector
+        values = np.where(np.isfinite(numbers), numbers, vector.values)
+        found = copy(self)
+        found.reference = replace(self.reference, vector=replace(vector, values=values))
+        return found
 
     def ready(self, cameras: Iterable[Camera | None]) -> None:
         """Simulate side by side, where processes are, what will be asked for one by one."""

@@ -4,6 +4,7 @@ from collections.abc import Callable, Container, Sequence
 from dataclasses import replace
 from math import log
 
+from analysis.mismatch.advantage import odds
 from analysis.mismatch.basenumbers import preferred
 from analysis.mismatch.instance import frequency_of, same_line
 from analysis.mismatch.memory import Memory
@@ -21,6 +22,7 @@ _SAYS_LESS = {
     "readout_memory": ("adc_memory",),
 }
 _BY_CODES = "quantisation"
+_FAR_AHEAD = 25.0  # nats, that no numbers have by chance
 _KEEPS_VARIANCE = ("spatial_filtering", {"spatial_filtering", "readout_memory"})
 _TWINS = {
     "tap_mismatch": ("channel_imbalance",),
@@ -70,9 +72,18 @@ def ties(state: State, best: Ranked, other: Ranked) -> bool:
         gains = _unpriced(best), _unpriced(other)
     near = gains[1] > gains[0] - TOLD_APART and other.kind != best.kind
     near |= smooth_as_well(state, best.mean, best.kind, other.kind)
-    if not near or other.kind in _SAYS_LESS.get(best.kind, ()) or _other_line(state, best, other):
+    if other.kind in _SAYS_LESS.get(best.kind, ()) or _other_line(state, best, other):
         return False
-    return alike(state, best.polished.mean, other.polished.mean)
+    if not alike(state, best.polished.mean, other.polished.mean):
+        return False
+    return near or _by_chance(state, best, other, gains[0] - gains[1])
+
+
+def _by_chance(state: State, best: Ranked, other: Ranked, ahead: float) -> bool:
+    """Return whether the best is ahead by what chance has in common of many numbers."""
+    if state.setting.large or other.kind == best.kind or ahead > _FAR_AHEAD:
+        return False
+    return odds(state, best, other, ahead) < TOLD_APART
 
 
 def bends_as_well(state: State, best: Ranked, path: Path | None) -> Path | None:

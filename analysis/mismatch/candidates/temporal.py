@@ -14,10 +14,9 @@ from analysis.mismatch.bank.peaks import Peak
 from analysis.mismatch.bank.scalars import UNKNOWN
 from analysis.mismatch.candidates.candidate import Candidate, Proposal, measured, proposals
 from analysis.mismatch.clues import NO_LINE, Clues, alike
-from analysis.mismatch.framewalk import FrameMeans, Walk, walk_of
+from analysis.mismatch.framewalk import Walk, means_of, share_of_light, walk_of
 from analysis.mismatch.instance import Frequency, same_line
 from dsis.effects.black_level_drift import BlackLevelDrift
-from dsis.effects.flicker import Flicker
 
 _ALTERNATING = {"checkerboard": ((0.5, 0.5),), "rows": ((0.0, 0.5),), "columns": ((0.5, 0.0),)}
 _BY_PLANE = {  # of a mosaic: what alternates in each of its planes
@@ -67,14 +66,13 @@ def _walk(clues: Clues) -> Walk | None:
     """Return how the means of whole frames wander; None: it is not seen, or is the camera's own."""
     if any(isinstance(own, BlackLevelDrift) for own in clues.camera.effect):
         return None
-    of_light = [own.sigma_percent for own in clues.camera.effect if isinstance(own, Flicker)]
-    share = float(np.linalg.norm(of_light)) / 100 if of_light else 0.0
-    found = []
-    for exposure in clues.layout.uniform:
-        signals = [clues.signal((exposure.name, c)) for c in clues.layout.channels]
-        light = share * float(np.mean(signals))
-        found.append(FrameMeans.of(clues.seen.lines, exposure.name, exposure.numbers, light))
-    return walk_of([own for own in found if own is not None])
+    share, channels = share_of_light(clues.camera.effect), clues.layout.channels
+
+    def light_dn(exposure: str) -> float:
+        return share * float(np.mean([clues.signal((exposure, c)) for c in channels]))
+
+    found = means_of(clues.seen.lines, clues.layout.uniform, light_dn)
+    return walk_of(list(found.values()))
 
 
 def _flicker(clues: Clues) -> Sequence[Proposal]:

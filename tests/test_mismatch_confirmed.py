@@ -218,10 +218,10 @@ def test_lines_behind_a_stronger_one_may_explain_nothing() -> None:
         ("outlying_patch", -0.2, False, True),  # dust, of which columns of some frames had a part
         ("outlying_patch", 0.1, False, False),  # locked frames show it
         ("outlying_patch", -0.2, True, False),
-        ("fixed_column_variance", -0.2, False, False),  # something calls for it
+        ("fixed_column_variance", -0.2, False, True),  # though another explains what called for it
     ],
 )
-def test_what_nothing_calls_for_in_all_frames_must_be_shown_by_locked_ones(
+def test_what_explains_nothing_in_all_frames_must_be_shown_by_locked_ones(
     first: str, low: float, explains: bool, dropped: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     named: Any = Stub(name="column_prnu", kind="column_prnu", measured=False)

@@ -9,7 +9,7 @@ import pytest
 from scipy.stats import norm
 
 from analysis.mismatch.bank.key import Key
-from analysis.mismatch.feignedtails import coded, lopsided, placed
+from analysis.mismatch.feignedtails import coded, lopsided, placed, timed
 from dsis.effects.adc_dnl import AdcDnl
 
 TAILS = "heavy_tailed_read_noise"
@@ -168,3 +168,37 @@ def test_tails_that_single_pixels_cannot_show_are_not_denied() -> None:
     state.mismatches = [SimpleNamespace(statistic="column_variance_spread")]
     assert placed(state, TAILS, np.zeros(1)) is None
     assert placed(state, "impulse", np.zeros(1)) is not None  # outliers of the noisiest lines
+
+
+@pytest.mark.parametrize(
+    ("short", "grows", "denied"),
+    [
+        (0.0, True, True),  # few electrons of a glow, in long exposures alone
+        (12.0, True, False),  # tails where there is no time for any
+        (0.0, False, False),  # nothing is left that grows with time
+    ],
+)
+def test_tails_of_charge_that_needs_time_are_no_spikes(
+    short: float, grows: bool, denied: bool
+) -> None:
+    keys = tuple(
+        Key(statistic="kurtosis", scope="exposure", exposure=name, channel="MONO", detail="")
+        for name in ("short", "long")
+    )
+    where = SimpleNamespace(exposure_time_s=(0.01, 0.5) if grows else None)
+    state: Any = SimpleNamespace(
+        setting=SimpleNamespace(
+            layout=SimpleNamespace(
+                exposures=[
+                    SimpleNamespace(name="short", exposure_time_s=0.01),
+                    SimpleNamespace(name="long", exposure_time_s=0.5),
+                ]
+            )
+        ),
+        vector=SimpleNamespace(keys=keys, values=np.array([short, 60.0])),
+        null=SimpleNamespace(mean=np.array([2.0, 60.0]), sd=np.ones(2), known=np.ones(2, bool)),
+        mismatches=[SimpleNamespace(statistic="level", where=where)],
+    )
+    for kind in ("impulse", TAILS):
+        assert (timed(state, kind, np.zeros(2)) is not None) is denied
+    assert timed(state, "rts", np.zeros(2)) is None

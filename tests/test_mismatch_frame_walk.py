@@ -3,15 +3,20 @@
 import numpy as np
 import pytest
 
-from analysis.mismatch.framewalk import FrameMeans, Walk, walk_of
+from analysis.mismatch.framewalk import FrameMeans, Walk, share_of_light, shown, walk_of
+from exposing import effect
 
 NEW_DN2 = 0.04**2
 FRAMES = [n for n in range(10) if n not in (3, 7)]  # locked frames are not looked at
 
 
-def _walk(
+def _walk(rng: np.random.Generator, sigma: float, persistence: float) -> Walk | None:
+    return walk_of(_means(rng, sigma, persistence))
+
+
+def _means(
     rng: np.random.Generator, sigma: float, persistence: float, exposures: int = 10
-) -> Walk | None:
+) -> list[FrameMeans]:
     found = []
     for _ in range(exposures):
         walk = [rng.standard_normal()]
@@ -21,7 +26,7 @@ def _walk(
             )
         means = 100 + sigma * np.array(walk) + np.sqrt(NEW_DN2) * rng.standard_normal(10)
         found.append(FrameMeans(np.array(FRAMES, float), means[FRAMES], NEW_DN2))
-    return walk_of(found)
+    return found
 
 
 @pytest.mark.parametrize("persistence", [0.0, 0.6, 0.8])
@@ -47,3 +52,19 @@ def test_frames_that_stand_still_do_not_wander() -> None:
     means = 50 + 1e-3 * rng.standard_normal(8)
     assert walk_of([FrameMeans(np.arange(8.0), means, NEW_DN2)]) is None
     assert walk_of([]) is None
+
+
+def test_frames_show_a_wander_by_how_far_it_goes() -> None:
+    """Of frames that stand still the gain is that of two numbers that are not needed."""
+    rng = np.random.default_rng(8)
+    still, restless = ([shown(_means(rng, sigma, 0.5)) for _ in range(60)] for sigma in (0.0, 0.12))
+    assert min(still) >= 0
+    assert np.mean(np.array(still) > 3.0) <= 0.05  # chi-squared of two, half of it above zero
+    assert min(restless) > 10.0
+    assert shown([]) == 0.0
+
+
+def test_light_that_flickers_twice_flickers_by_both() -> None:
+    lights = [effect("flicker", sigma_percent=s) for s in (0.3, 0.4)]
+    assert share_of_light([*lights, effect("row_noise", sigma_dn=1.0)]) == pytest.approx(0.005)
+    assert share_of_light([]) == 0.0

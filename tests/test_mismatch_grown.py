@@ -6,8 +6,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from analysis.mismatch import grown as module
 from analysis.mismatch.bank.key import MOSAIC, Key
-from analysis.mismatch.grown import grown
+from analysis.mismatch.framewalk import FrameMeans
+from analysis.mismatch.grown import grown, warmed
+from exposing import effect
 
 TIMES = {"dark_0": 0.02, "dark_1": 0.12, "flat_0": 0.02, "flat_1": 0.05}
 OFFSET = 0.25  # variance of the offsets, relative to noise of lines
@@ -101,3 +104,56 @@ def test_one_channel_by_itself_denies_no_offset(alone: bool) -> None:
     own.vector.values[far[:1] if alone else far] += 0.3
     said = grown(own, "column_fpn", np.ones(len(own.vector.keys)))
     assert (said is None) is alone
+
+
+NEW_DN2 = 0.09**2
+DRIFT = effect("black_level_drift", sigma_dn=0.3, persistence=0.98)
+
+
+def _warmed(
+    levels: dict[str, tuple[float, float]],
+    monkeypatch: pytest.MonkeyPatch,
+    *,
+    within_dn: float = 0.0,
+    one: Any = DRIFT,
+) -> bool:
+    """Return whether darks (seconds, level) deny a drift; frames of each scatter `within_dn`."""
+    rng = np.random.default_rng(4)
+    wander = within_dn * np.array([1.0, -1.0] * 4)
+    means = {
+        name: FrameMeans(np.arange(8.0), level + wander + 0.05 * rng.standard_normal(8), NEW_DN2)
+        for name, (_, level) in levels.items()
+    }
+    monkeypatch.setattr(module, "means_of", lambda *_: means)
+    uniform = [
+        SimpleNamespace(name=name, exposure_time_s=time, kind="dark")
+        for name, (time, _) in levels.items()
+    ]
+    state: Any = SimpleNamespace(
+        setting=SimpleNamespace(
+            layout=SimpleNamespace(uniform=uniform, channels=("MONO",)),
+            seen=SimpleNamespace(lines={}),
+        ),
+        camera=SimpleNamespace(effect=()),
+        calibrated=SimpleNamespace(fit=SimpleNamespace(signal_dn={})),
+    )
+    return warmed(state, one) is not None
+
+
+def test_darks_that_grow_with_time_are_no_wander_of_frames(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    two = {"a": (0.01, 0.0), "b": (0.5, 0.6)}
+    assert _warmed(two, monkeypatch)
+    assert not _warmed(two, monkeypatch, within_dn=0.4)  # frames show that they wander
+    assert not _warmed(two, monkeypatch, one=effect("dsnu", sigma_dn=1.0))
+    assert not _warmed({"a": (0.01, 0.0), "b": (0.5, 0.02)}, monkeypatch)  # nothing grows
+    assert not _warmed({"a": (0.01, 0.0), "b": (0.01, 0.6)}, monkeypatch)  # no time says so
+
+
+def test_darks_in_no_order_of_their_times_may_wander(monkeypatch: pytest.MonkeyPatch) -> None:
+    times = (0.01, 0.1, 0.2, 0.5)
+    line, none = (0.0, 0.12, 0.24, 0.6), (0.0, 0.9, -0.6, 0.5)
+    for levels, grows in ((line, True), (none, False)):
+        darks = {str(t): (t, level) for t, level in zip(times, levels, strict=True)}
+        assert _warmed(darks, monkeypatch) is grows

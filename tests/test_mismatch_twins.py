@@ -24,7 +24,7 @@ def _ranked(kind: str, gain: float, mean: Sequence[float], best_of: int = 1) -> 
 
 def _state() -> Any:
     null = SimpleNamespace(mean=np.zeros(2), sd=np.ones(2), known=np.ones(2, bool))
-    return SimpleNamespace(null=null, setting=SimpleNamespace(layout=None))
+    return SimpleNamespace(null=null, setting=SimpleNamespace(layout=None, large=True))
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ from analysis.mismatch.bank.standing import NAME as FIXED_WAVE
 from analysis.mismatch.contradicted import Denial, rival
 from analysis.mismatch.displaced import displaced
 from analysis.mismatch.edged import STATISTIC, edged, single
-from analysis.mismatch.feignedtails import clamped, coded, lopsided, mixed, placed, spiked
+from analysis.mismatch.feignedtails import clamped, coded, lopsided, mixed, placed, spiked, timed
 from analysis.mismatch.fewfixed import of_few_that_stand_out
 from analysis.mismatch.flatcolumns import flat_columns
 from analysis.mismatch.grown import grown, warmed
@@ -94,6 +94,7 @@ def of_another(state: State, effect: Effect, without: Array) -> Denial | None:
         or placed(state, kind, without)
         or clamped(state, kind, without)
         or mixed(state, kind)
+        or timed(state, kind, without)
         or persisting(state, kind, without)
         or carried(state, effect)
         or no_field(state, effect)

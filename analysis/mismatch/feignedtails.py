@@ -143,6 +143,35 @@ def placed(state: State, kind: str, without: Array) -> Denial | None:
     return Denial(0.0, why)
 
 
+def timed(state: State, kind: str, without: Array) -> Denial | None:
+    """Return how tails or spikes are denied by charge that needs time; None: they are not.
+
+    Few electrons are no normal variate: a glow of less than one in a pixel looks like rare spikes.
+    These know no exposure time. Where something grows with it and is left unexplained, tails must
+    show in the exposures of the shortest time, surely and by half of what they would change there.
+    """
+    times = {e.name: e.exposure_time_s for e in state.setting.layout.exposures}
+    grows = any(m.where.exposure_time_s is not None for m in state.mismatches)
+    if kind not in TAILS or not grows:
+        return None
+    shortest = min(times.values())
+    own = np.array(
+        [
+            key.scope == "exposure"
+            and key.statistic in _SHAPES | _OF_PIXELS
+            and times.get(key.exposure, np.inf) <= shortest
+            for key in state.vector.keys
+        ]
+    )
+    own &= state.null.known & np.isfinite(without)
+    size, shown = _shown(state, without, own)
+    if shown >= max(CLEAR, _MOST * size):
+        return None
+    return Denial(
+        0.0, "something grows with exposure time, and where there is no time are no tails"
+    )
+
+
 def mixed(state: State, kind: str) -> Denial | None:
     """Return how the law of single pixels' noise is denied by noise that neighbours share; None.
 

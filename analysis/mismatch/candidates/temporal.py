@@ -51,12 +51,17 @@ def _lines(kind: str, statistic: str) -> Candidate:
 
 
 def _drift(clues: Clues) -> Sequence[Proposal]:
+    """Start from the weighted mean of what exposures show, or from the likeliest wander.
+
+    The mean is none where a quiet exposure, whose variance is known best, outweighs a restless one.
+    """
     variance, _ = clues.amplitude("frame_variance", alike)
-    if variance <= 0:
-        return []
     walk = _walk(clues)
+    if walk is None and variance <= 0:
+        return []
     if walk is None or walk.gain < _PERSISTS:
-        return proposals("black_level_drift", ["sigma_dn"], sigma_dn=sqrt(variance))
+        size = sqrt(variance) if variance > 0 or walk is None else walk.sigma_dn
+        return proposals("black_level_drift", ["sigma_dn"], sigma_dn=size)
     values = {"sigma_dn": walk.sigma_dn, "persistence": walk.persistence}
     start = proposals("black_level_drift", (), (), **values)
     return [measured(own, values, walk.errors) for own in start]

@@ -2,21 +2,18 @@
 
 The likelihood of numbers takes each by itself. Of one sensor many are told by the same pixels - a
 gain with and without what is taken off beside it, near an edge and far from it - and have chance in
-common: ten nats may be what one sensor in twenty feigns. What recordings that were simulated with
-either of two effects gain by the first over the second says how much the gain of the recording is
-worth (D. R. Cox, Tests of separate families of hypotheses, 4th Berkeley Symposium, 1961).
+common: ten nats may be what one sensor in twenty feigns. What recordings with either of two effects
+gain by the first over the second says how much the gain of the recording is worth (D. R. Cox, Tests
+of separate families of hypotheses, 4th Berkeley Symposium, 1961).
 """
 
-from collections.abc import Sequence
 from math import log1p
 
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.mismatch.credited import joined
 from analysis.mismatch.rank import Ranked
 from analysis.mismatch.state import State
-from dsis.camera import Camera
 
 Array = NDArray[np.float64]
 _LEAST_SD = 1e-6  # nats
@@ -25,9 +22,8 @@ _LEAST_SD = 1e-6  # nats
 def odds(state: State, best: Ranked, other: Ranked, ahead: float) -> float:
     """Return the logarithm of the odds of one effect against another, nats.
 
-    Of gains that are normally distributed over sensors of either kind, as a null's simulations tell
-    it. An effect that is further ahead than its own recordings would have it is as likely as if it
-    were not. Infinity where either is no camera.
+    Of gains that are normally distributed over recordings of either kind. An effect that is further
+    ahead than its own recordings would have it is as likely as if it were not.
 
     Parameters
     ----------
@@ -38,12 +34,7 @@ def odds(state: State, best: Ranked, other: Ranked, ahead: float) -> float:
     ahead
         By how much the first gains more than the second in the recording, nats.
     """
-    cameras = [joined(state.camera, own.polished.effects, state.setting.given)
-               for own in (best, other)]  # fmt: skip
-    made = [own for own in cameras if own is not None]
-    if len(made) < len(cameras):
-        return float("inf")
-    with_best, with_other = _advantages(state, made, best.mean, other.mean)
+    with_best, with_other = _advantages(state, best.mean, other.mean)
     behind = max(_scores(with_best, -ahead, -1), 0.0)
     beyond = max(_scores(with_other, ahead, 1), 0.0)
     degrees = len(with_best) - 1
@@ -56,15 +47,15 @@ def _scores(gains: Array, value: float, sign: int) -> float:
     return (value - sign * float(gains.mean())) / sd
 
 
-def _advantages(
-    state: State, cameras: Sequence[Camera], one: Array, other: Array
-) -> tuple[Array, Array]:
-    """Return what one prediction gains over another in recordings with the one, and the other."""
-    predictor = state.predictor(state.setting.nulls)
-    predictor.ready(cameras)
+def _advantages(state: State, one: Array, other: Array) -> tuple[Array, Array]:
+    """Return what one prediction gains over another in recordings of the one, and of the other.
+
+    These scatter about what is predicted as simulated recordings of the state do about theirs.
+    """
+    predictor = state.predictor()
+    scatter = state.simulated - state.null.mean
     found = []
-    for camera in cameras:
-        recordings = predictor.simulations.of(camera, predictor.replicates)
-        beside = [predictor.beside(numbers) for numbers in recordings]
+    for mean in (one, other):
+        beside = [predictor.beside(mean + own) for own in scatter]
         found.append(np.array([own.gain(one) - own.gain(other) for own in beside]))
     return found[0], found[1]

@@ -224,7 +224,8 @@ def test_lines_behind_a_stronger_one_may_explain_nothing() -> None:
 def test_what_explains_nothing_in_all_frames_must_be_shown_by_locked_ones(
     first: str, low: float, explains: bool, dropped: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    named: Any = Stub(name="column_prnu", kind="column_prnu", measured=False)
+    own = effect("column_prnu", sigma_percent=0.3)
+    named: Any = Stub(name="column_prnu", kind="column_prnu", effect=own, measured=False)
     search: Any = Stub(named=[named], without=lambda *_: None)
     base: Any = Stub(mismatches=[Stub(statistic=first)])
     trial: Any = None  # nothing more is asked
@@ -259,5 +260,22 @@ def test_a_line_that_explains_nothing_must_be_sure(
     told = {first: ("periodic_noise" if explains else None, 5.0)}
     monkeypatch.setattr(confirmed, "explained", lambda *_: told)
     gains = {"periodic_noise": Gain(0.3, (0.1, 0.5))}
+    found = confirmed.uncalled(search, base, base, gains, trial)
+    assert found == ((named, confirmed.UNCALLED) if dropped else None)
+
+
+@pytest.mark.parametrize(("first", "dropped"), [("frame_variance", False), ("kurtosis", True)])
+def test_what_all_frames_show_beside_another_need_not_be_shown_by_locked_ones(
+    first: str, dropped: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Light that flickers beside a drift: one of them has all of what frames scatter by."""
+    own = effect("flicker", sigma_percent=0.3)
+    named: Any = Stub(name="flicker", kind="flicker", effect=own, measured=False)
+    search: Any = Stub(named=[named], without=lambda *_: None)
+    base: Any = Stub(mismatches=[Stub(statistic=first)])
+    trial: Any = None
+    monkeypatch.setattr(confirmed, "changes", lambda *_: {"flicker": None})
+    monkeypatch.setattr(confirmed, "explained", lambda *_: {first: ("black_level_drift", 1.0)})
+    gains = {"flicker": Gain(0.3, (-0.1, 0.7))}
     found = confirmed.uncalled(search, base, base, gains, trial)
     assert found == ((named, confirmed.UNCALLED) if dropped else None)

@@ -8,9 +8,12 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
+from analysis.mismatch import feigned
 from analysis.mismatch.bank.key import Key
+from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.feignedtails import coded, lopsided, placed, timed
 from dsis.effects.adc_dnl import AdcDnl
+from exposing import effect
 
 TAILS = "heavy_tailed_read_noise"
 
@@ -171,34 +174,54 @@ def test_tails_that_single_pixels_cannot_show_are_not_denied() -> None:
 
 
 @pytest.mark.parametrize(
-    ("short", "grows", "denied"),
+    ("change", "short", "grows", "denied"),
     [
-        (0.0, True, True),  # few electrons of a glow, in long exposures alone
-        (12.0, True, False),  # tails where there is no time for any
-        (0.0, False, False),  # nothing is left that grows with time
+        (5.0, 0.5, True, True),  # tails that would show without time, and do not
+        (5.0, 4.0, True, False),
+        (0.2, 0.5, True, True),  # few electrons of a glow, in long exposures alone
+        (0.2, 3.5, True, False),  # rare spikes, of which a short dark has one as well
+        (0.2, 0.5, False, False),  # nothing is left that grows with time
     ],
 )
+@pytest.mark.parametrize("times", [(0.01, 0.5), (0.5, 0.5)])
 def test_tails_of_charge_that_needs_time_are_no_spikes(
-    short: float, grows: bool, denied: bool
+    change: float, short: float, grows: bool, denied: bool, times: tuple[float, float]
 ) -> None:
+    names = ("flat", "short", "long")
     keys = tuple(
         Key(statistic="kurtosis", scope="exposure", exposure=name, channel="MONO", detail="")
-        for name in ("short", "long")
+        for name in names
     )
     where = SimpleNamespace(exposure_time_s=(0.01, 0.5) if grows else None)
+    uniform = [
+        SimpleNamespace(name=name, exposure_time_s=time, kind="flat" if name == "flat" else "dark")
+        for name, time in zip(names, (1e-4, *times), strict=True)  # a flat has too much noise
+    ]
     state: Any = SimpleNamespace(
-        setting=SimpleNamespace(
-            layout=SimpleNamespace(
-                exposures=[
-                    SimpleNamespace(name="short", exposure_time_s=0.01),
-                    SimpleNamespace(name="long", exposure_time_s=0.5),
-                ]
-            )
+        setting=SimpleNamespace(layout=SimpleNamespace(uniform=uniform)),
+        vector=SimpleNamespace(
+            keys=keys, values=np.array([0.0, short, 60.0]), errors=np.array([1.0, 1.0, 1.0])
         ),
-        vector=SimpleNamespace(keys=keys, values=np.array([short, 60.0])),
-        null=SimpleNamespace(mean=np.array([2.0, 60.0]), sd=np.ones(2), known=np.ones(2, bool)),
+        null=SimpleNamespace(
+            mean=np.array([0.0, change, 60.0]), sd=np.ones(3), known=np.ones(3, bool)
+        ),
         mismatches=[SimpleNamespace(statistic="level", where=where)],
     )
     for kind in ("impulse", TAILS):
-        assert (timed(state, kind, np.zeros(2)) is not None) is denied
-    assert timed(state, "rts", np.zeros(2)) is None
+        assert (timed(state, kind, np.zeros(3)) is not None) is (denied and len(set(times)) > 1)
+    assert timed(state, "rts", np.zeros(3)) is None
+    state.null.known[:] = False
+    assert timed(state, "impulse", np.zeros(3)) is None
+
+
+@pytest.mark.parametrize("name", ["timed", "mixed", "warmed", "grown", "placed"])
+def test_all_that_feigns_an_effect_is_asked(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    own = effect("impulse", per_megapixel_frame=30.0)
+    asked = [n for n in feigned.of_another.__code__.co_names if callable(getattr(feigned, n, None))]
+    for other in asked:
+        monkeypatch.setattr(feigned, other, lambda *_: None)
+    state: Any = SimpleNamespace(null=SimpleNamespace(mean=np.zeros(1)))
+    assert feigned.of_another(state, own, np.zeros(1)) is None
+    said = Denial(0.0, "for a reason")
+    monkeypatch.setattr(feigned, name, lambda *_: said)
+    assert feigned.of_another(state, own, np.zeros(1)) is said

@@ -1,8 +1,13 @@
 """How far whole frames wander, and how long that lasts: numpy's own autoregressive walks."""
 
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
+from analysis.mismatch.candidates import temporal
 from analysis.mismatch.framewalk import FrameMeans, Walk, share_of_light, shown, walk_of
 from exposing import effect
 
@@ -43,6 +48,8 @@ def test_size_and_persistence_are_those_planted(persistence: float) -> None:
     assert np.mean(inside) > 0.88  # 95 % of 40, two standard deviations below
     assert np.mean(lasting) > 0.88
     assert np.median([own.sigma_dn for own in walks]) == pytest.approx(0.2, rel=0.1)
+    if not persistence:
+        assert np.median([own.white_dn for own in walks]) == pytest.approx(0.2, rel=0.1)
     sure = np.mean([own.gain > 3.0 for own in walks])
     assert sure > 0.7 if persistence else sure < 0.05
 
@@ -68,3 +75,30 @@ def test_light_that_flickers_twice_flickers_by_both() -> None:
     lights = [effect("flicker", sigma_percent=s) for s in (0.3, 0.4)]
     assert share_of_light([*lights, effect("row_noise", sigma_dn=1.0)]) == pytest.approx(0.005)
     assert share_of_light([]) == 0.0
+
+
+WALK = Walk(0.3, 0.9, {"sigma_dn": 0.1, "persistence": 0.2}, 0.5, 0.07)
+
+
+@pytest.mark.parametrize(
+    ("variance", "walk", "sigma_dn", "persistence"),
+    [
+        (0.04, None, 0.2, 0.0),
+        (0.04, WALK, 0.2, 0.0),  # that it lasts is chance
+        (-0.01, WALK, 0.07, 0.0),  # a quiet exposure outweighs a restless one
+        (-0.01, replace(WALK, gain=3.0), 0.3, 0.9),
+        (-0.01, None, None, None),
+    ],
+)
+def test_a_search_for_drift_starts_where_frames_wander(
+    variance: float,
+    walk: Walk | None,
+    sigma_dn: float | None,
+    persistence: float | None,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(temporal, "_walk", lambda _: walk)
+    clues: Any = SimpleNamespace(amplitude=lambda *_: (variance, 0.01))
+    found = [own.effect for own in temporal._drift(clues)]
+    expected = [] if sigma_dn is None else [(pytest.approx(sigma_dn), persistence)]
+    assert [(one.sigma_dn, one.persistence) for one in found] == expected

@@ -115,6 +115,7 @@ def _warmed(
     monkeypatch: pytest.MonkeyPatch,
     *,
     within_dn: float = 0.0,
+    modelled: tuple[float, ...] = (),
     one: Any = DRIFT,
 ) -> bool:
     """Return whether darks (seconds, level) deny a drift; frames of each scatter `within_dn`."""
@@ -135,7 +136,12 @@ def _warmed(
             seen=SimpleNamespace(lines={}),
         ),
         camera=SimpleNamespace(effect=()),
-        calibrated=SimpleNamespace(fit=SimpleNamespace(signal_dn={})),
+        calibrated=SimpleNamespace(
+            fit=SimpleNamespace(signal_dn={}),
+            offsets=SimpleNamespace(
+                level_dn={(n, "MONO"): dn for n, dn in zip(levels, modelled, strict=False)}
+            ),
+        ),
     )
     return warmed(state, one) is not None
 
@@ -149,6 +155,8 @@ def test_darks_that_grow_with_time_are_no_wander_of_frames(
     assert not _warmed(two, monkeypatch, one=effect("dsnu", sigma_dn=1.0))
     assert not _warmed({"a": (0.01, 0.0), "b": (0.5, 0.02)}, monkeypatch)  # nothing grows
     assert not _warmed({"a": (0.01, 0.0), "b": (0.01, 0.6)}, monkeypatch)  # no time says so
+    assert not _warmed({"a": (0.01, 0.6), "b": (0.5, 0.0)}, monkeypatch)  # no current falls
+    assert not _warmed(two, monkeypatch, modelled=(0.0, 0.6))  # the camera has it
 
 
 def test_darks_in_no_order_of_their_times_may_wander(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -33,7 +33,7 @@ STATE: Any = SimpleNamespace(
     setting=SimpleNamespace(
         layout=SimpleNamespace(rows=64, columns=96, uniform=(), channels=()),
         seen=SimpleNamespace(levels={}, middles={}, lines={}),
-        large=True,  # simulations do not say how much a gain is worth
+        large=True,  # no simulations say how much a gain is worth
     ),
 )
 

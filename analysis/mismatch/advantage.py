@@ -7,7 +7,7 @@ gain by the first over the second says how much the gain of the recording is wor
 of separate families of hypotheses, 4th Berkeley Symposium, 1961).
 """
 
-from math import log1p
+from math import log, log1p
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,11 +19,12 @@ Array = NDArray[np.float64]
 _LEAST_SD = 1e-6  # nats
 
 
-def odds(state: State, best: Ranked, other: Ranked, ahead: float) -> float:
-    """Return the logarithm of the odds of one effect against another, nats.
+def odds(state: State, best: Ranked, other: Ranked) -> tuple[float, float]:
+    """Return by how much numbers are likelier with one effect than with another, and the odds.
 
-    Of gains that are normally distributed over recordings of either kind. An effect that is further
-    ahead than its own recordings would have it is as likely as if it were not.
+    Both in nats, the odds of gains that are normally distributed over recordings of either kind. An
+    effect that is further ahead than its own recordings would have it is as likely as if it were
+    not.
 
     Parameters
     ----------
@@ -31,26 +32,24 @@ def odds(state: State, best: Ranked, other: Ranked, ahead: float) -> float:
         Without both.
     best, other
         The effects, fitted.
-    ahead
-        By how much the first gains more than the second in the recording, nats.
     """
+    predictor = state.predictor()
+    ahead = predictor.gain(best.mean) - predictor.gain(other.mean)
     with_best, with_other = _advantages(state, best.mean, other.mean)
-    behind = max(_scores(with_best, -ahead, -1), 0.0)
-    beyond = max(_scores(with_other, ahead, 1), 0.0)
+    sizes = [max(float(own.std(ddof=1)), _LEAST_SD) for own in (with_best, with_other)]
     degrees = len(with_best) - 1
-    return (degrees + 1) / 2 * (log1p(beyond**2 / degrees) - log1p(behind**2 / degrees))
-
-
-def _scores(gains: Array, value: float, sign: int) -> float:
-    """Return by how many standard deviations a value is above gains, or their negatives."""
-    sd = max(float(gains.std(ddof=1)), _LEAST_SD)
-    return (value - sign * float(gains.mean())) / sd
+    wider = 1 + 1 / len(with_best)  # the means are no better known
+    behind = min((ahead - float(with_best.mean())) / sizes[0], 0.0)
+    beyond = max((ahead - float(with_other.mean())) / sizes[1], 0.0)
+    far, near = (log1p(z**2 / (degrees * wider)) for z in (beyond, behind))
+    return ahead, log(sizes[1] / sizes[0]) + (degrees + 1) / 2 * (far - near)
 
 
 def _advantages(state: State, one: Array, other: Array) -> tuple[Array, Array]:
     """Return what one prediction gains over another in recordings of the one, and of the other.
 
-    These scatter about what is predicted as simulated recordings of the state do about theirs.
+    These scatter about what is predicted as simulated recordings of the state do about theirs: what
+    an effect draws at random, and another sensor would have otherwise, is not in it.
     """
     predictor = state.predictor()
     scatter = state.simulated - state.null.mean

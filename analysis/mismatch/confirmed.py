@@ -8,7 +8,7 @@ from math import isfinite
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.mismatch.allframes import shown_by_all
+from analysis.mismatch.allframes import once_a_frame, shown_by_all
 from analysis.mismatch.candidates import CANDIDATES
 from analysis.mismatch.explain import because, changes, explained
 from analysis.mismatch.finding import Gain
@@ -99,12 +99,18 @@ def uncalled(
 
     What hides behind another, or beside what explains all that calls for it, is called for by
     nothing at first: locked frames must show it then. A line that explains nothing must be shown by
-    all frames, at odds that take an effect in: peaks are many, of one axis or of another's.
+    all frames, at odds that take an effect in: peaks are many, of one axis or of another's. What
+    draws one number a frame, and is called for, all frames have shown where locked ones did not.
     """
+    first = {m.statistic for m in base.mismatches}
     asked = [
         n
         for n in search.named
-        if n.kind in CANDIDATES and n.name in gains and _unshown(n, gains[n.name], trial)
+        if n.kind in CANDIDATES and n.name in gains
+        if n.kind in LINES
+        or first.isdisjoint({*CANDIDATES[n.kind].calls, *CANDIDATES[n.kind].hints})
+        or not (n.effect is not None and once_a_frame(n.effect))
+        if _unshown(n, gains[n.name], trial)
     ]
     return _explaining_nothing(search, base, final, asked, UNCALLED)
 

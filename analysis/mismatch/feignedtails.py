@@ -30,6 +30,7 @@ _TAILS = TAILS | {"read_noise_spread", "rts"}
 _OF_SAMPLES = frozenset({"heavy_tailed_read_noise", "read_noise_spread"})
 _ADJACENT = ("correlation_0_1", "correlation_1_0")
 _STRONG = 0.1  # a correlation of neighbours
+_TIMES = 2  # of darks, that tell what needs time
 _LIKELY = 2.0  # standard deviations that chance may well have
 _FEW_ELECTRONS = 1.0  # skewness of shot noise of one electron: read noise beside it lessens it
 
@@ -148,28 +149,36 @@ def timed(state: State, kind: str, without: Array) -> Denial | None:
 
     Few electrons are no normal variate: a glow of less than one in a pixel looks like rare spikes.
     These know no exposure time. Where something grows with it and is left unexplained, tails must
-    show in the exposures of the shortest time, surely and by half of what they would change there.
+    show in the darks of the shortest time, surely and by half of what they would change there. Rare
+    ones would change next to nothing: of these none may be far off in longer darks alone, as white
+    noise scatters.
     """
-    times = {e.name: e.exposure_time_s for e in state.setting.layout.exposures}
+    darks = {e.name: e.exposure_time_s for e in state.setting.layout.uniform if e.kind == "dark"}
     grows = any(m.where.exposure_time_s is not None for m in state.mismatches)
-    if kind not in TAILS or not grows:
+    if kind not in TAILS or not grows or len(set(darks.values())) < _TIMES:
         return None
-    shortest = min(times.values())
+    shortest = min(darks.values())
+    keys, known = state.vector.keys, state.null.known & np.isfinite(without)
     own = np.array(
         [
-            key.scope == "exposure"
+            key.exposure in darks
+            and key.scope == "exposure"
             and key.statistic in _SHAPES | _OF_PIXELS
-            and times.get(key.exposure, np.inf) <= shortest
-            for key in state.vector.keys
+            for key in keys
         ]
     )
-    own &= state.null.known & np.isfinite(without)
-    size, shown = _shown(state, without, own)
-    if shown >= max(CLEAR, _MOST * size):
+    own &= known
+    short = own & np.array([darks.get(key.exposure, np.inf) <= shortest for key in keys])
+    if not short.any():
         return None
-    return Denial(
-        0.0, "something grows with exposure time, and where there is no time are no tails"
-    )
+    size, shown = _shown(state, without, short)
+    if size < CLEAR:
+        off = np.where(own, (state.vector.values - without) / state.vector.errors, 0.0)
+        none = off[short].max() < CLEAR and off.max() > FAR_OFF
+    else:
+        none = shown < max(CLEAR, _MOST * size)
+    why = "something grows with exposure time, and darks of the shortest time have no tails"
+    return Denial(0.0, why) if none else None
 
 
 def mixed(state: State, kind: str) -> Denial | None:

@@ -40,12 +40,15 @@ class Walk:
         1.96.
     gain
         Of log-likelihood over one that does not persist, nats.
+    white_dn
+        Standard deviation of the likeliest that does not.
     """
 
     sigma_dn: float
     persistence: float
     errors: Mapping[str, float]
     gain: float
+    white_dn: float
 
 
 @dataclass(frozen=True)
@@ -90,15 +93,18 @@ class FrameMeans:
 def means_of(
     lines: Mapping[tuple[str, Axis], LineMeans],
     exposures: Iterable[Taken],
-    light_dn: Callable[[str], float],
+    effects: Iterable[Effect],
+    signal_dn: Callable[[str], float],
 ) -> dict[str, FrameMeans]:
     """Return the means of the frames of exposures, by name, where they are known.
 
-    `light_dn` gives the standard deviation of an exposure's light.
+    `effects` are the camera's: its light flickers by its own share of what `signal_dn` gives.
     """
+    share = share_of_light(effects)
     found = {}
     for exposure in exposures:
-        own = FrameMeans.of(lines, exposure.name, exposure.numbers, light_dn(exposure.name))
+        light = share * signal_dn(exposure.name) if share else 0.0
+        own = FrameMeans.of(lines, exposure.name, exposure.numbers, light)
         if own is not None:
             found[exposure.name] = own
     return found
@@ -129,7 +135,8 @@ def walk_of(exposures: Sequence[FrameMeans]) -> Walk | None:
         )
     }
     gain = best - float(likely[0].max())
-    return Walk(float(sizes[of]), float(_PERSISTENCES[at]), errors, gain)
+    white = float(sizes[int(likely[0].argmax())])
+    return Walk(float(sizes[of]), float(_PERSISTENCES[at]), errors, gain, white)
 
 
 def _sizes(exposures: Sequence[FrameMeans]) -> Array:

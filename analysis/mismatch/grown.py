@@ -1,5 +1,7 @@
 """Offsets of pixels, lines or frames that grow with exposure time, as no offset does."""
 
+from collections.abc import Mapping
+from functools import partial
 from math import exp
 
 import numpy as np
@@ -8,7 +10,8 @@ from scipy.optimize import nnls
 
 from analysis.mismatch.bank.key import MOSAIC
 from analysis.mismatch.contradicted import Denial
-from analysis.mismatch.framewalk import means_of, share_of_light, shown
+from analysis.mismatch.framewalk import means_of, shown
+from analysis.mismatch.layout import Place
 from analysis.mismatch.rank import TOLD_APART
 from analysis.mismatch.state import State
 from dsis.effects import Effect
@@ -75,24 +78,24 @@ def warmed(state: State, effect: Effect) -> Denial | None:
     """Return how a wander of whole frames is denied by darks that grow with time; None: it is not.
 
     An offset that stays for long moves the levels of exposures, and so does a dark current. Where
-    frames within exposures do not show that they wander, and levels of darks go with exposure time
-    as well as by chance, at odds of 20, there may be no wander.
+    frames within exposures do not show that they wander, and levels of darks, beyond the camera's
+    own, rise with exposure time as well as by chance, at odds of 20, there may be no wander.
     """
-    layout = state.setting.layout
+    layout, seen = state.setting.layout, state.setting.seen
     darks = {e.name: e.exposure_time_s for e in layout.uniform if e.kind == "dark"}
     if not isinstance(effect, BlackLevelDrift) or len(set(darks.values())) < _TIMES:
         return None
-    share, signal = share_of_light(state.camera.effect), state.calibrated.fit.signal_dn
+    signal, modelled = state.calibrated.fit.signal_dn, state.calibrated.offsets.level_dn
 
-    def light_dn(exposure: str) -> float:
-        return share * float(np.mean([signal[exposure, channel] for channel in layout.channels]))
+    def over(of: Mapping[Place, float], exposure: str) -> float:
+        return float(np.mean([of.get((exposure, c), 0.0) for c in layout.channels]))
 
-    means = means_of(state.setting.seen.lines, layout.uniform, light_dn)
+    means = means_of(seen.lines, layout.uniform, state.camera.effect, partial(over, signal))
     own = {name: means[name] for name in darks if name in means}
     times = np.array([darks[name] for name in own])
     if len(set(times.tolist())) < _TIMES or shown(list(means.values())) >= TOLD_APART:
         return None
-    levels = np.array([float(one.means.mean()) for one in own.values()])
+    levels = np.array([float(one.means.mean()) - over(modelled, n) for n, one in own.items()])
     square = np.array([one.new_dn2 / one.means.size for one in own.values()])
     plain, growing = (_likely(levels, square, shape) for shape in (None, times))
     wandering = max(_likely(levels, square + size**2, None) for size in _offsets(levels))
@@ -108,11 +111,13 @@ def _offsets(levels: Array) -> Array:
 
 
 def _likely(levels: Array, square: Array, shape: Array | None) -> float:
-    """Return the log-likelihood of levels of some variances about their mean, or a line."""
-    free = [np.ones(levels.size), *([] if shape is None else [shape])]
-    design = np.stack(free, 1) / np.sqrt(square)[:, np.newaxis]
-    seen = levels / np.sqrt(square)
-    rest = seen - design @ np.linalg.lstsq(design, seen, rcond=None)[0]
+    """Return the log-likelihood of levels of some variances about their mean, or what rises."""
+    weights = 1 / square
+    seen = (levels - np.average(levels, weights=weights)) * np.sqrt(weights)
+    rest = seen
+    if shape is not None:
+        rise = (shape - np.average(shape, weights=weights)) * np.sqrt(weights)
+        rest = seen - max(float(rise @ seen), 0.0) / float(rise @ rise) * rise
     return -float(rest @ rest + np.log(square).sum()) / 2
 
 

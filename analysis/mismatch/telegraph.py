@@ -1,11 +1,10 @@
 """Pixels that jump between two levels, told by their own frames from pixels noisy otherwise.
 
 Some pixels are random telegraphs, whose jumps are exponentially distributed over the pixels, or all
-of one height. All
-others have one of the laws that noise of single pixels may have besides: alike, of variances that
-spread, that grow with time, with noisier frames now and then, or a drift, as of hot pixels that
-warm up. What telegraphs gain is counted
-from the best of these laws, and beside the best of them.
+of one height. All others have one of the laws that noise of single pixels may have besides: alike,
+of variances that spread, that grow with time, with noisier frames now and then, or a drift, as of
+hot pixels that warm up. What telegraphs gain is counted from the best of these laws, and beside the
+best of them.
 """
 
 from collections.abc import Iterator, Mapping

@@ -80,10 +80,15 @@ def ties(state: State, best: Ranked, other: Ranked) -> bool:
 
 
 def _by_chance(state: State, best: Ranked, other: Ranked, ahead: float) -> bool:
-    """Return whether the best is ahead by what chance has in common of many numbers."""
+    """Return whether the best is ahead by what chance has in common of many numbers.
+
+    What frames or single pixels say besides is not in numbers. Of a large recording few are
+    simulated, and nothing is said.
+    """
     if state.setting.large or other.kind == best.kind or ahead > _FAR_AHEAD:
         return False
-    return odds(state, best, other, ahead) < TOLD_APART
+    by_numbers, likelier = odds(state, best, other)
+    return ahead - by_numbers < TOLD_APART and likelier < TOLD_APART
 
 
 def bends_as_well(state: State, best: Ranked, path: Path | None) -> Path | None:

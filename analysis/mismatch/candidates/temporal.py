@@ -14,7 +14,7 @@ from analysis.mismatch.bank.peaks import Peak
 from analysis.mismatch.bank.scalars import UNKNOWN
 from analysis.mismatch.candidates.candidate import Candidate, Proposal, measured, proposals
 from analysis.mismatch.clues import NO_LINE, Clues, alike
-from analysis.mismatch.framewalk import Walk, means_of, share_of_light, walk_of
+from analysis.mismatch.framewalk import Walk, means_of, walk_of
 from analysis.mismatch.instance import Frequency, same_line
 from dsis.effects.black_level_drift import BlackLevelDrift
 
@@ -53,14 +53,14 @@ def _lines(kind: str, statistic: str) -> Candidate:
 def _drift(clues: Clues) -> Sequence[Proposal]:
     """Start from the weighted mean of what exposures show, or from the likeliest wander.
 
-    The mean is none where a quiet exposure, whose variance is known best, outweighs a restless one.
+    The mean may be none: errors grow with what is seen, so quiet exposures outweigh restless ones.
     """
     variance, _ = clues.amplitude("frame_variance", alike)
     walk = _walk(clues)
     if walk is None and variance <= 0:
         return []
     if walk is None or walk.gain < _PERSISTS:
-        size = sqrt(variance) if variance > 0 or walk is None else walk.sigma_dn
+        size = sqrt(variance) if walk is None or variance > 0 else walk.white_dn
         return proposals("black_level_drift", ["sigma_dn"], sigma_dn=size)
     values = {"sigma_dn": walk.sigma_dn, "persistence": walk.persistence}
     start = proposals("black_level_drift", (), (), **values)
@@ -71,12 +71,12 @@ def _walk(clues: Clues) -> Walk | None:
     """Return how the means of whole frames wander; None: it is not seen, or is the camera's own."""
     if any(isinstance(own, BlackLevelDrift) for own in clues.camera.effect):
         return None
-    share, channels = share_of_light(clues.camera.effect), clues.layout.channels
+    channels = clues.layout.channels
 
-    def light_dn(exposure: str) -> float:
-        return share * float(np.mean([clues.signal((exposure, c)) for c in channels]))
+    def signal_dn(exposure: str) -> float:
+        return float(np.mean([clues.signal((exposure, c)) for c in channels]))
 
-    found = means_of(clues.seen.lines, clues.layout.uniform, light_dn)
+    found = means_of(clues.seen.lines, clues.layout.uniform, clues.camera.effect, signal_dn)
     return walk_of(list(found.values()))
 
 

@@ -218,10 +218,10 @@ def test_lines_behind_a_stronger_one_may_explain_nothing() -> None:
         ("outlying_patch", -0.2, False, True),  # dust, of which columns of some frames had a part
         ("outlying_patch", 0.1, False, False),  # locked frames show it
         ("outlying_patch", -0.2, True, False),
-        ("fixed_column_variance", -0.2, False, True),  # though another explains what called for it
+        ("fixed_column_variance", -0.2, False, False),  # something calls for it
     ],
 )
-def test_what_explains_nothing_in_all_frames_must_be_shown_by_locked_ones(
+def test_what_nothing_calls_for_in_all_frames_must_be_shown_by_locked_ones(
     first: str, low: float, explains: bool, dropped: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     own = effect("column_prnu", sigma_percent=0.3)
@@ -264,18 +264,48 @@ def test_a_line_that_explains_nothing_must_be_sure(
     assert found == ((named, confirmed.UNCALLED) if dropped else None)
 
 
-@pytest.mark.parametrize(("first", "dropped"), [("frame_variance", False), ("kurtosis", True)])
-def test_what_all_frames_show_beside_another_need_not_be_shown_by_locked_ones(
-    first: str, dropped: bool, monkeypatch: pytest.MonkeyPatch
+def test_what_only_hints_at_an_effect_does_not_call_for_it(
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Light that flickers beside a drift: one of them has all of what frames scatter by."""
-    own = effect("flicker", sigma_percent=0.3)
-    named: Any = Stub(name="flicker", kind="flicker", effect=own, measured=False)
+    """A smooth surface that a glow explains is no reason for a decay at an edge."""
+    own = effect("line_settling", offset_dn=-1.2, length_pixels=5.0, edge="bottom")
+    named: Any = Stub(name="line_settling (bottom)", kind=own.kind, effect=own, measured=False)
     search: Any = Stub(named=[named], without=lambda *_: None)
-    base: Any = Stub(mismatches=[Stub(statistic=first)])
+    base: Any = Stub(mismatches=[Stub(statistic="fixed_smooth_variance")])
     trial: Any = None
-    monkeypatch.setattr(confirmed, "changes", lambda *_: {"flicker": None})
-    monkeypatch.setattr(confirmed, "explained", lambda *_: {first: ("black_level_drift", 1.0)})
-    gains = {"flicker": Gain(0.3, (-0.1, 0.7))}
-    found = confirmed.uncalled(search, base, base, gains, trial)
-    assert found == ((named, confirmed.UNCALLED) if dropped else None)
+    monkeypatch.setattr(confirmed, "changes", lambda *_: {named.name: None})
+    told = {"fixed_smooth_variance": ("amp_glow", 1.0)}
+    monkeypatch.setattr(confirmed, "explained", lambda *_: told)
+    gains = {named.name: Gain(0.13, (-0.2, 0.4))}
+    assert confirmed.uncalled(search, base, base, gains, trial) == (named, confirmed.UNCALLED)
+
+
+@pytest.mark.parametrize(
+    ("error", "low", "measured", "refused"),
+    [
+        (0.024, -0.04, False, True),
+        (0.004, -0.04, False, False),  # known by its size
+        (0.024, 0.04, False, False),  # locked frames show it
+        (0.024, -0.04, True, False),  # so do whole frames
+    ],
+)
+def test_what_no_frames_show_has_a_size_beyond_its_error(
+    error: float, low: float, measured: bool, refused: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Codes of unequal width of 0.0058 +- 0.0239 LSB are none."""
+    own = effect("adc_dnl", rms_lsb=0.0058)
+    named: Any = Stub(
+        kind=own.kind,
+        effect=own,
+        measured=measured,
+        errors={"rms_lsb": error},
+        proposal=Stub(free=("rms_lsb",), effect=own, errors={}),
+    )
+    monkeypatch.setattr(confirmed, "_calls_left", lambda *_: False)
+    search: Any = None
+    state: Any = None
+    told = Gained(Gain(150.0, (low, 500.0)), certain=True)
+    why = confirmed.small(search, state, named, told)
+    assert why == (
+        "no size of it exceeds its standard error (rms lsb 0.0058 ± 0.024)" if refused else ""
+    )

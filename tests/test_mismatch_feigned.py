@@ -313,3 +313,22 @@ def test_charge_that_hot_pixels_share_makes_no_clusters() -> None:
     image, _ = state.setting.seen.images["MONO", "time alone"]
     image[1:] += 0.15 * image[:-1].clip(10) - 1.5
     assert side_by_side(state, "hot_pixels") is None
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(("together", "denied"), [(16, True), (1, False)])
+def test_what_is_written_into_a_line_of_frames_does_not_jump(
+    together: int, denied: bool, seed: int
+) -> None:
+    """A counter in the first pixels, say; random telegraphs lie anywhere."""
+    rng = np.random.default_rng(seed)
+    state = _lines(0.0, "variance", "variance_spread")
+    image = rng.chisquare(40, (ROWS, COLUMNS)) - 40
+    at = [(0, x) for x in range(16)]
+    if together == 1:
+        at = list(zip(rng.integers(ROWS, size=16), rng.integers(COLUMNS, size=16), strict=True))
+    for y, x in at:
+        image[y, x] += 2000 * rng.uniform(0.5, 1.0)
+    state.setting.seen.images["MONO", "variance"] = (image, float(np.sqrt(80)))
+    assert (side_by_side(state, "rts") is not None) == denied
+    assert side_by_side(state, "read_noise_spread") is None

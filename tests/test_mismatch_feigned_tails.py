@@ -11,7 +11,7 @@ from scipy.stats import norm
 from analysis.mismatch import feigned
 from analysis.mismatch.bank.key import Key
 from analysis.mismatch.contradicted import Denial
-from analysis.mismatch.feignedtails import coded, lopsided, placed, timed
+from analysis.mismatch.feignedtails import coded, lopsided, mixed, placed, timed
 from dsis.effects.adc_dnl import AdcDnl
 from exposing import effect
 
@@ -225,3 +225,32 @@ def test_all_that_feigns_an_effect_is_asked(name: str, monkeypatch: pytest.Monke
     said = Denial(0.0, "for a reason")
     monkeypatch.setattr(feigned, name, lambda *_: said)
     assert feigned.of_another(state, own, np.zeros(1)) is said
+
+
+@pytest.mark.parametrize(
+    ("along_rows", "along_columns", "denied"),
+    [
+        (0.07, 0.05, True),
+        (0.07, 0.0, False),  # a filter along rows
+        (0.02, 0.02, False),  # may be another's
+    ],
+)
+def test_noise_that_neighbours_share_in_the_dark_is_no_law_of_single_samples(
+    along_rows: float, along_columns: float, denied: bool
+) -> None:
+    names = ("correlation_0_1", "correlation_1_0")
+    keys = tuple(
+        Key(statistic=name, scope="exposure", exposure="dark", channel="MONO", detail="")
+        for name in names
+    )
+    state: Any = SimpleNamespace(
+        setting=SimpleNamespace(
+            layout=SimpleNamespace(exposures=[SimpleNamespace(name="dark", kind="dark")])
+        ),
+        vector=SimpleNamespace(keys=keys, values=np.array([along_rows, along_columns])),
+        null=SimpleNamespace(mean=np.zeros(2), sd=np.full(2, 0.004), known=np.ones(2, bool)),
+        mismatches=[SimpleNamespace(statistic=name) for name in names],
+    )
+    for kind in ("adc_dnl", "read_noise_spread", TAILS):
+        assert (mixed(state, kind) is not None) is denied
+    assert mixed(state, "quantisation") is None

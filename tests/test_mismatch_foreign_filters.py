@@ -120,8 +120,9 @@ def test_lit_frames_that_are_unlike_by_chance_deny_no_lag() -> None:
         ("heavy_tailed_read_noise", 0.3, 0.2, True),
         ("heavy_tailed_read_noise", -0.3, 0.2, True),
         ("read_noise_spread", 0.3, 0.2, True),
-        ("heavy_tailed_read_noise", 0.3, 0.05, False),  # memory goes along one axis
-        ("heavy_tailed_read_noise", 0.05, 0.05, False),  # a weak filter
+        ("heavy_tailed_read_noise", 0.3, 0.01, False),  # memory goes along one axis
+        ("heavy_tailed_read_noise", 0.05, 0.05, True),
+        ("adc_dnl", 0.05, 0.05, True),
         ("rts", 0.3, 0.2, False),
     ],
 )
@@ -153,3 +154,13 @@ def test_a_switch_is_where_the_final_model_has_it() -> None:
     assert as_settled(moved, 2850.0, 900.0) == (2900.0, 900.0)  # other gaps were as likely
     none: Any = Stub(switches=(), fit=Stub(signal_dn=signals))
     assert as_settled(none, 2100.0, 380.0) == (2100.0, 380.0)
+
+
+@pytest.mark.parametrize("kind", ["adc_dnl", "heavy_tailed_read_noise", "read_noise_spread"])
+@pytest.mark.parametrize(("dark", "denied"), [(0.15, True), (0.01, False)])
+def test_frames_that_share_noise_in_the_dark_have_no_law_of_single_samples(
+    kind: str, dark: float, denied: bool
+) -> None:
+    values = {"frame_correlation": (dark, dark, 0.01, 0.01)}
+    assert (mixed(_state(values, {"frame_correlation"}), kind) is not None) is denied
+    assert mixed(_state(values, set()), kind) is None  # something explains it

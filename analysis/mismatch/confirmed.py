@@ -8,7 +8,7 @@ from math import isfinite
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.mismatch.allframes import once_a_frame, shown_by_all
+from analysis.mismatch.allframes import shown_by_all
 from analysis.mismatch.candidates import CANDIDATES
 from analysis.mismatch.explain import because, changes, explained
 from analysis.mismatch.finding import Gain
@@ -19,7 +19,7 @@ from analysis.mismatch.judge import Judge
 from analysis.mismatch.locate import FAMILY
 from analysis.mismatch.model import side_by_side
 from analysis.mismatch.name import Search
-from analysis.mismatch.named import Named, unclear
+from analysis.mismatch.named import Named, unclear, vague
 from analysis.mismatch.rank import SURE_GAIN
 from analysis.mismatch.relit import relit
 from analysis.mismatch.state import State
@@ -95,21 +95,18 @@ def _explaining_nothing(
 def uncalled(
     search: Search, base: State, final: State, gains: Mapping[str, Gain], trial: Trial
 ) -> tuple[Named, str] | None:
-    """Return an effect that nothing in all frames needs, nor locked ones show; None: none is.
+    """Return an effect for which nothing calls in all frames, nor do locked ones; None: none is.
 
-    What hides behind another, or beside what explains all that calls for it, is called for by
-    nothing at first: locked frames must show it then. A line that explains nothing must be shown by
-    all frames, at odds that take an effect in: peaks are many, of one axis or of another's. What
-    draws one number a frame, and is called for, all frames have shown where locked ones did not.
+    What hides behind another is called for by nothing at first: locked frames must show it then,
+    whatever hinted at it. A line that explains nothing must be shown by all frames, at odds that
+    take an effect in: peaks are many, of one axis or of another's.
     """
     first = {m.statistic for m in base.mismatches}
     asked = [
         n
         for n in search.named
         if n.kind in CANDIDATES and n.name in gains
-        if n.kind in LINES
-        or first.isdisjoint({*CANDIDATES[n.kind].calls, *CANDIDATES[n.kind].hints})
-        or not (n.effect is not None and once_a_frame(n.effect))
+        if n.kind in LINES or first.isdisjoint(CANDIDATES[n.kind].calls)
         if _unshown(n, gains[n.name], trial)
     ]
     return _explaining_nothing(search, base, final, asked, UNCALLED)
@@ -191,10 +188,14 @@ def small(search: Search, state: State, named: Named, told: Gained | None) -> st
     """Return why an effect is not told from none by its own size; empty: it is, or frames bear it.
 
     What draws at random is known by what frames gain, whatever its size, unless a statistic that
-    calls for it is left: then something else is there, by which frames would gain as well.
+    calls for it is left: then something else is there, by which frames would gain as well. Where
+    locked frames leave it open, one of its sizes must exceed its error.
     """
     if named.effect is not None and named.effect.draws:
-        return unclear(named, at_random=True) if _calls_left(search, state, named) else ""
+        if _calls_left(search, state, named):
+            return unclear(named, at_random=True)
+        plain = named.kind in LINES or named.measured or _borne_out(told)
+        return "" if plain else vague(named)
     return "" if _borne_out(told) else unclear(named)
 
 

@@ -48,6 +48,12 @@ _MAPS = {
 _AXES = {"row_fpn": "rows", "column_fpn": "columns", "row_prnu": "rows", "column_prnu": "columns"}
 _GROWING = frozenset({"row_prnu", "column_prnu"})
 _CLEAR = 5.0  # standard errors of what stands out
+_ONE_BY_ONE = {"hot_pixels": _MAPS["hot_pixels"], "rts": ("variance",)}
+_STANDS_OUT = {"hot_pixels": _CLEAR, "rts": 8.0}  # variances of few frames scatter far above
+_ONE_BY_ONE_WHY = {
+    "hot_pixels": "pixels that stand out with exposure time lie side by side",
+    "rts": "pixels that are noisier than the others lie side by side",
+}
 _SURE = 4.0  # of what few frequencies make
 _ALIKE_ROWS = frozenset({"row_correlation", "slow_row_variance"})
 _SHAPED = frozenset({"half_seam", "parity", STATISTIC})
@@ -294,20 +300,21 @@ def _mostly_left(state: State, without: Array) -> bool:
 
 
 def side_by_side(state: State, kind: str) -> Denial | None:
-    """Return how hot pixels are denied by warm ones that lie side by side; None: they do not.
+    """Return how single pixels are denied by such that lie side by side; None: they do not.
 
-    Pixels that are hot are drawn one by one: f of them leave 1 - (1 - f)^8 of them a neighbour that
-    is. Where most of those that stand out of what grows with time have one, of a height like their
-    own, and far more than that leaves, they are trails or clusters.
+    Pixels that are hot, or jump, are drawn one by one: f of them leave 1 - (1 - f)^8 of them a
+    neighbour that does. Where most of those that stand out - of what grows with time, or of how
+    noisy pixels are - have one, of a height like their own, and far more than that leaves, they are
+    trails, clusters, or something that is written into the frames.
     """
-    if kind != "hot_pixels":
+    if kind not in _ONE_BY_ONE:
         return None
     out, with_one, by_chance = 0, 0, 0.0
-    for image, noise in _maps(state, kind):
+    for image, noise in _maps(state, _ONE_BY_ONE[kind]):
         low, middle, high = np.percentile(image, [25, 50, 75])
         spread = max(variance_of_quartiles(float(low), float(high)) ** 0.5, noise)
         height = (image - middle) / spread
-        warm = np.pad(np.where(height > _CLEAR, height, 0.0), 1)
+        warm = np.pad(np.where(height > _STANDS_OUT[kind], height, 0.0), 1)
         own = warm[1:-1, 1:-1]
         beside = np.lib.stride_tricks.sliding_window_view(warm, (3, 3)).reshape(*own.shape, 9)
         alike = (beside > _LIKE * own[..., np.newaxis]) & (beside * _LIKE < own[..., np.newaxis])
@@ -319,7 +326,7 @@ def side_by_side(state: State, kind: str) -> Denial | None:
     chance = float(binom.sf(with_one - 1, out, min(by_chance / out, 1.0))) if out else 1.0
     if with_one <= _MOST * out or chance > _RARE:
         return None
-    return Denial(1 - with_one / out, "pixels that stand out with exposure time lie side by side")
+    return Denial(1 - with_one / out, _ONE_BY_ONE_WHY[kind])
 
 
 def _of_many(state: State, name: str) -> tuple[float, float, float]:
@@ -351,7 +358,7 @@ def coloured(state: State, kind: str) -> Denial | None:
     if kind not in _MAPS or not called:
         return None
     plain, most, square = 0.0, 0.0, 0.0
-    for image, noise in _maps(state, kind):
+    for image, noise in _maps(state, _MAPS[kind]):
         part = parts(image, noise)
         power = np.abs(np.fft.rfft2(part.pixels)[1:, 1:-1]) ** 2 / image.size
         plain += part.square - 1
@@ -363,10 +370,10 @@ def coloured(state: State, kind: str) -> Denial | None:
     return Denial(max(most / plain, 0.0), f"{why} most of what it would explain")
 
 
-def _maps(state: State, kind: str) -> list[tuple[Array, float]]:
-    """Return the maps and their noise, of each channel, that a pattern of pixels is seen in."""
+def _maps(state: State, names: tuple[str, ...]) -> list[tuple[Array, float]]:
+    """Return the first of some maps that there is, and its noise, of each channel."""
     images = state.setting.seen.images
     return [
-        next(images[channel, name] for name in _MAPS[kind] if (channel, name) in images)
-        for channel in sorted({channel for channel, name in images if name in _MAPS[kind]})
+        next(images[channel, name] for name in names if (channel, name) in images)
+        for channel in sorted({channel for channel, name in images if name in names})
     ]

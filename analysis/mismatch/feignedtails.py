@@ -27,9 +27,9 @@ _MOST = 0.5  # of tails, that something else may feign
 _SCATTER = 1.84  # see `coded`
 _OF_PIXELS = frozenset({"variance_spread", "one_off_outliers"})
 _TAILS = TAILS | {"read_noise_spread", "rts"}
-_OF_SAMPLES = frozenset({"heavy_tailed_read_noise", "read_noise_spread"})
+_OF_SAMPLES = frozenset({"adc_dnl", "heavy_tailed_read_noise", "read_noise_spread"})
+_IN_TIME = "frame_correlation"
 _ADJACENT = ("correlation_0_1", "correlation_1_0")
-_STRONG = 0.1  # a correlation of neighbours
 _TIMES = 2  # of darks, that tell what needs time
 _LIKELY = 2.0  # standard deviations that chance may well have
 _FEW_ELECTRONS = 1.0  # skewness of shot noise of one electron: read noise beside it lessens it
@@ -184,21 +184,26 @@ def timed(state: State, kind: str, without: Array) -> Denial | None:
 def mixed(state: State, kind: str) -> Denial | None:
     """Return how the law of single pixels' noise is denied by noise that neighbours share; None.
 
-    Tails, and pixels that are noisier, are of samples drawn each by itself. Where neighbours along
-    rows and along columns are far from that in the dark, and it is left unexplained - a camera that
-    compresses, say - the noise has no such law.
+    Tails, and pixels that are noisier, are of samples drawn each by itself, and codes of unequal
+    width are met by each sample by itself. Where neighbours along rows and along columns are far
+    from that in the dark, or successive frames, and it is left unexplained - a camera that
+    compresses, say, or averages - the noise has no such law.
     """
     darks = {e.name for e in state.setting.layout.exposures if e.kind == "dark"}
     if kind not in _OF_SAMPLES or not darks:
         return None
-    left = left_open(state, _ADJACENT)
-    along = [
-        [rest for (place, name), (rest, _) in left.items() if name == own and place[0] in darks]
-        for own in _ADJACENT
-    ]
-    if not all(along) or min(abs(float(np.mean(own))) for own in along) < _STRONG:
+    left = left_open(state, (*_ADJACENT, _IN_TIME))
+
+    def shared(name: str) -> bool:
+        own = [one for (place, of), one in left.items() if of == name and place[0] in darks]
+        rest, sd = np.mean(own, 0) if own else (0.0, 1.0)
+        return bool(abs(rest) > FAR_OFF * sd)
+
+    if shared(_IN_TIME):
+        return Denial(0.0, "in the dark successive frames share noise, and no sample has its own")
+    if not all(shared(name) for name in _ADJACENT):
         return None
-    return Denial(0.0, "in the dark neighbours share much of their noise, and no pixel has its own")
+    return Denial(0.0, "in the dark neighbours share noise, and no sample has its own")
 
 
 def clamped(state: State, kind: str, without: Array) -> Denial | None:

@@ -11,7 +11,7 @@ from analysis.mismatch.candidates import CANDIDATES
 from analysis.mismatch.contradicted import Denial, contradicted
 from analysis.mismatch.displaced import displaced
 from analysis.mismatch.edged import outlined
-from analysis.mismatch.feigned import of_another
+from analysis.mismatch.feigned import of_another, side_by_side
 from analysis.mismatch.instance import LINES
 from analysis.mismatch.named import Named
 from analysis.mismatch.otherlags import alike
@@ -138,7 +138,8 @@ class Judge:
 
     def _denial(self, predictor: Predictor, named: Named) -> Verdict | None:
         if named.measured:
-            return None  # what correlates pixels besides may hide it in numbers, not in frames
+            # What correlates pixels besides may hide it in numbers, not in frames.
+            return _verdict(side_by_side(self.state, named.kind))
         if named.proposal is None:
             return _verdict(displaced(self.state, named.kind, self.state.null.mean))
         without = self.without(named)

@@ -1,6 +1,6 @@
 """What a search has taken in, and cameras without it."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf, isfinite, log1p
 
@@ -124,11 +124,7 @@ def unclear(named: Named, *, at_random: bool = False) -> str:
         for name, (value, error) in sizes.items()
     ):
         return ""
-    said = ", ".join(
-        f"{name.replace('_', ' ')} {value:.3g} ± {error:.2g}"
-        for name, (value, error) in sizes.items()
-    )
-    return f"its size is less than {clear:g} of its standard errors ({said})"
+    return f"its size is less than {clear:g} of its standard errors ({_said(sizes)})"
 
 
 def _plain(named: Named, effect: Effect, errors: dict[str, float]) -> Named:
@@ -177,3 +173,25 @@ def camera_without(camera: Camera, effects: Sequence[Effect], given: Camera) -> 
                 del left[i]
                 break
     return camera.model_copy(update={"effect": tuple(left)})
+
+
+def vague(named: Named) -> str:
+    """Return why an effect that draws at random has no size; empty: one exceeds its error."""
+    effect = named.effect
+    if named.proposal is None or effect is None:
+        return ""
+    sizes = {
+        name: (float(getattr(effect, name)), named.errors.get(name, inf))
+        for name in named.proposal.free
+        if name not in SHAPES
+    }
+    if not sizes or any(not isfinite(e) or abs(value) >= e for value, e in sizes.values()):
+        return ""
+    return f"no size of it exceeds its standard error ({_said(sizes)})"
+
+
+def _said(sizes: Mapping[str, tuple[float, float]]) -> str:
+    return ", ".join(
+        f"{name.replace('_', ' ')} {value:.3g} ± {error:.2g}"
+        for name, (value, error) in sizes.items()
+    )

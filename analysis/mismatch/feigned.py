@@ -25,6 +25,7 @@ from analysis.mismatch.jumped import jumped
 from analysis.mismatch.leftopen import warm_left
 from analysis.mismatch.movinglines import of_means
 from analysis.mismatch.nofield import no_field
+from analysis.mismatch.noslope import untold_slope
 from analysis.mismatch.notfull import far_below
 from analysis.mismatch.persisting import persisting
 from analysis.mismatch.rivalled import rivalled
@@ -97,6 +98,7 @@ def of_another(state: State, effect: Effect, without: Array) -> Denial | None:
         or lopsided(state, kind)
         or spiked(state, kind)
         or far_below(state, effect)
+        or untold_slope(state, effect)
         or placed(state, kind, without)
         or clamped(state, kind, without)
         or mixed(state, kind)

@@ -35,7 +35,7 @@ _PAIRS = {
     frozenset({"line_settling", "amp_glow"}): "darks at two exposure times",
     frozenset(
         {"tap_mismatch", "channel_imbalance"}
-    ): "light of known colour: amplifiers of rows change red and blue too",
+    ): "light of known colour: amplifiers of rows or columns change red and blue too",
     frozenset({"dark_current", "black_level_drift"}): "darks at several exposure times, shuffled",
 }
 

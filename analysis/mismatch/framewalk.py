@@ -118,10 +118,9 @@ def share_of_light(effects: Iterable[Effect]) -> float:
 
 def walk_of(exposures: Sequence[FrameMeans]) -> Walk | None:
     """Return the likeliest wander of frames; None where they show none."""
-    excess = [float(own.means.var(ddof=1)) - own.new_dn2 for own in exposures]
-    if not exposures or max(excess) <= 0:
-        return None
     sizes = _sizes(exposures)
+    if sizes[0] <= 0:
+        return None
     likely = np.zeros((_PERSISTENCES.size, _SIZES))
     for own in exposures:
         likely += _loglik(own, sizes)

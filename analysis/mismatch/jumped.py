@@ -1,6 +1,7 @@
 """Pixels that stand out in the dark, and may be some that jump but stay where they are."""
 
 from analysis.mismatch.contradicted import Denial
+from analysis.mismatch.jumping import NAME
 from analysis.mismatch.state import State
 from dsis.effects import Effect
 from dsis.effects.hot_pixels import HotPixels
@@ -13,10 +14,13 @@ def jumped(state: State, effect: Effect) -> Denial | None:
     A pixel that jumps rarely, or back at once, is in one of its two states through all frames of an
     exposure, and seems brighter than others; that it does not grow with exposure time only another
     time tells. Where all exposures take the same, and as many pixels jump as stand out, or more,
-    there may be no hot ones.
+    there may be no hot ones. Nor where frames show that pixels jump, which nothing explains, and
+    hot ones leave pixels that stand out.
     """
     if not isinstance(effect, HotPixels):
         return None
+    if {m.statistic for m in state.mismatches} >= {NAME, "outlying_pixels"}:
+        return Denial(0.0, "frames show pixels that jump, and others than hot ones stand out")
     if len({exposure.exposure_time_s for exposure in state.setting.layout.uniform}) > 1:
         return None
     jumping = sum(e.pixel_fraction for e in state.camera.effect if isinstance(e, Rts))

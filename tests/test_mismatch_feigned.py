@@ -14,9 +14,9 @@ from analysis.mismatch.feigned import (
     feigned,
     heated,
     outlying,
-    side_by_side,
     stepped,
 )
+from analysis.mismatch.standout import side_by_side
 
 NUMBERS = (0, 1, 2, 4, 5, 6)  # of eight frames two are locked
 FRAMES, PIXELS = 6, 200_000

@@ -13,6 +13,8 @@ from analysis.mismatch.rank import TOLD_APART
 from analysis.mismatch.repeated import Repeated, repeats_of
 from analysis.mismatch.rowlaw import RowLaw
 from analysis.mismatch.rowpower import Size, row_powers
+from analysis.mismatch.sampletails import Ring, ring_of
+from analysis.mismatch.sidedneighbours import Sided, sided
 from analysis.mismatch.telegraph import Telegraph, could_jump
 from analysis.mismatch.telegraph import telegraph as find_telegraph
 from dsis.effects.rts import Rts
@@ -90,6 +92,16 @@ class FramesAsked:
     def bursts(self) -> Bursts:
         """How much of their tails lies in single lines."""
         return bursts_of(self.layout, self.frames_of)
+
+    @cached_property
+    def ring(self) -> Ring:
+        """How many samples of darks are moderately far out."""
+        return ring_of(self.layout, self.frames_of)
+
+    @cached_property
+    def sided(self) -> Sided:
+        """How much more alike neighbours are on one side than on the other."""
+        return sided(self.layout, self.frames_of)
 
     @cached_property
     def repeats(self) -> Mapping[str, Repeated]:

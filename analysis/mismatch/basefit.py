@@ -106,6 +106,7 @@ def fit_base(
     black_dn: float,
     left_out: frozenset[str] = frozenset(),
     slopes: Sequence[float] = (),
+    intercept: float | None = None,
 ) -> BaseFit:
     """Return the numbers of the base model.
 
@@ -123,19 +124,15 @@ def fit_base(
         Exposures that are not fitted.
     slopes
         Of each segment, for segments whose levels cannot tell it.
+    intercept
+        Of the first segment, where it is not fitted.
     """
     added_in_all = offsets.variance_dn2
     levels, offsets = offsets.fitted(levels)
     black, black_error = _black(layout, levels, offsets, black_dn)
     signal = _signals(layout, levels, offsets, black)
     light = _light(layout, levels, signal, left_out)
-    used = [
-        place
-        for place in levels
-        if place[0] not in left_out
-        and _sound(levels[place])
-        and not _hidden(levels[place], offsets, place)
-    ]
+    used = _used(layout, levels, offsets, left_out)
     x = np.array([signal[place] for place in used])
     v = np.array(
         [levels[place].variance_dn2 - offsets.variance_dn2.get(place, 1 / 12) for place in used]
@@ -150,7 +147,8 @@ def fit_base(
     for number, (low, high) in enumerate(zip(starts, ends, strict=True)):
         inside = (x >= low) & (x < high)
         known = slopes[number] if number < len(slopes) else None
-        pieces.append(_piece(low, x[inside], v[inside], relative[inside], added[inside], known))
+        own = x[inside], v[inside], relative[inside], added[inside]
+        pieces.append(_piece(low, *own, known, None if number else intercept))
     fit = BaseFit(black, black_error, light, tuple(pieces), signal, {})
     at = np.array([signal[place] for place in levels])
     line = fit.line_dn2(at)
@@ -159,6 +157,33 @@ def fit_base(
         for place, value in zip(levels, line, strict=True)
     }
     return BaseFit(black, black_error, light, tuple(pieces), signal, expected)
+
+
+def _used(
+    layout: Layout, levels: Mapping[Place, Level], offsets: Offsets, left_out: frozenset[str]
+) -> list[Place]:
+    """Return the places whose variances are fitted.
+
+    Where every dark is cut off at the lowest code, so are those in which that is a few samples:
+    read noise is normal, and what a cut leaves of it is known, see `rounding.unrounded`.
+    """
+    darks = {e.name for e in layout.uniform if e.kind == "dark"}
+    told = [
+        place
+        for place in levels
+        if place[0] not in left_out and not _hidden(levels[place], offsets, place)
+    ]
+    sound = [place for place in told if _sound(levels[place])]
+    if any(place[0] in darks for place in sound):
+        return sound
+    cut = {
+        place
+        for place in told
+        if place[0] in darks
+        and levels[place].clipped_low <= _CUT
+        and levels[place].variance_dn2 > 0
+    }
+    return [place for place in told if place in cut or _sound(levels[place])]
 
 
 def _hidden(level: Level, offsets: Offsets, place: Place) -> bool:
@@ -267,10 +292,35 @@ def _light(
     return light
 
 
+def _line(design: Array, w: Array, v: Array) -> tuple[Array, Array]:
+    """Return slope and intercept by weighted least squares, and their covariance."""
+    normal = (design * w[:, None]).T @ design
+    size = np.sqrt(np.diag(normal))
+    sizes = size * size[:, np.newaxis]
+    inverse = np.linalg.pinv(normal / sizes) / sizes
+    return inverse @ (design.T @ (w * v)), inverse
+
+
+def _through(held: float, x: Array, w: Array, v: Array) -> tuple[Array, Array]:
+    """Return the same of a line whose intercept is held, and not known."""
+    square = float((w * x * x).sum())
+    slope = float((w * x * (v - held)).sum()) / square
+    return np.array([slope, held]), np.array([[1 / square, 0.0], [0.0, np.inf]])
+
+
 def _piece(
-    low: float, x: Array, v: Array, relative: Array, added: Array, slope: float | None
+    low: float,
+    x: Array,
+    v: Array,
+    relative: Array,
+    added: Array,
+    slope: float | None,
+    held: float | None,
 ) -> Piece:
-    """Return the line through the variances of one segment, by reweighting."""
+    """Return the line through the variances of one segment, by reweighting.
+
+    `slope` where these do not tell it; an intercept that is `held` is not fitted.
+    """
     if x.size == 0:
         return Piece(low, slope or 0.0, 0.0, np.inf, np.inf)
     free = np.unique(np.round(x / max(np.abs(x).max(), 1e-12), 3)).size > 1
@@ -288,11 +338,7 @@ def _piece(
             rest = (v - parameters[0] * x - parameters[1]) / sd if parameters.any() else 0 * v
             spread = max(1.0, median(np.abs(rest)) * 1.4826)
             w = w * np.minimum(1, _HUBER * spread / np.maximum(np.abs(rest), 1e-12))
-            normal = (design * w[:, None]).T @ design
-            size = np.sqrt(np.diag(normal))
-            sizes = size * size[:, np.newaxis]
-            inverse = np.linalg.pinv(normal / sizes) / sizes
-            parameters = inverse @ (design.T @ (w * v))
+            parameters, inverse = _line(design, w, v) if held is None else _through(held, x, w, v)
         else:
             rest_v = v - (slope or 0.0) * x
             parameters = np.array([slope or 0.0, float((w * rest_v).sum() / w.sum())])

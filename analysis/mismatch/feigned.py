@@ -4,7 +4,6 @@ from math import log
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import binom
 
 from analysis.mismatch.bank.edges import edge_shapes
 from analysis.mismatch.bank.parts import parts
@@ -18,6 +17,7 @@ from analysis.mismatch.edged import STATISTIC, edged, single
 from analysis.mismatch.feignedtails import clamped, coded, lopsided, mixed, placed, spiked, timed
 from analysis.mismatch.fewfixed import of_few_that_stand_out
 from analysis.mismatch.flatcolumns import flat_columns
+from analysis.mismatch.grainedlines import grained
 from analysis.mismatch.grown import grown, warmed
 from analysis.mismatch.halves import halved
 from analysis.mismatch.inpatches import in_patches
@@ -29,6 +29,7 @@ from analysis.mismatch.noslope import untold_slope
 from analysis.mismatch.notfull import far_below
 from analysis.mismatch.persisting import persisting
 from analysis.mismatch.rivalled import rivalled
+from analysis.mismatch.standout import first_maps, side_by_side
 from analysis.mismatch.state import State
 from analysis.mismatch.unequal import unequal
 from analysis.mismatch.uneven import uneven
@@ -49,17 +50,10 @@ _MAPS = {
 _AXES = {"row_fpn": "rows", "column_fpn": "columns", "row_prnu": "rows", "column_prnu": "columns"}
 _GROWING = frozenset({"row_prnu", "column_prnu"})
 _CLEAR = 5.0  # standard errors of what stands out
-_ONE_BY_ONE = {"hot_pixels": _MAPS["hot_pixels"], "rts": ("variance",)}
-_STANDS_OUT = {"hot_pixels": _CLEAR, "rts": 8.0}  # variances of few frames scatter far above
-_ONE_BY_ONE_WHY = {
-    "hot_pixels": "pixels that stand out with exposure time lie side by side",
-    "rts": "pixels that are noisier than the others lie side by side",
-}
 _SURE = 4.0  # of what few frequencies make
 _ALIKE_ROWS = frozenset({"row_correlation", "slow_row_variance"})
 _SHAPED = frozenset({"half_seam", "parity", STATISTIC})
 _NEIGHBOURS = frozenset({"fixed_correlation_0_1", "fixed_correlation_1_0", "fixed_patch_variance"})
-_LIKE, _RARE = 0.3, 1e-6  # a share of a height; the chance of as many neighbours
 _MOST = 0.5  # of a pattern's variance, or of tails, that something else may feign
 _OF_QUARTILES = 0.37  # efficiency of a normal variate's scale by its quartiles
 _LONGEST = 1 / 8  # of a frame's rows, over which bands are taken to last
@@ -102,6 +96,7 @@ def of_another(state: State, effect: Effect, without: Array) -> Denial | None:
         or placed(state, kind, without)
         or clamped(state, kind, without)
         or mixed(state, kind)
+        or grained(state, kind, without)
         or timed(state, kind, without)
         or persisting(state, kind, without)
         or carried(state, effect)
@@ -301,36 +296,6 @@ def _mostly_left(state: State, without: Array) -> bool:
     return bool(((there > _CLEAR * sd) & (left > _CLEAR * sd) & (left > _MOST * there)).any())
 
 
-def side_by_side(state: State, kind: str) -> Denial | None:
-    """Return how single pixels are denied by such that lie side by side; None: they do not.
-
-    Pixels that are hot, or jump, are drawn one by one: f of them leave 1 - (1 - f)^8 of them a
-    neighbour that does. Where most of those that stand out - of what grows with time, or of how
-    noisy pixels are - have one, of a height like their own, and far more than that leaves, they are
-    trails, clusters, or something that is written into the frames.
-    """
-    if kind not in _ONE_BY_ONE:
-        return None
-    out, with_one, by_chance = 0, 0, 0.0
-    for image, noise in _maps(state, _ONE_BY_ONE[kind]):
-        low, middle, high = np.percentile(image, [25, 50, 75])
-        spread = max(variance_of_quartiles(float(low), float(high)) ** 0.5, noise)
-        height = (image - middle) / spread
-        warm = np.pad(np.where(height > _STANDS_OUT[kind], height, 0.0), 1)
-        own = warm[1:-1, 1:-1]
-        beside = np.lib.stride_tricks.sliding_window_view(warm, (3, 3)).reshape(*own.shape, 9)
-        alike = (beside > _LIKE * own[..., np.newaxis]) & (beside * _LIKE < own[..., np.newaxis])
-        alike[..., 4] = False  # itself
-        hot = own > 0
-        out += int(hot.sum())
-        with_one += int((hot & alike.any(-1)).sum())
-        by_chance += float(hot.sum() * (1 - (1 - hot.mean()) ** 8))
-    chance = float(binom.sf(with_one - 1, out, min(by_chance / out, 1.0))) if out else 1.0
-    if with_one <= _MOST * out or chance > _RARE:
-        return None
-    return Denial(1 - with_one / out, _ONE_BY_ONE_WHY[kind])
-
-
 def _of_many(state: State, name: str) -> tuple[float, float, float]:
     """Return a map's variance beyond noise, that of its many pixels, and the latter's error.
 
@@ -360,7 +325,7 @@ def coloured(state: State, kind: str) -> Denial | None:
     if kind not in _MAPS or not called:
         return None
     plain, most, square = 0.0, 0.0, 0.0
-    for image, noise in _maps(state, _MAPS[kind]):
+    for image, noise in first_maps(state, _MAPS[kind]).values():
         part = parts(image, noise)
         power = np.abs(np.fft.rfft2(part.pixels)[1:, 1:-1]) ** 2 / image.size
         plain += part.square - 1
@@ -370,12 +335,3 @@ def coloured(state: State, kind: str) -> Denial | None:
         return None
     why = "a wave that stands still makes" if FIXED_WAVE in called else "neighbours have in common"
     return Denial(max(most / plain, 0.0), f"{why} most of what it would explain")
-
-
-def _maps(state: State, names: tuple[str, ...]) -> list[tuple[Array, float]]:
-    """Return the first of some maps that there is, and its noise, of each channel."""
-    images = state.setting.seen.images
-    return [
-        next(images[channel, name] for name in names if (channel, name) in images)
-        for channel in sorted({channel for channel, name in images if name in names})
-    ]

@@ -98,11 +98,15 @@ def spiked(state: State, kind: str) -> Denial | None:
 
 
 def lopsided(state: State, kind: str) -> Denial | None:
-    """Return how heavy tails are denied by noise that leans to one side; None: they are not.
+    """Return how tails or spikes are denied by noise that leans to one side; None: they are not.
 
     Heavy-tailed noise is as likely above as below. Chance leans it far, which the null with its
     tails knows; what leans beyond that, and more than shot noise can, are spikes of one sign.
+    Spikes are charge, which only adds: beside no tails, and no uneven codes, darks whose noise
+    leans down, as white noise scatters, have none.
     """
+    if kind == "impulse":
+        return _downwards(state)
     if kind != "heavy_tailed_read_noise":
         return None
     left = state.null.departures(state.vector)
@@ -118,6 +122,20 @@ def lopsided(state: State, kind: str) -> Denial | None:
         if leans
         else None
     )
+
+
+def _downwards(state: State) -> Denial | None:
+    """Return how spikes are denied by darks that lean down; None: they are not."""
+    darks = {e.name for e in state.setting.layout.uniform if e.kind == "dark"}
+    if not _OF_SAMPLES.isdisjoint(effect.kind for effect in state.camera.effect):
+        return None
+    leans = any(
+        key.statistic == "skewness" and key.exposure in darks and value < -FAR_OFF * error
+        for key, value, error in zip(
+            state.vector.keys, state.vector.values, state.vector.errors, strict=True
+        )
+    )
+    return Denial(0.0, "spikes add charge, and the noise of darks leans down") if leans else None
 
 
 def placed(state: State, kind: str, without: Array) -> Denial | None:

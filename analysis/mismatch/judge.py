@@ -11,13 +11,14 @@ from analysis.mismatch.candidates import CANDIDATES
 from analysis.mismatch.contradicted import Denial, contradicted
 from analysis.mismatch.displaced import displaced
 from analysis.mismatch.edged import outlined
-from analysis.mismatch.feigned import of_another, side_by_side
+from analysis.mismatch.feigned import of_another
 from analysis.mismatch.instance import LINES
 from analysis.mismatch.named import Named
 from analysis.mismatch.otherlags import alike
 from analysis.mismatch.predict import Predictor
 from analysis.mismatch.rank import LEAST_GAIN
 from analysis.mismatch.resolved import locates, resolved
+from analysis.mismatch.standout import side_by_side
 from analysis.mismatch.state import State
 from analysis.mismatch.unmet import mirrored, unmet
 from dsis.camera import Camera

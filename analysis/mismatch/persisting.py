@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.contradicted import Denial
+from analysis.mismatch.resolved import FAR_OFF
 from analysis.mismatch.state import State
 from dsis.measures.moments import kept
 
@@ -20,10 +21,13 @@ def persisting(state: State, kind: str, without: Array) -> Denial | None:
     kurtosis of 3 V, and no pixel has tails. What such spreads have in common in several exposures
     is no matter of tails, which make variances differ anew. Where that is left unexplained, it is
     the spread of the very noise whose tails are claimed, and makes half of these, and single
-    pixels show no more than half of them, either, there may be none. `without` are the numbers
+    pixels show no more than half of them, either, there may be none. Nor are there spikes where it
+    is far from explained: they are few, and so are pixels that come back. `without` are the numbers
     predicted without the tails.
     """
-    called = {m.statistic for m in state.mismatches}
+    called = {m.statistic: m.z for m in state.mismatches}
+    if kind == "impulse" and called.get("variance_persistence", 0.0) > FAR_OFF:
+        return Denial(0.0, "samples far out are those of the same pixels in every exposure")
     if kind != "heavy_tailed_read_noise" or "variance_persistence" not in called:
         return None
     fake = _feigned(state, _claimed(state, "kurtosis", without))

@@ -27,6 +27,7 @@ _LEAST = 0.01  # of a signal: with the above, half a thousandth of it is as good
 _SAME = 0.05  # of an error: the fit has settled
 _CLOSER = 0.3  # a round's change beside that of the one before, unless two have shown it
 _SWITCH_DEVIANCE = 12.0  # by which another gap must fit better before the switch is moved
+_CHANCE = 2.0  # standard errors, that a given number may well be off
 _FREE = 5  # numbers of two lines and a switch
 _APART = 1.005  # ratio of signals from which they are two levels
 
@@ -53,6 +54,8 @@ class Calibrated:
         What the camera's own effects add, of the offsets.
     settled
         Whether another round would change nothing.
+    held
+        The first segment's intercept, where the recording does not tell it: see `_held`.
     """
 
     model: Model
@@ -63,6 +66,7 @@ class Calibrated:
     left_out: frozenset[str]
     bent: Offsets
     settled: bool = False
+    held: float | None = None
 
     @property
     def sums(self) -> frozenset[str]:
@@ -80,6 +84,7 @@ class Calibrated:
             black_dn=camera.black_level - layout.black_dn,
             left_out=self.left_out,
             slopes=[s.slope for s in camera.noise.segment],
+            intercept=self.held,
         )
 
 
@@ -109,12 +114,15 @@ def calibrate(
     effects = near.bent if near is not None and bending else Offsets()
     known = near is not None and _bends_alike(near, camera, spiky=spiky)
 
+    held: float | None = None
+
     def fitted(
         offsets: Offsets, at: tuple[float, ...], levels: Mapping[Place, Level] = seen.levels
     ) -> BaseFit:
-        return fit_base(
-            layout, levels, at, offsets, black_dn=start, left_out=left_out, slopes=slopes
-        )
+        free = partial(fit_base, black_dn=start, left_out=left_out, slopes=slopes)
+        return free(layout, levels, at, offsets, intercept=held)
+
+    held = _held(camera, fitted(_sum(undone, effects), switches))
 
     before: BaseFit | None = None
     change = nan
@@ -141,7 +149,20 @@ def calibrate(
         model = with_pictures(model, layout, fit, effects, seed=seed + 1, jobs=jobs)
     offsets = _sum(_rounding(model, layout, fit, spiky=spiky), effects)
     final = fitted(offsets, switches)
-    return Calibrated(model, fit, final, offsets, switches, left_out, effects, settled)
+    return Calibrated(model, fit, final, offsets, switches, left_out, effects, settled, held)
+
+
+def _held(camera: Camera, fit: BaseFit) -> float | None:
+    """Return the camera's own intercept where a fit does not tell it; None: it does.
+
+    Where darks are cut off at the lowest code, bright flats alone may know of it: no better than
+    that it may as well be the given one, or none, or twice that. It would move from one simulation
+    to the next by more than itself, and all that depends on read noise with it.
+    """
+    given, own = camera.noise.segment[0].intercept, fit.pieces[0]
+    untold = isfinite(own.intercept_error) and own.intercept_error > given
+    chance = abs(own.intercept - given) <= _CHANCE * own.intercept_error
+    return given if untold and chance else None
 
 
 def _bends_alike(near: Calibrated, camera: Camera, *, spiky: bool) -> bool:

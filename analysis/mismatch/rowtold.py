@@ -17,6 +17,7 @@ from analysis.mismatch.phase import WholeFrames
 from analysis.mismatch.polish import with_effects
 from analysis.mismatch.rank import LEAST_GAIN, TOLD_APART, Ranked, alike, replicates_for
 from analysis.mismatch.repeated import OFFSETS
+from analysis.mismatch.sidedneighbours import SHARED
 from analysis.mismatch.state import State
 from dsis.effects import Effect
 from dsis.effects.pink_noise import PinkNoise
@@ -62,7 +63,7 @@ def unlike_frames(
     None: they do not. Frames do where the other of both, which was not fitted or has no word, is as
     likely.
     """
-    if frames is not None and (denial := _of_frames(state, frames, best.kind)) is not None:
+    if frames is not None and (denial := _of_frames(state, frames, best)) is not None:
         return denial
     if best.kind in PIXELS:
         return unlike_pixels(state.camera, frames, best, others, partial(_explained, state))
@@ -74,15 +75,19 @@ def unlike_frames(
     return rival(-odds, f"{AS_WELL} {_WORDS[_OTHER[best.kind]]}")
 
 
-def _of_frames(state: State, frames: WholeFrames, kind: str) -> Denial | None:
+def _of_frames(state: State, frames: WholeFrames, best: Ranked) -> Denial | None:
     """Return how frames deny what lasts, tails, or offsets that are fixed; None: they do not.
 
     Of offsets nothing is said beside lines, which may last as long as an exposure does.
     """
+    kind = best.kind
     if kind in STEADY:
         return frames.pairs.denial(kind)
+    if kind in SHARED:
+        return frames.sided.denial(kind)
     if kind in TAILS:
-        return frames.bursts.denial(kind)
+        bursts = frames.bursts.denial(kind)
+        return bursts or frames.ring.denial(best.polished.effects[0])
     if kind not in OFFSETS or any(own.kind in LINES for own in state.camera.effect):
         return None
     lined = any("spectral_peak" in own.statistic for own in state.mismatches)

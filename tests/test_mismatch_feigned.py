@@ -168,7 +168,9 @@ def test_hot_pixels_that_have_no_word_do_not_jump(
 ) -> None:
     keys = (Key("outlying_pixels", scope, "", "R"),)
     state: Any = SimpleNamespace(
-        vector=None, null=SimpleNamespace(keys=keys, departures=lambda _: np.array([z]))
+        vector=None,
+        setting=SimpleNamespace(seen=SimpleNamespace(images={})),
+        null=SimpleNamespace(keys=keys, departures=lambda _: np.array([z])),
     )
     assert (heated(state, kind) is not None) == denied
 
@@ -332,3 +334,20 @@ def test_what_is_written_into_a_line_of_frames_does_not_jump(
     state.setting.seen.images["MONO", "variance"] = (image, float(np.sqrt(80)))
     assert (side_by_side(state, "rts") is not None) == denied
     assert side_by_side(state, "read_noise_spread") is None
+
+
+@pytest.mark.parametrize(("together", "denied"), [(True, True), (False, False)])
+def test_neighbours_on_a_mosaic_lie_in_several_channels(together: bool, denied: bool) -> None:
+    """Three pixels that count frames, two of one colour; apart they jump, as far as that tells."""
+    rng = np.random.default_rng(3)
+    state = _lines(0.0, "variance", "variance_spread")
+    sites = {"R": (0, 0), "Gr": (0, 1), "Gb": (1, 0), "B": (1, 1)}
+    whole = rng.chisquare(40, (ROWS, COLUMNS)) - 40
+    at = [(0, 0), (0, 1), (0, 2)] if together else [(0, 0), (9, 21), (20, 12)]
+    for (y, x), height in zip(at, (900, 1000, 800), strict=True):
+        whole[y, x] += height
+    state.setting.layout = SimpleNamespace(rows=ROWS, columns=COLUMNS, sites=sites)
+    state.setting.seen.images.clear()
+    for channel, (y, x) in sites.items():
+        state.setting.seen.images[channel, "variance"] = (whole[y::2, x::2], float(np.sqrt(80)))
+    assert (side_by_side(state, "rts") is not None) == denied

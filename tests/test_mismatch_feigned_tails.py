@@ -110,8 +110,11 @@ def _leaning(skewness: float, expected: float, sd: float) -> Any:
     """Return a state with tails, whose null knows how far chance leans such noise."""
     key = Key(statistic="skewness", scope="exposure", exposure="dark", channel="MONO", detail="")
     z = np.array([(skewness - expected) / sd])
+    dark = SimpleNamespace(name="dark", kind="dark")
     return SimpleNamespace(
-        vector=SimpleNamespace(keys=(key,), values=np.array([skewness])),
+        camera=SimpleNamespace(effect=()),
+        setting=SimpleNamespace(layout=SimpleNamespace(uniform=(dark,))),
+        vector=SimpleNamespace(keys=(key,), values=np.array([skewness]), errors=np.array([0.01])),
         null=SimpleNamespace(departures=lambda _: z),
     )
 
@@ -127,7 +130,16 @@ def _leaning(skewness: float, expected: float, sd: float) -> Any:
 )
 def test_heavy_tails_lean_to_no_side(skewness: float, sd: float, denied: bool) -> None:
     assert (lopsided(_leaning(skewness, 0.0, sd), TAILS) is not None) == denied
-    assert lopsided(_leaning(skewness, 0.0, sd), "impulse") is None
+    assert (lopsided(_leaning(skewness, 0.0, sd), "impulse") is not None) == (skewness < 0)
+
+
+def test_spikes_that_go_down_are_no_charge() -> None:
+    """Bits that flip do so both ways; beside tails, or uneven codes, noise leans by chance."""
+    state = _leaning(-0.2, 0.0, 5.0)  # 20 errors of white noise, well within spikes' own scatter
+    assert lopsided(state, "impulse") is not None
+    state.camera.effect = (AdcDnl(rms_lsb=0.1),)
+    assert lopsided(state, "impulse") is None
+    assert lopsided(_leaning(-0.05, 0.0, 5.0), "impulse") is None
 
 
 @pytest.mark.parametrize(

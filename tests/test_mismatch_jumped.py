@@ -3,9 +3,10 @@
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
-from analysis.mismatch.jumped import jumped
+from analysis.mismatch.jumped import jumped, turned
 from dsis.effects.dsnu import Dsnu
 from dsis.effects.hot_pixels import HotPixels
 from dsis.effects.rts import Rts
@@ -17,7 +18,9 @@ def _state(times: tuple[float, ...], jumping: float, left: tuple[str, ...] = ())
     rts = Rts(pixel_fraction=jumping, amplitude_dn=40.0)
     exposures = [SimpleNamespace(exposure_time_s=t) for t in times]
     return SimpleNamespace(
-        setting=SimpleNamespace(layout=SimpleNamespace(uniform=exposures)),
+        setting=SimpleNamespace(
+            layout=SimpleNamespace(uniform=exposures), seen=SimpleNamespace(images={})
+        ),
         camera=SimpleNamespace(effect=(HOT, rts)),
         mismatches=[SimpleNamespace(statistic=name) for name in left],
     )
@@ -50,3 +53,21 @@ def test_pixels_that_jump_and_have_no_word_are_no_hot_ones(
     left: tuple[str, ...], denied: bool
 ) -> None:
     assert (jumped(_state((0.05, 0.4), 0.001, left), HOT) is not None) == denied
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize(("change", "denied"), [(-1.0, True), (0.0, False), (1.0, False)])
+def test_pixels_that_are_dark_before_they_are_bright_have_jumped(
+    change: float, denied: bool, seed: int
+) -> None:
+    """Two darks: what a pixel has at no time is a hot one's offset, or the other state's."""
+    rng = np.random.default_rng(seed)
+    short, long = rng.normal(0, 1, (2, 60, 80))
+    few = rng.choice(short.size, 3, replace=False)
+    short.flat[few] += 12 * change
+    long.flat[few] += 24.0 if change >= 0 else 12.0
+    state = _state((0.01, 0.5), 0.0)
+    images = {("MONO", "offset"): (short, 1.0), ("MONO", "time"): (long - short, 2**0.5)}
+    state.setting.seen.images.update(images)
+    assert (jumped(state, HOT) is not None) == denied
+    assert turned(state) == denied

@@ -70,3 +70,13 @@ def test_a_spread_that_is_explained_feigns_nothing() -> None:
     others = tuple(m for m in state.mismatches if m.statistic != "variance_persistence")
     assert len(others) < len(state.mismatches)
     assert persisting(replace(state, mismatches=others), KIND, without) is None
+
+
+def test_the_same_noisy_pixels_in_every_exposure_are_no_spikes() -> None:
+    """Pixels that count frames, say: far out anew each time, but always they."""
+    state = _state(np.log1p(1 / 6) ** 0.5 / 2, None)
+    (own,) = (m for m in state.mismatches if m.statistic == "variance_persistence")
+    assert own.z > 8.0
+    assert persisting(state, "impulse", _without(state)) is not None
+    weak = [replace(m, z=5.0) if m is own else m for m in state.mismatches]
+    assert persisting(replace(state, mismatches=tuple(weak)), "impulse", _without(state)) is None

@@ -21,7 +21,7 @@ from analysis.mismatch.grainedlines import grained
 from analysis.mismatch.grown import grown, warmed
 from analysis.mismatch.halves import halved
 from analysis.mismatch.inpatches import in_patches
-from analysis.mismatch.jumped import jumped
+from analysis.mismatch.jumped import jumped, turned
 from analysis.mismatch.leftopen import warm_left
 from analysis.mismatch.movinglines import of_means
 from analysis.mismatch.nofield import no_field
@@ -179,9 +179,10 @@ def heated(state: State, kind: str) -> Denial | None:
     """Return how pixels that jump are denied by others that stand out with exposure time.
 
     The dark current of hot pixels is noisy, and so are they, in long exposures. Where pixels that
-    grow with time are left unexplained, they may be all that is noisy.
+    grow with time are left unexplained, they may be all that is noisy; unless these jump
+    themselves, as hot ones do not.
     """
-    if kind != "rts":
+    if kind != "rts" or turned(state):
         return None
     why = "pixels that stand out with exposure time are left, whose dark current is noisy too"
     return Denial(0.0, why) if warm_left(state) else None

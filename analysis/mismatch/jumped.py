@@ -1,10 +1,5 @@
 """Pixels that stand out in the dark, and may be some that jump but stay where they are."""
 
-from collections.abc import Mapping
-
-import numpy as np
-from numpy.typing import NDArray
-
 from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.jumping import NAME
 from analysis.mismatch.standout import heights
@@ -13,7 +8,6 @@ from dsis.effects import Effect
 from dsis.effects.hot_pixels import HotPixels
 from dsis.effects.rts import Rts
 
-Array = NDArray[np.float64]
 _CLEAR, _BELOW = 5.0, -4.0  # standard deviations of a map's noise: of all pixels, of few
 _MOST = 0.5  # of those that stand out
 
@@ -32,7 +26,7 @@ def jumped(state: State, effect: Effect) -> Denial | None:
         return None
     if {m.statistic for m in state.mismatches} >= {NAME, "outlying_pixels"}:
         return Denial(0.0, "frames show pixels that jump, and others than hot ones stand out")
-    if _turned(state.setting.seen.images):
+    if turned(state):
         return Denial(0.0, "pixels that grow with exposure time stand out below at none: they jump")
     if len({exposure.exposure_time_s for exposure in state.setting.layout.uniform}) > 1:
         return None
@@ -43,8 +37,9 @@ def jumped(state: State, effect: Effect) -> Denial | None:
     return Denial(0.0, why)
 
 
-def _turned(images: Mapping[tuple[str, str], tuple[Array, float]]) -> bool:
+def turned(state: State) -> bool:
     """Return whether most of the pixels that stand out with time do so below without any."""
+    images = state.setting.seen.images
     out = below = 0
     for channel in sorted({own for own, name in images if name == "time"}):
         if (channel, "offset") in images:

@@ -1,0 +1,82 @@
+"""Rare faults are no heavy tails: of these, most that is far out is only moderately so."""
+
+from collections.abc import Iterator
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.stats import norm, t
+
+from analysis.mismatch.sampletails import Ring, ring_of
+from dsis.effects.heavy_tailed_read_noise import HeavyTailedReadNoise
+from dsis.effects.impulse import Impulse
+
+Array = NDArray[np.float64]
+SHAPE = (8, 90, 110)
+SPREAD = 4.0  # codes
+
+
+def _layout(white: float = 4095.0, large: bool = False) -> Any:
+    exposures = [SimpleNamespace(name="dark", kind="dark", numbers=tuple(range(SHAPE[0])))]
+    sites = {"MONO": (0, 0)}
+    return SimpleNamespace(uniform=exposures, sites=sites, white_dn=white, large=large)
+
+
+def _ring(noise: Array, **layout: Any) -> Ring:
+    codes = np.rint(200 + SPREAD * noise)
+
+    def frames(name: str) -> Iterator[Array]:
+        assert name == "dark"
+        yield from codes
+
+    return ring_of(_layout(**layout), frames)
+
+
+def _student(df: float) -> HeavyTailedReadNoise:
+    return HeavyTailedReadNoise(tail_df=df)
+
+
+@pytest.mark.parametrize("df", [3.2, 5.0, 8.0])
+def test_heavy_tails_have_the_samples_that_student_s_law_has(df: float) -> None:
+    """As many beyond 3.5 quartile deviations as scipy's law has, but for the mean frame.
+
+    Less it, samples of pixels with one far out differ more: some move, and quartiles lie wider.
+    """
+    rng = np.random.default_rng(4)
+    ring = _ring(rng.standard_t(df, SHAPE))
+    scale = t.isf(0.25, df) / norm.isf(0.25)
+    expected = 2 * (t.sf(3.5 * scale, df) - t.sf(7 * scale, df))
+    assert ring.samples == np.prod(SHAPE)
+    assert ring.seen / ring.samples == pytest.approx(expected, rel=0.3)
+    assert ring.denial(_student(df)) is None
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_bits_that_flip_are_no_tails(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    noise = rng.standard_normal(SHAPE)
+    noise[rng.random(SHAPE) < 1e-4] += 32.0  # a bit of 128 codes
+    ring = _ring(noise)
+    denial = ring.denial(_student(3.4))
+    assert denial is not None
+    assert "rare faults" in denial.why
+    assert ring.denial(_student(60.0)) is None  # which foretells hardly any
+    assert ring.denial(Impulse(per_megapixel_frame=100.0, mean_dn=128.0)) is None
+
+
+def test_a_mixture_of_two_normal_laws_is_believed() -> None:
+    """A hundredth with twice the noise: another law, but tails all the same."""
+    rng = np.random.default_rng(9)
+    wide = rng.random(SHAPE) < 0.01
+    ring = _ring(rng.standard_normal(SHAPE) * np.where(wide, 3.0, 1.0))
+    assert ring.denial(_student(6.0)) is None
+
+
+def test_nothing_is_said_of_large_clipped_or_coarse_recordings() -> None:
+    noise = np.random.default_rng(2).standard_normal(SHAPE)
+    assert _ring(noise, large=True) == Ring()
+    assert _ring(noise, white=205.0) == Ring()
+    assert _ring(noise * 0.2) == Ring()
+    assert Ring().denial(_student(3.0)) is None

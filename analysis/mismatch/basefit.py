@@ -107,6 +107,7 @@ def fit_base(
     left_out: frozenset[str] = frozenset(),
     slopes: Sequence[float] = (),
     intercept: float | None = None,
+    local: Mapping[Place, Level] | None = None,
 ) -> BaseFit:
     """Return the numbers of the base model.
 
@@ -126,6 +127,8 @@ def fit_base(
         Of each segment, for segments whose levels cannot tell it.
     intercept
         Of the first segment, where it is not fitted.
+    local
+        Of ranges of signal in scenes, which tell the slope where no flat does.
     """
     added_in_all = offsets.variance_dn2
     levels, offsets = offsets.fitted(levels)
@@ -133,12 +136,18 @@ def fit_base(
     signal = _signals(layout, levels, offsets, black)
     light = _light(layout, levels, signal, left_out)
     used = _used(layout, levels, offsets, left_out)
-    x = np.array([signal[place] for place in used])
+    fitted, at = dict(levels), dict(signal)
+    if local is not None and not _flats_among(layout):
+        whole = set(layout.channels)
+        ranges = {p: own for p, own in local.items() if p[1] not in whole if own.variance_dn2 > 0}
+        used, fitted = [*used, *ranges], {**fitted, **ranges}
+        at |= {place: layout.signal_dn[place] for place in ranges}
+    x = np.array([at[place] for place in used])
     v = np.array(
-        [levels[place].variance_dn2 - offsets.variance_dn2.get(place, 1 / 12) for place in used]
+        [fitted[place].variance_dn2 - offsets.variance_dn2.get(place, 1 / 12) for place in used]
     )
     relative = np.array(
-        [sqrt(2 / levels[place].dof) * offsets.stretch.get(place, 1.0) for place in used]
+        [sqrt(2 / fitted[place].dof) * offsets.stretch.get(place, 1.0) for place in used]
     )
     added = np.array([offsets.variance_dn2.get(place, 1 / 12) for place in used])
     starts = [-np.inf, *switches]
@@ -150,13 +159,16 @@ def fit_base(
         own = x[inside], v[inside], relative[inside], added[inside]
         pieces.append(_piece(low, *own, known, None if number else intercept))
     fit = BaseFit(black, black_error, light, tuple(pieces), signal, {})
-    at = np.array([signal[place] for place in levels])
-    line = fit.line_dn2(at)
+    line = fit.line_dn2(np.array([signal[place] for place in levels]))
     expected = {
         place: float(value) + added_in_all.get(place, 1 / 12)
         for place, value in zip(levels, line, strict=True)
     }
     return BaseFit(black, black_error, light, tuple(pieces), signal, expected)
+
+
+def _flats_among(layout: Layout) -> bool:
+    return any(e.kind == "flat" for e in layout.uniform)
 
 
 def _used(

@@ -73,18 +73,19 @@ class Calibrated:
         """Sums of simulated frames that a `refit` needs beside those that are always made."""
         return frozenset({SPIKES} if self.offsets.bulk_dn2 else ())
 
-    def refit(self, layout: Layout, levels: Mapping[Place, Level]) -> BaseFit:
+    def refit(self, layout: Layout, seen: Observation) -> BaseFit:
         """Return the base numbers of another observation, fitted in the same way."""
         camera = self.model.camera
         return fit_base(
             layout,
-            levels,
+            seen.levels,
             self.switches,
             self.offsets,
             black_dn=camera.black_level - layout.black_dn,
             left_out=self.left_out,
             slopes=[s.slope for s in camera.noise.segment],
             intercept=self.held,
+            local=seen.local,
         )
 
 
@@ -120,7 +121,7 @@ def calibrate(
         offsets: Offsets, at: tuple[float, ...], levels: Mapping[Place, Level] = seen.levels
     ) -> BaseFit:
         free = partial(fit_base, black_dn=start, left_out=left_out, slopes=slopes)
-        return free(layout, levels, at, offsets, intercept=held)
+        return free(layout, levels, at, offsets, intercept=held, local=seen.local)
 
     held = _held(camera, fitted(_sum(undone, effects), switches))
 

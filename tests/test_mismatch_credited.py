@@ -129,3 +129,16 @@ def test_of_two_of_a_kind_none_is_mistaken_for_the_other() -> None:
     (kept,) = kept_up([_named(WHITE)], camera(one, other), 0)
     assert kept.proposal is not None
     assert kept.proposal.effect == WHITE
+
+
+def test_a_filter_and_charge_share_what_neighbours_have_in_common() -> None:
+    """Each has its own law: a share is given back where they are fitted, but not without one."""
+    filtering = effect("spatial_filtering", fraction=0.03)
+    charge = effect("crosstalk", fraction=0.02)
+    bare, starts = together(camera(DARK, filtering), Proposal(charge, ("fraction",)), 1)
+    assert bare.effect == (DARK,)
+    sizes: list[Any] = [one.effect.model_dump()["fraction"] for one in starts]
+    assert sizes == pytest.approx([0.02, 0.01])
+    _, starts = together(camera(charge), Proposal(filtering, ("fraction",)), 0)
+    assert starts[1].effect.model_dump()["fraction"] == pytest.approx(0.002)
+    assert given_back(camera(filtering), charge, 0) == camera(filtering)

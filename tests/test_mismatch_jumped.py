@@ -71,3 +71,19 @@ def test_pixels_that_are_dark_before_they_are_bright_have_jumped(
     state.setting.seen.images.update(images)
     assert (jumped(state, HOT) is not None) == denied
     assert turned(state) == denied
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(("below", "denied"), [(0, False), (1, False), (6, True)])
+def test_no_current_is_negative(below: int, denied: bool, seed: int) -> None:
+    """Of eight pixels that stand out above none or one is below by a defect, six by jumps."""
+    rng = np.random.default_rng(seed)
+    image = rng.normal(0, 1, (60, 80))
+    few = rng.choice(image.size, 8 + below, replace=False)
+    image.flat[few] += np.where(np.arange(8 + below) < 8, 15.0, -15.0)
+    state = _state((0.05,), 0.0)
+    state.setting.seen.images["MONO", "offset"] = (image, 1.0)
+    state.camera.effect = (HOT,)
+    assert (jumped(state, HOT) is not None) == denied
+    state.camera.effect = (HOT, Rts(pixel_fraction=1e-5, amplitude_dn=15.0))
+    assert jumped(state, HOT) is None  # which says what is below

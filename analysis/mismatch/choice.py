@@ -6,6 +6,7 @@ from math import log
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.mismatch.bothneeded import both_needed
 from analysis.mismatch.candidates import CANDIDATES, measured
 from analysis.mismatch.clues import NO_LINE
 from analysis.mismatch.codegain import gain_by_codes
@@ -62,6 +63,8 @@ class Choice(Fitted):
         Of all frames of a small recording; of those that are not locked.
     memory
         What was tried before.
+    second
+        What must be taken in with the best: see `both_needed`.
     least
         Gain for an effect to be taken in.
     """
@@ -75,6 +78,7 @@ class Choice(Fitted):
     lines: WholeFrames | None = None
     measuring: WholeFrames | None = None
     memory: Memory = field(default_factory=Memory)
+    second: Ranked | None = None
     least: float = SURE_GAIN
 
     def _refuse(self, kind: str, effect: Effect | None, why: str) -> None:
@@ -83,7 +87,7 @@ class Choice(Fitted):
             self.settled.append((kind, line))
 
     def _best(self, state: State) -> tuple[Named, Camera] | None:
-        """Return the effect that explains most, and the camera with it."""
+        """Return the effect that explains most, and the camera with it, and with a `second`."""
         left = self._left()
         off = {m.statistic for m in state.mismatches}
         path = self.path(state) if "dual_gain" in left and "pixel_variance" in off else None
@@ -115,8 +119,17 @@ class Choice(Fitted):
             proposal = measured(proposal, *known)
             errors = dict(proposal.errors)
             camera = with_effects(state.camera, [proposal.effect])
+        if camera is not None and self.second is not None:
+            camera = with_effects(camera, self.second.polished.effects)
         named = Named(best.kind, proposal, errors, best.gain, rivals)
         return None if camera is None else (named, camera)
+
+    def _second(self) -> list[Named]:
+        """Return what must be taken in with the best, if anything."""
+        if (own := self.second) is None:
+            return []
+        proposal = replace(own.proposal, effect=own.polished.effects[0])
+        return [Named(own.kind, proposal, own.polished.errors[0], own.gain, ())]
 
     @property
     def least_odds(self) -> float:
@@ -165,7 +178,7 @@ class Choice(Fitted):
         Neither of two that tie over the same numbers is claimed, nor what explains the same, and
         worse. What is taken in besides may decide: they are tried again in the next round.
         """
-        self.ties, self.doubted, self.apart = [], {}, []
+        self.ties, self.doubted, self.apart, self.second = [], {}, [], None
         while True:
             apart = [*self.apart, *(one.mean for pair in self.ties for one in pair)]
             settled = tuple(self.settled)
@@ -183,6 +196,9 @@ class Choice(Fitted):
                 continue  # all that was fitted of a kind is denied: others were too far behind it
             if not fitted or fitted[0].gain < LEAST_GAIN:
                 return fitted
+            if (both := both_needed(state, fitted)) is not None:
+                self.second = both[1]
+                return [both[0], *(one for one in fitted[1:] if one.kind != both[1].kind)]
             tied = (one for one in fitted[1:] if ties(state, fitted[0], one))
             rival: Ranked | Path | None = next(tied, self._named_otherwise(fitted[0]))
             rival = rival or bends_as_well(state, fitted[0], path)

@@ -1,7 +1,8 @@
 """Effects that were credited with what another explains: both are fitted together.
 
 Offsets that rows share are row noise too. Where white row noise was taken in first it has all of
-their variance: beside it nothing that adds to that fits, until it gives some back.
+their variance: beside it nothing that adds to that fits, until it gives some back. So have a filter
+and charge that neighbours share what the other correlates.
 """
 
 from collections.abc import Sequence
@@ -13,7 +14,7 @@ from analysis.mismatch.polish import with_effects
 from dsis.camera import Camera
 from dsis.effects import Effect
 
-_SIZE = "sigma_dn"
+_SIGMA, _SHARE = "sigma_dn", "fraction"
 _MAY = frozenset(kind for own in CANDIDATES.values() for kind in own.credited)
 _KEPT = 0.1  # of its size, that the credited effect keeps at least where a fit starts
 
@@ -21,17 +22,19 @@ _KEPT = 0.1  # of its size, that the credited effect keeps at least where a fit 
 def together(camera: Camera, proposal: Proposal, given: int) -> tuple[Camera, list[Proposal]]:
     """Return a camera, and what is fitted in it: a proposal, and what was credited with its part.
 
-    The credited effect leaves the camera, and is proposed again with the variance that the other
-    leaves it. Where there is none the camera stays as it is, and so do its first effects, as many
-    as are `given`: they are the user's.
+    The credited effect leaves the camera, and is proposed again with the variance, or the share,
+    that the other leaves it. Where there is none the camera stays as it is, and so do its first
+    effects, as many as are `given`: they are the user's.
     """
     place = _credited(camera, proposal.effect, given)
     if place is None:
         return camera, [proposal]
     credited = camera.effect[place]
-    size, other = (float(getattr(own, _SIZE)) for own in (credited, proposal.effect))
-    left = sqrt(max(size**2 - other**2, (_KEPT * size) ** 2))
-    again = Proposal(type(credited)(**{**credited.model_dump(), _SIZE: left}), (_SIZE,))
+    name = _size(credited)
+    size, other = (float(getattr(own, name)) for own in (credited, proposal.effect))
+    left = sqrt(max(size**2 - other**2, 0.0)) if name == _SIGMA else size - other
+    least = max(left, _KEPT * size)
+    again = Proposal(type(credited)(**{**credited.model_dump(), name: least}), (name,))
     return _without(camera, place), [proposal, again]
 
 
@@ -44,14 +47,15 @@ def joined(camera: Camera, effects: Sequence[Effect], given: int) -> Camera | No
 def given_back(camera: Camera, effect: Effect, given: int) -> Camera:
     """Return a camera without an effect in which what was credited has its part again.
 
-    Variances add: no effect is to gain what another would explain without it.
+    Variances add: no effect is to gain what another would explain without it. Shares do not: of
+    noise of light one has more of it, of all noise the other.
     """
     place = _credited(camera, effect, given)
-    if place is None:
+    if place is None or _size(camera.effect[place]) != _SIGMA:
         return camera
     credited = camera.effect[place]
-    size = hypot(float(getattr(credited, _SIZE)), float(getattr(effect, _SIZE)))
-    again = type(credited)(**{**credited.model_dump(), _SIZE: size})
+    size = hypot(float(getattr(credited, _SIGMA)), float(getattr(effect, _SIGMA)))
+    again = type(credited)(**{**credited.model_dump(), _SIGMA: size})
     effects = (*camera.effect[:place], again, *camera.effect[place + 1 :])
     return camera.model_copy(update={"effect": effects})
 
@@ -73,6 +77,11 @@ def _credited(camera: Camera, effect: Effect, given: int) -> int | None:
     kinds = CANDIDATES[effect.kind].credited
     places = [i for i, own in enumerate(camera.effect) if i >= given and own.kind in kinds]
     return places[-1] if places else None
+
+
+def _size(effect: Effect) -> str:
+    """Return the name of the size of which an effect gives some back."""
+    return _SIGMA if hasattr(effect, _SIGMA) else _SHARE
 
 
 def _without(camera: Camera, place: int) -> Camera:

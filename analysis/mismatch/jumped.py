@@ -2,14 +2,14 @@
 
 from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.jumping import NAME
-from analysis.mismatch.standout import heights
+from analysis.mismatch.standout import first_maps, heights
 from analysis.mismatch.state import State
 from dsis.effects import Effect
 from dsis.effects.hot_pixels import HotPixels
 from dsis.effects.rts import Rts
 
 _CLEAR, _BELOW = 5.0, -4.0  # standard deviations of a map's noise: of all pixels, of few
-_MOST = 0.5  # of those that stand out
+_MOST, _FEWEST = 0.5, 3  # of those that stand out
 
 
 def jumped(state: State, effect: Effect) -> Denial | None:
@@ -20,21 +20,38 @@ def jumped(state: State, effect: Effect) -> Denial | None:
     time tells. Where all exposures take the same, and as many pixels jump as stand out, or more,
     there may be no hot ones. Nor where frames show that pixels jump, which nothing explains, and
     hot ones leave pixels that stand out; nor where most of those that grow with time are as far
-    below the others at none: these changed their state from one exposure to the next.
+    below the others at none: these changed their state from one exposure to the next; nor where
+    half as many stand out below as above, and none is said to jump: no current is negative.
     """
-    if not isinstance(effect, HotPixels):
-        return None
+    why = _why(state, effect) if isinstance(effect, HotPixels) else ""
+    return Denial(0.0, why) if why else None
+
+
+def _why(state: State, effect: HotPixels) -> str:
+    """Return why there may be no hot pixels; empty: there may be."""
     if {m.statistic for m in state.mismatches} >= {NAME, "outlying_pixels"}:
-        return Denial(0.0, "frames show pixels that jump, and others than hot ones stand out")
+        return "frames show pixels that jump, and others than hot ones stand out"
     if turned(state):
-        return Denial(0.0, "pixels that grow with exposure time stand out below at none: they jump")
-    if len({exposure.exposure_time_s for exposure in state.setting.layout.uniform}) > 1:
-        return None
+        return "pixels that grow with exposure time stand out below at none: they jump"
+    if _both_ways(state):
+        return "pixels stand out below the others as well as above"
+    times = {exposure.exposure_time_s for exposure in state.setting.layout.uniform}
     jumping = sum(e.pixel_fraction for e in state.camera.effect if isinstance(e, Rts))
-    if jumping < effect.pixel_fraction:
-        return None
-    why = "pixels that jump may stay in one state, and all exposures take the same time"
-    return Denial(0.0, why)
+    if len(times) > 1 or jumping < effect.pixel_fraction:
+        return ""
+    return "pixels that jump may stay in one state, and all exposures take the same time"
+
+
+def _both_ways(state: State) -> bool:
+    """Return whether pixels stand out on both sides of a map that hot ones would stand out of."""
+    if any(isinstance(effect, Rts) for effect in state.camera.effect):
+        return False
+    maps = first_maps(state, ("time", "offset"))
+    above = below = 0
+    for height in (heights(*own) for own in maps.values()):
+        above += int((height > _CLEAR).sum())
+        below += int((height < -_CLEAR).sum())
+    return below >= max(_MOST * above, _FEWEST)
 
 
 def turned(state: State) -> bool:

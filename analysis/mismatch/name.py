@@ -139,7 +139,8 @@ class Search(Choice):
                 state, before = self._polished(state), state
                 if state is not before:
                     continue
-            self._take(added[0])
+            for named in (added[0], *self._second()):
+                self._take(named)
             self.named = kept_up(self.named, added[1], self.setting.given)
             self.rough |= added[0].gain >= WEAK
             state = State.of(self.setting, added[1], self.step, draft=True, near=state)

@@ -265,7 +265,12 @@ def _lag(clues: Clues) -> Sequence[Proposal]:
 
 
 CANDIDATES = (
-    Candidate("crosstalk", (*_NEAR, "channel_ratio"), _crosstalk),
+    Candidate(
+        "crosstalk",
+        (*_NEAR, "channel_ratio"),
+        _crosstalk,
+        credited=frozenset({"spatial_filtering"}),
+    ),
     Candidate(
         "brighter_fatter", (*_NEAR, "level"), _brighter_fatter, hints=("channel_ratio",)
     ),
@@ -274,6 +279,7 @@ CANDIDATES = (
         ("correlation_0_1", "correlation_0_2", "correlation_1_0", "correlation_2_0",
          "line_correlation"),
         _filtering,
+        credited=frozenset({"crosstalk"}),
     ),
     Candidate(
         "readout_memory",

@@ -19,7 +19,7 @@ from analysis.mismatch.judge import Judge
 from analysis.mismatch.locate import FAMILY
 from analysis.mismatch.model import side_by_side
 from analysis.mismatch.name import Search
-from analysis.mismatch.named import Named, unclear, vague
+from analysis.mismatch.named import APART, Named, unclear, vague
 from analysis.mismatch.rank import SURE_GAIN
 from analysis.mismatch.relit import relit
 from analysis.mismatch.state import State
@@ -29,6 +29,7 @@ from dsis.camera import Camera
 Array = NDArray[np.float64]
 IDLE = "all that called for it is left, and nothing that differed is explained by it alone or best"
 UNCALLED = "it explains nothing that differs in all frames, and frames leave it open"
+_QUARTER = 0.25
 _LITTLE = 0.3  # of what a number differs by, that an effect changes
 _DOUBTFUL = 30.0  # gain of log-likelihood below which locked frames may not confirm an effect
 
@@ -131,6 +132,7 @@ def undenied_by_all(
         denied = denied_by_rest(search, everything, whole)
         denied = denied or idle(search, whole, everything)
         denied = denied or uncalled(search, whole, everything, gains, trial)
+        denied = denied or unsized(search, everything)
         if denied is None:
             return final, gains, everything
         final = search.fitted_anew(search.further(search.drop(final, *denied)))
@@ -189,14 +191,43 @@ def small(search: Search, state: State, named: Named, told: Gained | None) -> st
 
     What draws at random is known by what frames gain, whatever its size, unless a statistic that
     calls for it is left: then something else is there, by which frames would gain as well. Where
-    locked frames leave it open, one of its sizes must exceed its error.
+    locked frames leave it open, one of its sizes must exceed its error; where much is left beside
+    what it changes, an interval of 95 % of one must reach no zero.
     """
+    if why := _unsized(search, state, named):
+        return why
     if named.effect is not None and named.effect.draws:
         if _calls_left(search, state, named):
             return unclear(named, at_random=True)
         plain = named.kind in LINES or named.measured or _borne_out(told)
         return "" if plain else vague(named)
     return "" if _borne_out(told) else unclear(named)
+
+
+def unsized(search: Search, everything: State) -> tuple[Named, str] | None:
+    """Return an effect of no clear size beside which all frames leave much open; None: none is."""
+    asked = ((one, _unsized(search, everything, one)) for one in search.named)
+    return next((pair for pair in asked if pair[1]), None)
+
+
+def _unsized(search: Search, state: State, named: Named) -> str:
+    """Return why an effect has no clear size, where much is left; empty: it has, or little is."""
+    if named.kind in LINES or named.measured or not (why := vague(named, APART)):
+        return ""
+    much = _much_left(search, state, named)
+    return f"{why}, and much is left unexplained beside it" if much else ""
+
+
+def _much_left(search: Search, state: State, named: Named) -> bool:
+    """Return whether what is left is off by a quarter of what an effect changes, or more."""
+    left = max((abs(m.z) for m in state.mismatches), default=0.0)
+    if not left or named.proposal is None:
+        return False
+    null = state.null
+    change = null.mean - state.predictor().mean(search.without(state, named))
+    change = np.where(null.known & np.isfinite(change), change, 0.0) / null.sd
+    both = np.concatenate([change, null.contrasts.matrix @ change / null.contrast_sd])
+    return left >= _QUARTER * float(np.abs(both).max(initial=0.0))
 
 
 def _borne_out(told: Gained | None) -> bool:

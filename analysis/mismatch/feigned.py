@@ -16,8 +16,9 @@ from analysis.mismatch.displaced import displaced
 from analysis.mismatch.edged import STATISTIC, edged, single
 from analysis.mismatch.feignedtails import clamped, coded, lopsided, mixed, placed, spiked, timed
 from analysis.mismatch.fewfixed import of_few_that_stand_out
+from analysis.mismatch.fields import interpolated
 from analysis.mismatch.flatcolumns import flat_columns
-from analysis.mismatch.grainedlines import grained
+from analysis.mismatch.grainedlines import grained, patterned
 from analysis.mismatch.grown import grown, warmed
 from analysis.mismatch.halves import halved
 from analysis.mismatch.inpatches import in_patches
@@ -97,6 +98,8 @@ def of_another(state: State, effect: Effect, without: Array) -> Denial | None:
         or clamped(state, kind, without)
         or mixed(state, kind)
         or grained(state, kind, without)
+        or patterned(state, kind, without)
+        or interpolated(state, kind)
         or timed(state, kind, without)
         or persisting(state, kind, without)
         or carried(state, effect)

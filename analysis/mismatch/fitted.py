@@ -174,9 +174,14 @@ class Fitted:
         return bare.model_copy(update={"effect": (*self.camera.effect, *some)})
 
     def without(self, state: State, named: Named) -> Camera:
-        """Return a state's camera without one of the effects named."""
+        """Return a state's camera without one of the effects named.
+
+        Without a second read-out path it has none of what needs one, either.
+        """
         if named.proposal is None:
-            return state.camera.model_copy(update={"noise": self.base.camera.noise})
+            camera = state.camera.model_copy(update={"noise": self.base.camera.noise})
+            able = [own for own in camera.effect if not own.unfit_for(camera.read_out)]
+            return camera.model_copy(update={"effect": tuple(able)})
         left = camera_without(state.camera, [named.proposal.effect], self.camera)
         return given_back(left, named.proposal.effect, self.setting.given)
 

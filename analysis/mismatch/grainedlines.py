@@ -18,7 +18,36 @@ _LINES = {
     "row_noise": _ROWS,
 }
 _NEXT = ("correlation_0_1", "correlation_1_0")
+_FIXED = {
+    "column_fpn": "fixed_column_variance",
+    "column_prnu": "fixed_column_variance",
+    "row_fpn": "fixed_row_variance",
+    "row_prnu": "fixed_row_variance",
+}
+_FIXED_NEXT = ("fixed_correlation_0_1", "fixed_correlation_1_0")
 _MOST = 0.5  # of what lines would explain, that neighbours may feign
+
+
+def patterned(state: State, kind: str, without: Array) -> Denial | None:
+    """Return how fixed lines are denied by a pattern of two dimensions; None: they are not.
+
+    Offsets or gains of lines make pixels of a line alike, and no others. Where in mean frames
+    neighbours along rows and along columns are, each more surely than lines differ, and it is left
+    unexplained, lines may differ by what else there is.
+    """
+    if kind not in _FIXED:
+        return None
+    left = left_open(state, _FIXED_NEXT)
+    sure = [
+        max((rest / sd for (_, of), (rest, sd) in left.items() if of == name), default=0.0)
+        for name in _FIXED_NEXT
+    ]
+    own = np.array([key.statistic == _FIXED[kind] for key in state.vector.keys])
+    own &= state.null.known & np.isfinite(without)
+    claimed = float(((state.null.mean - without)[own] / state.null.sd[own]).max(initial=0.0))
+    if min(sure) <= max(FAR_OFF, claimed):
+        return None
+    return Denial(0.0, "neighbours along rows and columns have a pattern in common, not lines")
 
 
 def grained(state: State, kind: str, without: Array) -> Denial | None:

@@ -14,6 +14,7 @@ from analysis.mismatch.edged import outlined
 from analysis.mismatch.feigned import of_another
 from analysis.mismatch.instance import LINES
 from analysis.mismatch.named import Named
+from analysis.mismatch.nopath import no_path
 from analysis.mismatch.otherlags import alike
 from analysis.mismatch.predict import Predictor
 from analysis.mismatch.rank import LEAST_GAIN
@@ -142,18 +143,23 @@ class Judge:
             # What correlates pixels besides may hide it in numbers, not in frames.
             return _verdict(side_by_side(self.state, named.kind))
         if named.proposal is None:
-            return _verdict(displaced(self.state, named.kind, self.state.null.mean))
+            return self._of_path(predictor, named)
         without = self.without(named)
         denial = contradicted(self.state, predictor, named.kind, without)
         if denial is None:
             denial = of_another(self.state, named.proposal.effect, predictor.mean(without))
         return _verdict(denial)
 
+    def _of_path(self, predictor: Predictor, named: Named) -> Verdict | None:
+        """Return how a second read-out path is denied."""
+        denial = displaced(self.state, named.kind, self.state.null.mean)
+        return _verdict(denial or no_path(self.state, predictor.mean(self.without(named))))
+
     def _left_open(
         self, first: frozenset[str], predictor: Predictor, named: Named
     ) -> Verdict | None:
         if named.proposal is None:
-            return _verdict(displaced(self.state, named.kind, self.state.null.mean))
+            return self._of_path(predictor, named)
         mean = predictor.mean(self.without(named))
         denial = of_another(self.state, named.proposal.effect, mean)
         denial = denial or mirrored(self.state, named.proposal.effect, mean)

@@ -11,7 +11,7 @@ from dsis.effects import Effect
 from dsis.effects.shading import Shading
 
 _OF_FRAMES = LINES | {"rts"}
-_APART = 1.96  # standard errors of a size whose interval of 95 % reaches none
+APART = 1.96  # standard errors of a size whose interval of 95 % reaches none
 _CLEAR = 3.0  # standard errors of an effect's size that is no chance
 SHAPES = frozenset(
     {
@@ -111,7 +111,7 @@ def unclear(named: Named, *, at_random: bool = False) -> str:
         return ""
     if named.plain is not None and not unclear(_plain(named, *named.plain), at_random=at_random):
         return ""
-    clear = _APART if effect.draws else _CLEAR
+    clear = APART if effect.draws else _CLEAR
     free = named.proposal.free
     sizes = {
         name: (float(getattr(effect, name)), named.errors.get(name, inf))
@@ -146,7 +146,7 @@ def _errors_of(value: float, error: float, *, signed: bool) -> float:
         return inf if value else 0.0
     if signed:
         return abs(value) / error
-    return _APART / log1p(_APART * error / abs(value)) if value else 0.0
+    return APART / log1p(APART * error / abs(value)) if value else 0.0
 
 
 def _sure(named: Named, effect: Effect, shape: str) -> bool:
@@ -175,8 +175,8 @@ def camera_without(camera: Camera, effects: Sequence[Effect], given: Camera) -> 
     return camera.model_copy(update={"effect": tuple(left)})
 
 
-def vague(named: Named) -> str:
-    """Return why an effect that draws at random has no size; empty: one exceeds its error."""
+def vague(named: Named, errors: float = 1.0) -> str:
+    """Return why an effect that draws at random has no size; empty: one exceeds so many errors."""
     effect = named.effect
     if named.proposal is None or effect is None:
         return ""
@@ -185,9 +185,10 @@ def vague(named: Named) -> str:
         for name in named.proposal.free
         if name not in SHAPES
     }
-    if not sizes or any(not isfinite(e) or abs(value) >= e for value, e in sizes.values()):
+    if not sizes or any(not isfinite(e) or abs(value) >= errors * e for value, e in sizes.values()):
         return ""
-    return f"no size of it exceeds its standard error ({_said(sizes)})"
+    times = "" if errors == 1 else f"{errors:g} times "
+    return f"no size of it exceeds {times}its standard error ({_said(sizes)})"
 
 
 def _said(sizes: Mapping[str, tuple[float, float]]) -> str:

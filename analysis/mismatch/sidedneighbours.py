@@ -13,7 +13,8 @@ from analysis.mismatch.layout import Layout
 from analysis.mismatch.projections import FramesOf
 
 Array = NDArray[np.float64]
-SHARED = frozenset({"crosstalk", "spatial_filtering"})  # alike all over the sensor
+SHARED = frozenset({"brighter_fatter", "crosstalk", "readout_memory", "spatial_filtering"})
+"""What all neighbours share alike, wherever they are on the sensor."""
 _PARTS = 3
 _LEAST_FRAMES, _MOST_FRAMES = 3, 16
 _MOST_SAMPLES = 1 << 24  # of one exposure: of large frames fewer are asked

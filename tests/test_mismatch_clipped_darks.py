@@ -55,6 +55,22 @@ def test_a_dark_of_which_some_is_cut_off_tells_the_read_noise(given: float, seed
     assert abs(piece.slope - GAIN) < 4 * piece.slope_error < 0.2
 
 
+@pytest.mark.parametrize("scatter", [1.0, 2.0])
+def test_offsets_that_scatter_beside_a_cut_are_no_read_noise(scatter: float) -> None:
+    """What is cut off of each pixel is another's: the given number is kept, not a wrong one."""
+    recording = _recorded(4.0, 6.0, 2)
+    assert recording.stacks is not None
+    rng = np.random.default_rng(3)
+    offsets = rng.normal(0, scatter, (recording.rows, recording.columns))
+    for name in ("dark-0", "dark-1"):
+        frames = 6 + offsets + rng.normal(0, 4.0, recording.stacks[name].shape)
+        recording.stacks[name] = np.clip(np.rint(frames), 0, 4095).astype(np.uint16)
+    found = _fitted(recording, _model(16.0, 6.0))
+    assert not found.cut
+    (piece,) = found.fit.pieces
+    assert found.held == 16.0 or abs(piece.intercept - 16.0) < 4 * piece.intercept_error
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_where_most_is_cut_off_the_given_read_noise_is_kept(seed: int) -> None:
     """Bright flats know it to more than itself: it is held in every simulation, too."""

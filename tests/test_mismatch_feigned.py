@@ -169,7 +169,10 @@ def test_hot_pixels_that_have_no_word_do_not_jump(
     keys = (Key("outlying_pixels", scope, "", "R"),)
     state: Any = SimpleNamespace(
         vector=None,
-        setting=SimpleNamespace(seen=SimpleNamespace(images={})),
+        setting=SimpleNamespace(
+            seen=SimpleNamespace(images={}),
+            layout=SimpleNamespace(uniform=[SimpleNamespace(exposure_time_s=0.01)]),
+        ),
         null=SimpleNamespace(keys=keys, departures=lambda _: np.array([z])),
     )
     assert (heated(state, kind) is not None) == denied

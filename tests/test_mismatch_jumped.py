@@ -56,9 +56,12 @@ def test_pixels_that_jump_and_have_no_word_are_no_hot_ones(
 
 
 @pytest.mark.parametrize("seed", range(4))
-@pytest.mark.parametrize(("change", "denied"), [(-1.0, True), (0.0, False), (1.0, False)])
+@pytest.mark.parametrize(
+    ("change", "short_s", "denied"),
+    [(-1.0, 0.01, True), (0.0, 0.01, False), (1.0, 0.01, False), (-1.0, 0.25, False)],
+)
 def test_pixels_that_are_dark_before_they_are_bright_have_jumped(
-    change: float, denied: bool, seed: int
+    change: float, short_s: float, denied: bool, seed: int
 ) -> None:
     """Two darks: what a pixel has at no time is a hot one's offset, or the other state's."""
     rng = np.random.default_rng(seed)
@@ -66,11 +69,33 @@ def test_pixels_that_are_dark_before_they_are_bright_have_jumped(
     few = rng.choice(short.size, 3, replace=False)
     short.flat[few] += 12 * change
     long.flat[few] += 24.0 if change >= 0 else 12.0
-    state = _state((0.01, 0.5), 0.0)
+    state = _state((short_s, 0.5), 0.0)
     images = {("MONO", "offset"): (short, 1.0), ("MONO", "time"): (long - short, 2**0.5)}
     state.setting.seen.images.update(images)
     assert (jumped(state, HOT) is not None) == denied
     assert turned(state) == denied
+
+
+@pytest.mark.parametrize("ratio", [0.02, 0.1, 0.2, 0.5])
+def test_the_noise_of_a_hot_current_is_no_jump(ratio: float) -> None:
+    """Currents of 3000 electrons: what their shot noise extrapolates to is far below zero."""
+    denied = 0
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        dark = np.zeros((60, 80))
+        dark.flat[rng.choice(dark.size, 4, replace=False)] = rng.exponential(3000, 4)
+        short, long = (
+            (rng.poisson(dark * t, (8, 60, 80)) + rng.normal(0, 3, (8, 60, 80))).mean(0)
+            for t in (ratio, 1.0)
+        )
+        slope = (long - short) / (1 - ratio)
+        noise = 3 / 8**0.5 / (1 - ratio)
+        state = _state((ratio, 1.0), 0.0)
+        images = {("MONO", "offset"): (short - slope * ratio, noise * (1 + ratio**2) ** 0.5)}
+        images["MONO", "time"] = (slope, noise * 2**0.5)
+        state.setting.seen.images.update(images)
+        denied += jumped(state, HOT) is not None
+    assert denied == 0
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -87,3 +112,14 @@ def test_no_current_is_negative(below: int, denied: bool, seed: int) -> None:
     assert (jumped(state, HOT) is not None) == denied
     state.camera.effect = (HOT, Rts(pixel_fraction=1e-5, amplitude_dn=15.0))
     assert jumped(state, HOT) is None  # which says what is below
+
+
+def test_a_cold_column_is_no_pixel_that_stands_out() -> None:
+    rng = np.random.default_rng(1)
+    image = rng.normal(0, 1, (60, 80))
+    image[:, 30] -= 8.0
+    image.flat[rng.choice(image.size, 8, replace=False)] += 25.0
+    state = _state((0.05,), 0.0)
+    state.setting.seen.images["MONO", "offset"] = (image, 1.0)
+    state.camera.effect = (HOT,)
+    assert jumped(state, HOT) is None

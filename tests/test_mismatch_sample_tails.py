@@ -16,10 +16,12 @@ from dsis.effects.impulse import Impulse
 Array = NDArray[np.float64]
 SHAPE = (8, 90, 110)
 SPREAD = 4.0  # codes
+READ = SPREAD**2
 
 
 def _layout(white: float = 4095.0, large: bool = False) -> Any:
     exposures = [SimpleNamespace(name="dark", kind="dark", numbers=tuple(range(SHAPE[0])))]
+    exposures[0].exposure_time_s = 0.01
     sites = {"MONO": (0, 0)}
     return SimpleNamespace(uniform=exposures, sites=sites, white_dn=white, large=large)
 
@@ -50,7 +52,7 @@ def test_heavy_tails_have_the_samples_that_student_s_law_has(df: float) -> None:
     expected = 2 * (t.sf(3.5 * scale, df) - t.sf(7 * scale, df))
     assert ring.samples == np.prod(SHAPE)
     assert ring.seen / ring.samples == pytest.approx(expected, rel=0.3)
-    assert ring.denial(_student(df)) is None
+    assert ring.denial(_student(df), READ) is None
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -59,11 +61,11 @@ def test_bits_that_flip_are_no_tails(seed: int) -> None:
     noise = rng.standard_normal(SHAPE)
     noise[rng.random(SHAPE) < 1e-4] += 32.0  # a bit of 128 codes
     ring = _ring(noise)
-    denial = ring.denial(_student(3.4))
+    denial = ring.denial(_student(3.4), READ)
     assert denial is not None
     assert "rare faults" in denial.why
-    assert ring.denial(_student(60.0)) is None  # which foretells hardly any
-    assert ring.denial(Impulse(per_megapixel_frame=100.0, mean_dn=128.0)) is None
+    assert ring.denial(_student(60.0), READ) is None  # which foretells hardly any
+    assert ring.denial(Impulse(per_megapixel_frame=100.0, mean_dn=128.0), READ) is None
 
 
 def test_a_mixture_of_two_normal_laws_is_believed() -> None:
@@ -71,7 +73,7 @@ def test_a_mixture_of_two_normal_laws_is_believed() -> None:
     rng = np.random.default_rng(9)
     wide = rng.random(SHAPE) < 0.01
     ring = _ring(rng.standard_normal(SHAPE) * np.where(wide, 3.0, 1.0))
-    assert ring.denial(_student(6.0)) is None
+    assert ring.denial(_student(6.0), READ) is None
 
 
 def test_nothing_is_said_of_large_clipped_or_coarse_recordings() -> None:
@@ -79,4 +81,16 @@ def test_nothing_is_said_of_large_clipped_or_coarse_recordings() -> None:
     assert _ring(noise, large=True) == Ring()
     assert _ring(noise, white=205.0) == Ring()
     assert _ring(noise * 0.2) == Ring()
-    assert Ring().denial(_student(3.0)) is None
+    assert Ring().denial(_student(3.0), READ) is None
+
+
+@pytest.mark.parametrize("share", [0.1, 0.3, 0.5])
+@pytest.mark.parametrize("df", [2.5, 4.0, 6.0])
+def test_tails_of_noise_that_has_others_beside_it_are_not_denied(df: float, share: float) -> None:
+    """Rows that move, or photons of a dark current, hide what is moderately far."""
+    rng = np.random.default_rng(7)
+    tails = rng.standard_t(df, SHAPE) * ((df - 2) / df * share) ** 0.5
+    ring = _ring(tails + rng.normal(0, (1 - share) ** 0.5, SHAPE))
+    assert ring.denial(_student(df), share * READ) is None
+    rows = _ring(rng.standard_normal(SHAPE) + rng.normal(0, 3.0, (SHAPE[0], SHAPE[1], 1)))
+    assert rows.variance_dn2 == pytest.approx(READ, rel=0.05)  # rows are taken off

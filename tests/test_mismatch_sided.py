@@ -74,3 +74,17 @@ def test_white_noise_and_lines_that_move_say_nothing(seed: int) -> None:
     assert _found(stacks).denial("crosstalk") is None
     clipped = {name: (own - own.mean()).clip(0) for name, own in stacks.items()}
     assert _found(clipped) == Sided()
+
+
+@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("tilt", [0.6, 0.9])
+def test_crosstalk_under_uneven_light_is_not_denied(tilt: float, seed: int) -> None:
+    """Where there is more light there is more of its noise, of which the same share crosses."""
+    rng = np.random.default_rng(seed)
+    level = 400.0 * np.linspace(1 - tilt, 1 + tilt, ROWS)[:, np.newaxis]
+    light = rng.normal(level, level**0.5, (FRAMES, ROWS, COLUMNS))
+    mixed = light * (1 - 0.03)
+    mixed[:, :-1] += 0.03 * light[:, 1:]
+    stacks = _stacks(np.full(ROWS, 0.03), seed)
+    stacks["flat"] = np.rint(BLACK + mixed + rng.normal(0, 3.0, light.shape))
+    assert _found(stacks).denial("crosstalk") is None

@@ -107,7 +107,7 @@ def fit_base(
     left_out: frozenset[str] = frozenset(),
     slopes: Sequence[float] = (),
     intercept: float | None = None,
-    local: Mapping[Place, Level] | None = None,
+    cut: frozenset[str] = frozenset(),
 ) -> BaseFit:
     """Return the numbers of the base model.
 
@@ -127,27 +127,26 @@ def fit_base(
         Of each segment, for segments whose levels cannot tell it.
     intercept
         Of the first segment, where it is not fitted.
-    local
-        Of ranges of signal in scenes, which tell the slope where no flat does.
+    cut
+        Darks that are fitted though the lowest code cuts some of their noise off.
     """
     added_in_all = offsets.variance_dn2
     levels, offsets = offsets.fitted(levels)
     black, black_error = _black(layout, levels, offsets, black_dn)
     signal = _signals(layout, levels, offsets, black)
     light = _light(layout, levels, signal, left_out)
-    used = _used(layout, levels, offsets, left_out)
-    fitted, at = dict(levels), dict(signal)
-    if local is not None and not _flats_among(layout):
-        whole = set(layout.channels)
-        ranges = {p: own for p, own in local.items() if p[1] not in whole if own.variance_dn2 > 0}
-        used, fitted = [*used, *ranges], {**fitted, **ranges}
-        at |= {place: layout.signal_dn[place] for place in ranges}
-    x = np.array([at[place] for place in used])
+    used = [
+        place
+        for place, own in levels.items()
+        if place[0] not in left_out and not _hidden(own, offsets, place)
+        if _sound(own) or (place[0] in cut and _some_cut(own))
+    ]
+    x = np.array([signal[place] for place in used])
     v = np.array(
-        [fitted[place].variance_dn2 - offsets.variance_dn2.get(place, 1 / 12) for place in used]
+        [levels[place].variance_dn2 - offsets.variance_dn2.get(place, 1 / 12) for place in used]
     )
     relative = np.array(
-        [sqrt(2 / fitted[place].dof) * offsets.stretch.get(place, 1.0) for place in used]
+        [sqrt(2 / levels[place].dof) * offsets.stretch.get(place, 1.0) for place in used]
     )
     added = np.array([offsets.variance_dn2.get(place, 1 / 12) for place in used])
     starts = [-np.inf, *switches]
@@ -167,35 +166,10 @@ def fit_base(
     return BaseFit(black, black_error, light, tuple(pieces), signal, expected)
 
 
-def _flats_among(layout: Layout) -> bool:
-    return any(e.kind == "flat" for e in layout.uniform)
-
-
-def _used(
-    layout: Layout, levels: Mapping[Place, Level], offsets: Offsets, left_out: frozenset[str]
-) -> list[Place]:
-    """Return the places whose variances are fitted.
-
-    Where every dark is cut off at the lowest code, so are those in which that is a few samples:
-    read noise is normal, and what a cut leaves of it is known, see `rounding.unrounded`.
-    """
-    darks = {e.name for e in layout.uniform if e.kind == "dark"}
-    told = [
-        place
-        for place in levels
-        if place[0] not in left_out and not _hidden(levels[place], offsets, place)
-    ]
-    sound = [place for place in told if _sound(levels[place])]
-    if any(place[0] in darks for place in sound):
-        return sound
-    cut = {
-        place
-        for place in told
-        if place[0] in darks
-        and levels[place].clipped_low <= _CUT
-        and levels[place].variance_dn2 > 0
-    }
-    return [place for place in told if place in cut or _sound(levels[place])]
+def _some_cut(level: Level) -> bool:
+    """Return whether the lowest code cuts off few samples, of what is known: see `unrounded`."""
+    clipped = level.clipped_low > _CUT or level.clipped_high > CLIPPED_SHARE
+    return not clipped and level.variance_dn2 > 0
 
 
 def _hidden(level: Level, offsets: Offsets, place: Place) -> bool:
@@ -331,7 +305,7 @@ def _piece(
 ) -> Piece:
     """Return the line through the variances of one segment, by reweighting.
 
-    `slope` where these do not tell it; an intercept that is `held` is not fitted.
+    `slope` where these do not tell it. An intercept that is `held` is not fitted to a slope.
     """
     if x.size == 0:
         return Piece(low, slope or 0.0, 0.0, np.inf, np.inf)

@@ -4,13 +4,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from analysis.mismatch.candidates import Proposal
+from analysis.mismatch.fitted import MAKE_ALIKE
 from analysis.mismatch.named import SHAPES
 from analysis.mismatch.polish import polish
 from analysis.mismatch.rank import SURE_GAIN, Ranked
 from analysis.mismatch.state import State
 from dsis.effects import Effect
 
-_SHARE = frozenset({"brighter_fatter", "crosstalk", "readout_memory", "spatial_filtering"})
 _CLEAR = 3.0  # standard errors
 
 
@@ -23,8 +23,8 @@ def both_needed(state: State, fitted: Sequence[Ranked]) -> tuple[Ranked, Ranked]
     do not gain over each what an effect that is taken in gains, or one of them is not clear.
     """
     best, *others = fitted
-    rivals = (one for one in others if one.kind in _SHARE and one.kind != best.kind)
-    other = next(rivals, None) if best.kind in _SHARE else None
+    rivals = (one for one in others if one.kind in MAKE_ALIKE and one.kind != best.kind)
+    other = next(rivals, None) if best.kind in MAKE_ALIKE else None
     if other is None or max(len(own.polished.effects) for own in (best, other)) > 1:
         return None
     starts = [replace(own.proposal, effect=own.polished.effects[0]) for own in (best, other)]
@@ -32,11 +32,12 @@ def both_needed(state: State, fitted: Sequence[Ranked]) -> tuple[Ranked, Ranked]
     together = polish(predictor, state.camera, starts)
     if together is None or not all(map(_clear, starts, together.effects, together.errors)):
         return None
+    gain = predictor.gain(together.mean)
     alone = max(predictor.gain(own.mean) for own in (best, other))
-    if predictor.gain(together.mean) - alone < SURE_GAIN:
+    if gain - alone - other.proposal.price < SURE_GAIN:
         return None
     first, second = (
-        replace(own, polished=replace(together, effects=(effect,), errors=(errors,)))
+        replace(own, gain=gain, polished=replace(together, effects=(effect,), errors=(errors,)))
         for own, effect, errors in zip(
             (best, other), together.effects, together.errors, strict=True
         )
@@ -46,8 +47,7 @@ def both_needed(state: State, fitted: Sequence[Ranked]) -> tuple[Ranked, Ranked]
 
 def _clear(start: Proposal, effect: Effect, errors: Mapping[str, float]) -> bool:
     """Return whether the sizes of an effect are clearly not none."""
-    return all(
-        abs(float(getattr(effect, name))) > _CLEAR * errors[name]
-        for name in start.free
-        if name not in SHAPES
+    sizes = [name for name in start.free if name not in SHAPES]
+    return bool(sizes) and all(
+        abs(float(getattr(effect, name))) > _CLEAR * errors[name] for name in sizes
     )

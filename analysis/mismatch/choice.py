@@ -100,6 +100,7 @@ class Choice(Fitted):
         bent = [one.gain for one in fits if "pixel_variance" in CANDIDATES[one.kind].calls]
         tied = max(bent, default=0.0)
         if path is not None and path.gain > max(self.least, most, tied):
+            self.second = None
             rivals = behind(path.kind, path.gain, fitted)
             error = {"switch_dn": path.error_dn}
             found = Named(path.kind, None, error, path.gain, rivals, path.switch_dn)
@@ -120,7 +121,7 @@ class Choice(Fitted):
             errors = dict(proposal.errors)
             camera = with_effects(state.camera, [proposal.effect])
         if camera is not None and self.second is not None:
-            camera = with_effects(camera, self.second.polished.effects)
+            camera = with_effects(camera, self.second.polished.effects) or camera
         named = Named(best.kind, proposal, errors, best.gain, rivals)
         return None if camera is None else (named, camera)
 
@@ -196,7 +197,8 @@ class Choice(Fitted):
                 continue  # all that was fitted of a kind is denied: others were too far behind it
             if not fitted or fitted[0].gain < LEAST_GAIN:
                 return fitted
-            if (both := both_needed(state, fitted)) is not None:
+            both = both_needed(state, fitted)
+            if both is not None and self._undenied(state, both[1]):
                 self.second = both[1]
                 return [both[0], *(one for one in fitted[1:] if one.kind != both[1].kind)]
             tied = (one for one in fitted[1:] if ties(state, fitted[0], one))
@@ -237,6 +239,15 @@ class Choice(Fitted):
                 self.apart += [best.mean] if denial.why.startswith(AS_WELL) else []
                 break
         return fitted
+
+    def _undenied(self, state: State, second: Ranked) -> bool:
+        """Return whether nothing denies an effect that is taken in with the best."""
+        effect = second.polished.effects[0]
+        if not CANDIDATES[second.kind].sane(state.setting.layout, effect):
+            return False
+        if any(own.like(effect) for own in self._sizes()):
+            return False  # the user's own is sized again
+        return unlike_frames(state, self.lines, second, ()) is None
 
     def _possible(self, effect: Effect) -> bool:
         """Return whether an effect may be tried: not again, and as whole frames show its line."""

@@ -219,15 +219,17 @@ def _unsized(search: Search, state: State, named: Named) -> str:
 
 
 def _much_left(search: Search, state: State, named: Named) -> bool:
-    """Return whether what is left is off by a quarter of what an effect changes, or more."""
+    """Return whether what is left is off by a quarter of what an effect explains, or more."""
     left = max((abs(m.z) for m in state.mismatches), default=0.0)
     if not left or named.proposal is None:
         return False
-    null = state.null
-    change = null.mean - state.predictor().mean(search.without(state, named))
-    change = np.where(null.known & np.isfinite(change), change, 0.0) / null.sd
-    both = np.concatenate([change, null.contrasts.matrix @ change / null.contrast_sd])
-    return left >= _QUARTER * float(np.abs(both).max(initial=0.0))
+    null, without = state.null, state.predictor().mean(search.without(state, named))
+    known = null.known & np.isfinite(without)
+    change, seen = (
+        np.where(known, own - without, 0.0) / null.sd for own in (null.mean, state.vector.values)
+    )
+    explains = np.minimum(np.abs(change), np.abs(seen))[change * seen > 0]
+    return left >= _QUARTER * float(explains.max(initial=0.0))
 
 
 def _borne_out(told: Gained | None) -> bool:

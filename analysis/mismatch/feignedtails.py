@@ -32,7 +32,6 @@ _IN_TIME = "frame_correlation"
 _ADJACENT = ("correlation_0_1", "correlation_1_0")
 _TIMES = 2  # of darks, that tell what needs time
 _LIKELY = 2.0  # standard deviations that chance may well have
-_LEANING = 0.3  # skewness of noise that is cut off a standard deviation below its mean: 0.55
 _FEW_ELECTRONS = 1.0  # skewness of shot noise of one electron: read noise beside it lessens it
 
 
@@ -102,8 +101,7 @@ def lopsided(state: State, kind: str) -> Denial | None:
     """Return how tails or spikes are denied by noise that leans to one side; None: they are not.
 
     Heavy-tailed noise is as likely above as below. Chance leans it far, which the null with its
-    tails knows; what leans beyond that, and more than shot noise can, are spikes of one sign. Darks
-    have next to none of that, and what leans in them is noise that is cut off or folded, too.
+    tails knows; what leans beyond that, and more than shot noise can, are spikes of one sign.
     Spikes are charge, which only adds: beside no tails, and no uneven codes, darks whose noise
     leans down, as white noise scatters, have none.
     """
@@ -112,12 +110,11 @@ def lopsided(state: State, kind: str) -> Denial | None:
     if kind != "heavy_tailed_read_noise":
         return None
     left = state.null.departures(state.vector)
-    darks = {e.name for e in state.setting.layout.uniform if e.kind == "dark"}
     leans = any(
         key.statistic == "skewness"
         and key.scope == "exposure"
         and abs(z) > FAR_OFF
-        and abs(value) > (_LEANING if key.exposure in darks else _FEW_ELECTRONS)
+        and abs(value) > _FEW_ELECTRONS
         for key, z, value in zip(state.vector.keys, left, state.vector.values, strict=False)
     )
     return (

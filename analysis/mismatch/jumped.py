@@ -1,5 +1,8 @@
 """Pixels that stand out in the dark, and may be some that jump but stay where they are."""
 
+import numpy as np
+
+from analysis.mismatch.bank.parts import parts
 from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.jumping import NAME
 from analysis.mismatch.standout import first_maps, heights
@@ -10,6 +13,7 @@ from dsis.effects.rts import Rts
 
 _CLEAR, _BELOW = 5.0, -4.0  # standard deviations of a map's noise: of all pixels, of few
 _MOST, _FEWEST = 0.5, 3  # of those that stand out
+_SHORT, _SHARE = 0.2, 0.3  # of the longest time; of what a pixel grows by in that
 
 
 def jumped(state: State, effect: Effect) -> Denial | None:
@@ -46,21 +50,29 @@ def _both_ways(state: State) -> bool:
     """Return whether pixels stand out on both sides of a map that hot ones would stand out of."""
     if any(isinstance(effect, Rts) for effect in state.camera.effect):
         return False
-    maps = first_maps(state, ("time", "offset"))
     above = below = 0
-    for height in (heights(*own) for own in maps.values()):
+    for own in first_maps(state, ("time", "offset")).values():
+        height = heights(parts(*own).pixels, 1.0)  # beyond lines and smooth surfaces
         above += int((height > _CLEAR).sum())
         below += int((height < -_CLEAR).sum())
     return below >= max(_MOST * above, _FEWEST)
 
 
 def turned(state: State) -> bool:
-    """Return whether most of the pixels that stand out with time do so below without any."""
+    """Return whether most of the pixels that stand out with time do so below without any.
+
+    By a share of what they grow by that no noise of their current has; a sample far out in a long
+    exposure has less of it where the shortest one is far shorter, else nothing is said.
+    """
+    times = [exposure.exposure_time_s for exposure in state.setting.layout.uniform]
     images = state.setting.seen.images
     out = below = 0
     for channel in sorted({own for own, name in images if name == "time"}):
-        if (channel, "offset") in images:
-            grow = heights(*images[channel, "time"]) > _CLEAR
-            out += int(grow.sum())
-            below += int((grow & (heights(*images[channel, "offset"]) < _BELOW)).sum())
+        if (channel, "offset") in images and min(times) <= _SHORT * max(times):
+            grows, offset = images[channel, "time"], images[channel, "offset"]
+            grow, first = (own[0] - np.median(own[0]) for own in (grows, offset))
+            far = heights(*grows) > _CLEAR
+            out += int(far.sum())
+            under = (heights(*offset) < _BELOW) & (first < -_SHARE * grow)
+            below += int((far & under).sum())
     return below > _MOST * out

@@ -1,4 +1,4 @@
-"""Bends of the response that nothing but variances of scenes shows."""
+"""Bends of the response that a slope of the camera file may feign where no flat tells it."""
 
 from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.state import State
@@ -7,13 +7,17 @@ from dsis.effects.nonlinearity import Nonlinearity
 
 
 def untold_slope(state: State, effect: Effect) -> Denial | None:
-    """Return how a bend is denied where no flat shows it; None: it is not.
+    """Return how a bend is denied by a slope that nothing tells; None: it is not.
 
-    Levels of flats bend with their light. Of scenes alone variances are known, to which the slope
-    is fitted, and what they leave may have as many reasons as a scene has.
+    Base numbers are fitted to darks and flats. Of scenes alone the slope of variance against signal
+    stays that of the camera file, and one that is off changes all their variances, as a bend does
+    most of them.
     """
     if not isinstance(effect, Nonlinearity):
         return None
     if any(exposure.kind == "flat" for exposure in state.setting.layout.uniform):
         return None
-    return Denial(0.0, "no flat shows a bend, and variances of scenes alone may have other reasons")
+    why = (
+        "no flat tells the slope of the camera file, and one that is off changes variances as well"
+    )
+    return Denial(0.0, why)

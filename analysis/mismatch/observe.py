@@ -323,20 +323,16 @@ def _scenes(
             own = parts[name]
             found[exposure.name, name] = local_scalars(channel, frames, own)
             local[exposure.name, name] = _level(channel, frames)
-            spread = scene.unsteadied(channel.variance_map, name)
-            for label, level in _by_signal(channel, frames, own, spread).items():
+            for label, level in _by_signal(channel, frames, own).items():
                 local[exposure.name, f"{name} {label}"] = level
     return local, shifts
 
 
-def _by_signal(channel: Channel, frames: int, own: Local, spread: Array) -> dict[str, Level]:
-    """Return the variance in each bin of signal; its degrees of freedom allow for its range.
-
-    `spread` is the variance map as it was before frames were steadied.
-    """
+def _by_signal(channel: Channel, frames: int, own: Local) -> dict[str, Level]:
+    """Return the variance in each bin of signal; its degrees of freedom allow for its range."""
     rows, columns = channel.mean_frame.shape
     share = (frames - 1) * (1 - 1 / rows) * (1 - 1 / columns)
-    level, variance = own.by_range(channel.mean_frame), variances(spread, own)
+    level, variance = own.by_range(channel.mean_frame), variances(channel, own)
     measured = own.by_range(channel.variance_map)
     found = {}
     for label, part in ((label, one.ranges) for label, one in own.bins.items()):

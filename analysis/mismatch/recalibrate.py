@@ -8,7 +8,7 @@ from math import inf, isfinite, log, nan, sqrt
 
 import numpy as np
 
-from analysis.mismatch.basefit import BaseFit, Offsets, colour, fit_base
+from analysis.mismatch.basefit import CLIPPED_SHARE, BaseFit, Offsets, colour, fit_base
 from analysis.mismatch.bending import bending_offsets, bends, bent_by
 from analysis.mismatch.flattened import flattened
 from analysis.mismatch.layout import Layout, Place, sites
@@ -27,6 +27,7 @@ _LEAST = 0.01  # of a signal: with the above, half a thousandth of it is as good
 _SAME = 0.05  # of an error: the fit has settled
 _CLOSER = 0.3  # a round's change beside that of the one before, unless two have shown it
 _SWITCH_DEVIANCE = 12.0  # by which another gap must fit better before the switch is moved
+_MOST_OFFSETS = 1.1  # variance of pixels' means beside that of noise: a cut moves by tenths of 1 %
 _CHANCE = 2.0  # standard errors, that a given number may well be off
 _FREE = 5  # numbers of two lines and a switch
 _APART = 1.005  # ratio of signals from which they are two levels
@@ -56,6 +57,8 @@ class Calibrated:
         Whether another round would change nothing.
     held
         The first segment's intercept, where the recording does not tell it: see `_held`.
+    cut
+        Darks that are fitted though some of their noise is cut off: see `_cut`.
     """
 
     model: Model
@@ -67,25 +70,26 @@ class Calibrated:
     bent: Offsets
     settled: bool = False
     held: float | None = None
+    cut: frozenset[str] = frozenset()
 
     @property
     def sums(self) -> frozenset[str]:
         """Sums of simulated frames that a `refit` needs beside those that are always made."""
         return frozenset({SPIKES} if self.offsets.bulk_dn2 else ())
 
-    def refit(self, layout: Layout, seen: Observation) -> BaseFit:
+    def refit(self, layout: Layout, levels: Mapping[Place, Level]) -> BaseFit:
         """Return the base numbers of another observation, fitted in the same way."""
         camera = self.model.camera
         return fit_base(
             layout,
-            seen.levels,
+            levels,
             self.switches,
             self.offsets,
             black_dn=camera.black_level - layout.black_dn,
             left_out=self.left_out,
             slopes=[s.slope for s in camera.noise.segment],
             intercept=self.held,
-            local=seen.local,
+            cut=self.cut,
         )
 
 
@@ -116,12 +120,13 @@ def calibrate(
     known = near is not None and _bends_alike(near, camera, spiky=spiky)
 
     held: float | None = None
+    cut = _cut(layout, seen)
 
     def fitted(
         offsets: Offsets, at: tuple[float, ...], levels: Mapping[Place, Level] = seen.levels
     ) -> BaseFit:
         free = partial(fit_base, black_dn=start, left_out=left_out, slopes=slopes)
-        return free(layout, levels, at, offsets, intercept=held, local=seen.local)
+        return free(layout, levels, at, offsets, intercept=held, cut=cut)
 
     held = _held(camera, fitted(_sum(undone, effects), switches))
 
@@ -150,7 +155,25 @@ def calibrate(
         model = with_pictures(model, layout, fit, effects, seed=seed + 1, jobs=jobs)
     offsets = _sum(_rounding(model, layout, fit, spiky=spiky), effects)
     final = fitted(offsets, switches)
-    return Calibrated(model, fit, final, offsets, switches, left_out, effects, settled, held)
+    return Calibrated(model, fit, final, offsets, switches, left_out, effects, settled, held, cut)
+
+
+def _cut(layout: Layout, seen: Observation) -> frozenset[str]:
+    """Return darks whose variances are fitted though the lowest code cuts some samples off.
+
+    Where it does in every dark they alone tell the read noise. It is normal, and what a cut leaves
+    of it is known, if all pixels have the same offset: not where their means scatter beyond noise.
+    """
+    darks = [e.name for e in layout.uniform if e.kind == "dark"]
+    levels = [seen.levels[name, channel] for name in darks for channel in layout.channels]
+    if any(level.clipped_low <= CLIPPED_SHARE for level in levels):
+        return frozenset()
+
+    def alike(name: str) -> bool:
+        numbers = [seen.scalars[name, c]["fixed_pixel_variance"][0] for c in layout.channels]
+        return all(number**3 < _MOST_OFFSETS for number in numbers)
+
+    return frozenset(name for name in darks if alike(name))
 
 
 def _held(camera: Camera, fit: BaseFit) -> float | None:
@@ -161,7 +184,8 @@ def _held(camera: Camera, fit: BaseFit) -> float | None:
     to the next by more than itself, and all that depends on read noise with it.
     """
     given, own = camera.noise.segment[0].intercept, fit.pieces[0]
-    untold = isfinite(own.intercept_error) and own.intercept_error > given
+    size = max(given, abs(own.intercept))
+    untold = isfinite(own.intercept_error) and own.intercept_error > size
     chance = abs(own.intercept - given) <= _CHANCE * own.intercept_error
     return given if untold and chance else None
 

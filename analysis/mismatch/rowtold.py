@@ -87,12 +87,17 @@ def _of_frames(state: State, frames: WholeFrames, best: Ranked) -> Denial | None
         return frames.sided.denial(kind)
     if kind in TAILS:
         bursts = frames.bursts.denial(kind)
-        return bursts or frames.ring.denial(best.polished.effects[0])
+        return bursts or frames.ring.denial(best.polished.effects[0], _read_dn2(state))
     if kind not in OFFSETS or any(own.kind in LINES for own in state.camera.effect):
         return None
     lined = any("spectral_peak" in own.statistic for own in state.mismatches)
     own = None if lined else frames.repeats.get(kind)
     return None if own is None else own.denial
+
+
+def _read_dn2(state: State) -> float:
+    """Return the variance of a state's read noise, DN^2."""
+    return state.camera.noise.segment[0].intercept
 
 
 def _explained(state: State, effect: Effect) -> float:

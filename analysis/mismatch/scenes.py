@@ -117,19 +117,6 @@ class Scene:
             own -= (_excess(means, outer, 0) * outer).astype(np.float32)[:, np.newaxis]
         return steady
 
-    def unsteadied(self, variance_dn2: Array, channel: str) -> Array:
-        """Return a map of variances, (row, column) of a channel, as before frames were steadied.
-
-        That takes from each row what its noise has in proportion to the picture, w of a pixel's
-        variance, which it brings to the others. To first order.
-        """
-        picture = self.signal_dn[self.planes[channel]].astype(np.float64)
-        square = (picture - picture.mean(1, keepdims=True)) ** 2
-        whole = square.sum(1, keepdims=True)
-        w = np.divide(square, whole, out=np.zeros_like(square), where=whole > 0)
-        others = (variance_dn2 * w).sum(1, keepdims=True)
-        return np.asarray(variance_dn2 * (1 + 2 * w) - w * others)
-
 
 def _excess(
     values: NDArray[np.floating], shape: NDArray[np.floating], axis: int

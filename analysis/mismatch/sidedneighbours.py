@@ -17,7 +17,8 @@ SHARED = frozenset({"brighter_fatter", "crosstalk", "readout_memory", "spatial_f
 """What all neighbours share alike, wherever they are on the sensor."""
 _PARTS = 3
 _LEAST_FRAMES, _MOST_FRAMES = 3, 16
-_MOST_SAMPLES = 1 << 24  # of one exposure: of large frames fewer are asked
+_MOST_SAMPLES = 1 << 24  # of one exposure: of large frames fewer are asked, of larger ones none
+_EVEN = 1.2  # ratio of variances of thirds, up to which noise is the same all over
 _LEAST_LINES = 24
 _APART = 1.0  # of what neighbours share in the mean, by which one side has more than the other
 _SURE = 6.0  # standard errors
@@ -51,13 +52,14 @@ def sided(layout: Layout, frames_of: FramesOf) -> Sided:
     more of it, the farther they are from the read-out; what pixels share by their shape, or a
     filter, they share everywhere. Correlations of neighbours along rows, or along columns, of the
     first and the last third of rows, or of columns; of darks and flats by what they share in the
-    mean. Means of lines, which may move, are taken off. In white noise a third of N samples tells
-    a correlation to (3 / N)^1/2.
+    mean. Means of lines, which may move, are taken off. Where light, or a glow, is so uneven that
+    thirds differ in noise, nothing is asked. In white noise a third of N samples tells a
+    correlation to (3 / N)^1/2. Of a mosaic neighbours are those of other colours.
     """
     sums: dict[tuple[int, int], Array] = {}
     for exposure in layout.uniform:
         most = _MOST_SAMPLES // (layout.rows * layout.columns)
-        count = min(len(exposure.numbers), _MOST_FRAMES, max(most, _LEAST_FRAMES))
+        count = min(len(exposure.numbers), _MOST_FRAMES, most)
         if count < _LEAST_FRAMES or min(layout.rows, layout.columns) < _LEAST_LINES:
             continue
         first = islice(frames_of(exposure.name), count)
@@ -91,6 +93,7 @@ def _alike(
         plane -= plane.mean(1, keepdims=True)
         plane -= plane.mean(2, keepdims=True)
         plane /= max(float(np.sqrt((plane**2).mean())), 1e-9)
+    squares = (rest**2).mean(0, dtype=np.float64)
     for along in (1, 2):
         size = rest.shape[along]
         before, after = (rest.take(range(i, size - 1 + i), along) for i in (0, 1))
@@ -98,5 +101,9 @@ def _alike(
         for parted in (0, 1):
             lines = product.mean(1 - parted)
             third = lines.size // _PARTS
+            noise = squares.mean(1 - parted)
+            ends = float(noise[:third].mean()), float(noise.mean()), float(noise[-third:].mean())
+            if max(ends) > _EVEN * min(ends):
+                continue
             shares = float(lines[:third].mean()), float(lines.mean()), float(lines[-third:].mean())
             yield (along, parted), (*shares, rest[1:].size)

@@ -236,5 +236,5 @@ def judged(layout: Layout, calibrated: Calibrated, seen: Observation) -> Vector:
 
 
 def _refitted(layout: Layout, calibrated: Calibrated, seen: Observation) -> tuple[BaseFit, Vector]:
-    fit = calibrated.refit(layout, seen)
+    fit = calibrated.refit(layout, seen.levels)
     return fit, vector(layout, seen, fit)

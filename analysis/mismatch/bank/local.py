@@ -78,12 +78,13 @@ def widened(
     return found
 
 
-def variances(found: Array, local: Local) -> Array:
-    """Return the variance in each range of signal, DN^2, by a map of it (row, column).
+def variances(channel: Channel, local: Local) -> Array:
+    """Return the variance in each range of signal, DN^2.
 
     Means of lines that are taken off bring the noise of bright pixels to dark ones: to first order
     a pixel's v is measured as v (1 - 1/n - 1/m) + (mean of its row) / m + (of its column) / n.
     """
+    found = channel.variance_map
     n, m = found.shape
     others = found.mean(1)[:, np.newaxis] / m + found.mean(0) / n
     return local.by_range(found * (1 + 1 / n + 1 / m) - others)
@@ -95,4 +96,4 @@ def _q(variance: Array, power: float) -> float:
 
 def _at_pixels(channel: Channel, local: Local) -> Array:
     """Return the variance of pixels of like signal, at each pixel, DN^2."""
-    return np.maximum(variances(channel.variance_map, local), 0.0)[local.labels]
+    return np.maximum(variances(channel, local), 0.0)[local.labels]

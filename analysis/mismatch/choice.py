@@ -121,7 +121,9 @@ class Choice(Fitted):
             errors = dict(proposal.errors)
             camera = with_effects(state.camera, [proposal.effect])
         if camera is not None and self.second is not None:
-            camera = with_effects(camera, self.second.polished.effects) or camera
+            both = with_effects(camera, self.second.polished.effects)
+            self.second = None if both is None else self.second
+            camera = both or camera
         named = Named(best.kind, proposal, errors, best.gain, rivals)
         return None if camera is None else (named, camera)
 

@@ -39,13 +39,13 @@ from dsis import __version__
 
 HEADLINES = {
     "match": "Simulation and recording agree",
-    "parameters": "The physics is complete, its numbers are off",
+    "parameters": "No physics is seen to be missing, but numbers are off",
     "omitted_physics": "The simulation leaves out physics",
     "unexplained": "Something differs that is not explained",
 }
 IN_DARKS = {
     "match": "In darks simulation and recording agree",
-    "parameters": "In darks the physics is complete, its numbers are off",
+    "parameters": "In darks no physics is seen to be missing, but numbers are off",
 }
 LOCATED = "Simulation and recording differ"
 TEMPLATE = Path(__file__).with_name("report.html.jinja")

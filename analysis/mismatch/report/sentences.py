@@ -19,10 +19,12 @@ from analysis.mismatch.remarks import NO_FLATS
 from analysis.mismatch.report.numbers import interval, measured, plain
 from analysis.mismatch.words import effect_words, place, statistic_words, unit
 
-_AGREE = "Simulation and recording agree: nothing differs by more than chance."
+_AGREE = "Simulation and recording agree: nothing that is measured differs by more than chance."
 _IN_DARKS = "In darks simulation and recording agree; no flat could be judged."
-_OFF = "The physics is complete; its numbers are off."
-_OFF_IN_DARKS = "In darks the physics is complete, its numbers are off; no flat could be judged."
+_OFF = "No physics is seen to be missing; numbers of the camera model are off."
+_OFF_IN_DARKS = (
+    "In darks no physics is seen to be missing, but numbers are off; no flat could be judged."
+)
 _NAMED = 3
 _TOGETHER = "all that is named, together"
 _IN_FULL = 4  # effects that one sentence can hold with their numbers

@@ -303,9 +303,44 @@ def test_what_no_frames_show_has_a_size_beyond_its_error(
     )
     monkeypatch.setattr(confirmed, "_calls_left", lambda *_: False)
     search: Any = None
-    state: Any = None
+    state: Any = Stub(mismatches=())
     told = Gained(Gain(150.0, (low, 500.0)), certain=True)
     why = confirmed.small(search, state, named, told)
     assert why == (
         "no size of it exceeds its standard error (rms lsb 0.0058 ± 0.024)" if refused else ""
     )
+
+
+@pytest.mark.parametrize(
+    ("error", "left", "refused"),
+    [
+        (0.81, 6.6, True),  # of 25 that it explains a quarter
+        (0.81, 5.0, False),
+        (0.81, 0.0, False),  # all else is explained
+        (0.4, 6.6, False),  # known by its size
+    ],
+)
+def test_an_effect_of_no_clear_size_leaves_little(error: float, left: float, refused: bool) -> None:
+    """Flicker without its word is no drift of 0.99 +- 0.81, whatever frames gain by one."""
+    own = effect("black_level_drift", sigma_dn=0.99)
+    errors = {"sigma_dn": error}
+    proposal = Stub(free=("sigma_dn",), effect=own, errors={})
+    named: Any = Stub(
+        kind=own.kind, name=own.kind, effect=own, measured=False, errors=errors, proposal=proposal
+    )
+    without = np.array([1.0, 1.0, 1.0])
+    values = np.array([26.0, 5.0, 1.0])  # one is explained, one overshot: of that 4 count
+    null = Stub(mean=np.array([26.0, 40.0, 1.0]), sd=np.ones(3), known=np.ones(3, bool))
+    state: Any = Stub(
+        mismatches=[Stub(statistic="frame_variance", z=-left)] if left else [],
+        null=null,
+        vector=Stub(values=values),
+        predictor=lambda: Stub(mean=lambda _: without),
+    )
+    search: Any = Stub(named=[named], without=lambda *_: None)
+    found = confirmed.unsized(search, state)
+    assert (found is not None) == refused
+    if found is not None:
+        assert found[0] is named
+        assert "sigma dn 0.99 ± 0.81" in found[1]
+        assert "1.96 times" in found[1]

@@ -194,14 +194,15 @@ def small(search: Search, state: State, named: Named, told: Gained | None) -> st
     locked frames leave it open, one of its sizes must exceed its error; where much is left beside
     what it changes, an interval of 95 % of one must reach no zero.
     """
-    if why := _unsized(search, state, named):
-        return why
     if named.effect is not None and named.effect.draws:
         if _calls_left(search, state, named):
-            return unclear(named, at_random=True)
-        plain = named.kind in LINES or named.measured or _borne_out(told)
-        return "" if plain else vague(named)
-    return "" if _borne_out(told) else unclear(named)
+            why = unclear(named, at_random=True)
+        else:
+            plain = named.kind in LINES or named.measured or _borne_out(told)
+            why = "" if plain else vague(named)
+    else:
+        why = "" if _borne_out(told) else unclear(named)
+    return why or _unsized(search, state, named)
 
 
 def unsized(search: Search, everything: State) -> tuple[Named, str] | None:

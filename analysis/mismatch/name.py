@@ -161,11 +161,11 @@ class Search(Choice):
         return self._asked_of_all(self._dropped(bare, named, why))
 
     def _dropped(self, bare: State, named: Named, why: str) -> State:
-        """Refuse an effect, and what a camera without it cannot have."""
+        """Refuse an effect; of a second read-out path also what needs one."""
         self._refuse(named.kind, named.effect, why)
         self.named.remove(named)
-        read_out = bare.camera.read_out
-        for other in [n for n in self.named if n.effect and n.effect.unfit_for(read_out)]:
+        able = None if named.proposal else bare.camera.read_out
+        for other in [n for n in self.named if able and n.effect and n.effect.unfit_for(able)]:
             self._refuse(other.kind, other.effect, f"needs {named.kind}: {why}")
             self.named.remove(other)
         self.named = kept_up(self.named, bare.camera, self.setting.given)

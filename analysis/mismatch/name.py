@@ -164,7 +164,7 @@ class Search(Choice):
         """Refuse an effect; of a second read-out path also what needs one."""
         self._refuse(named.kind, named.effect, why)
         self.named.remove(named)
-        able = None if named.proposal else bare.camera.read_out
+        able = bare.camera.read_out if named.kind == "dual_gain" else None
         for other in [n for n in self.named if able and n.effect and n.effect.unfit_for(able)]:
             self._refuse(other.kind, other.effect, f"needs {named.kind}: {why}")
             self.named.remove(other)

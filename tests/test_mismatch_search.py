@@ -88,6 +88,7 @@ def _offering(
     monkeypatch.setattr(choice, "ranked", ranked)
     monkeypatch.setattr(choice, "refuted", refuted)
     monkeypatch.setattr(choice, "replicates_for", lambda *_: 2)
+    monkeypatch.setattr(choice, "both_needed", lambda *_: None)  # which fits them together
 
 
 def test_predictions_of_the_same_numbers_are_alike() -> None:

@@ -191,22 +191,21 @@ def small(search: Search, state: State, named: Named, told: Gained | None) -> st
 
     What draws at random is known by what frames gain, whatever its size, unless a statistic that
     calls for it is left: then something else is there, by which frames would gain as well. Where
-    locked frames leave it open, one of its sizes must exceed its error; where much is left beside
-    what it changes, an interval of 95 % of one must reach no zero.
+    locked frames leave it open, one of its sizes must exceed its error.
     """
     if named.effect is not None and named.effect.draws:
         if _calls_left(search, state, named):
-            why = unclear(named, at_random=True)
-        else:
-            plain = named.kind in LINES or named.measured or _borne_out(told)
-            why = "" if plain else vague(named)
-    else:
-        why = "" if _borne_out(told) else unclear(named)
-    return why or _unsized(search, state, named)
+            return unclear(named, at_random=True)
+        plain = named.kind in LINES or named.measured or _borne_out(told)
+        return "" if plain else vague(named)
+    return "" if _borne_out(told) else unclear(named)
 
 
 def unsized(search: Search, everything: State) -> tuple[Named, str] | None:
-    """Return an effect of no clear size beside which all frames leave much open; None: none is."""
+    """Return an effect of no clear size beside which all frames leave much open; None: none is.
+
+    Of small recordings: in many frames what is sure has errors of its form that are larger.
+    """
     asked = ((one, _unsized(search, everything, one)) for one in search.named)
     return next((pair for pair in asked if pair[1]), None)
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from analysis.mismatch.bank.key import Key
-from analysis.mismatch.grainedlines import grained
+from analysis.mismatch.grainedlines import grained, patterned
 
 NAMES = (
     "row_variance",
@@ -73,3 +73,26 @@ def test_rows_that_move_alone_or_neighbours_that_are_explained_deny_nothing() ->
     assert grained(_state(rows, 9.0), "row_noise", WITHOUT) is None
     assert grained(_state(_grain(0.1, 3), 0.45, located=()), "row_noise", WITHOUT) is None
     assert grained(_state(_grain(0.1, 3), 0.45), "crosstalk", WITHOUT) is None
+
+
+@pytest.mark.parametrize(
+    ("along_row", "along_column", "claimed", "denied"),
+    [
+        (30.0, 37.0, 14.0, True),  # bars that fade in a dark
+        (30.0, 37.0, 60.0, False),  # lines differ more surely than neighbours are alike
+        (30.0, 2.0, 14.0, False),  # what a line has in common its pixels have
+    ],
+)
+def test_a_pattern_of_two_dimensions_is_none_of_lines(
+    along_row: float, along_column: float, claimed: float, denied: bool
+) -> None:
+    names = ("fixed_correlation_0_1", "fixed_correlation_1_0", "fixed_row_variance")
+    keys = tuple(Key(name, "exposure", "dark", "MONO", "") for name in names)
+    state: Any = SimpleNamespace(
+        vector=SimpleNamespace(keys=keys, values=SD * np.array([along_row, along_column, 0.0])),
+        null=SimpleNamespace(mean=np.zeros(3), sd=np.full(3, SD), known=np.ones(3, bool)),
+        mismatches=[SimpleNamespace(statistic=name) for name in names[:2]],
+    )
+    without = np.array([0.0, 0.0, -claimed * SD])
+    assert (patterned(state, "row_fpn", without) is not None) == denied
+    assert patterned(state, "dsnu", without) is None

@@ -29,7 +29,7 @@ from dsis.camera import Camera
 Array = NDArray[np.float64]
 IDLE = "all that called for it is left, and nothing that differed is explained by it alone or best"
 UNCALLED = "it explains nothing that differs in all frames, and frames leave it open"
-_QUARTER = 0.25
+_QUARTER = 0.25  # of what an effect explains, that may be left beside one of no clear size
 _LITTLE = 0.3  # of what a number differs by, that an effect changes
 _DOUBTFUL = 30.0  # gain of log-likelihood below which locked frames may not confirm an effect
 

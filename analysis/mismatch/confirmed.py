@@ -166,6 +166,7 @@ def proven(
     while True:
         final = final if judged else undenied(search, final)
         gained = _gained(search, final, trial)
+        _simulated(search, final)
         sizes = [(one, small(search, final, one, gained.get(one.name))) for one in search.named]
         least = next((pair for pair in sizes if pair[1]), None)
         if least is not None:
@@ -306,19 +307,38 @@ def _calls_left(search: Search, state: State, named: Named) -> bool:
 
     Of numbers that it changes: what darks differ by with time is no matter of a bend.
     """
+    off = _left_off(state, named)
+    if isinstance(off, bool):
+        return off
+    null = state.null
+    change = null.mean - state.predictor().mean(search.without(state, named))
+    change = np.where(null.known & np.isfinite(change), change, 0.0) / null.sd
+    both = np.concatenate([change, null.contrasts.matrix @ change / null.contrast_sd])
+    return bool((np.abs(both[off]) > _LITTLE * np.abs(state.departures[off])).any())
+
+
+def _left_off(state: State, named: Named) -> list[int] | bool:
+    """Return which numbers are off, of statistics left that call for an effect.
+
+    False: none is left. True: one is that no number shows, or no simulation is to be asked.
+    """
     if named.kind not in CANDIDATES:
         return False
     left = {m.statistic for m in state.mismatches}.intersection(CANDIDATES[named.kind].calls)
     if not left or named.proposal is None:
         return bool(left)
-    null, keys = state.null, state.null.keys
+    keys = state.null.keys
     off = [i for i in np.flatnonzero(state.chances < FAMILY) if keys[i].statistic in left]
-    if left - {keys[i].statistic for i in off}:
-        return True  # all frames show it, and no number of these does
-    change = null.mean - state.predictor().mean(search.without(state, named))
-    change = np.where(null.known & np.isfinite(change), change, 0.0) / null.sd
-    both = np.concatenate([change, null.contrasts.matrix @ change / null.contrast_sd])
-    return bool((np.abs(both[off]) > _LITTLE * np.abs(state.departures[off])).any())
+    # All frames show it, and no number of these does.
+    return True if left - {keys[i].statistic for i in off} else off
+
+
+def _simulated(search: Search, state: State) -> None:
+    """Simulate side by side what `small` asks for one by one."""
+    asked = [one for one in search.named if one.effect is not None and one.effect.draws]
+    off = [one for one in asked if not isinstance(_left_off(state, one), bool)]
+    if len(off) > 1:
+        state.predictor().ready(search.without(state, one) for one in off)
 
 
 def _foretold(search: Search, named: Named, without: Camera, trial: Trial, told: Gained) -> Gained:

@@ -328,7 +328,7 @@ def _left_off(state: State, named: Named) -> list[int] | bool:
     if not left or named.proposal is None:
         return bool(left)
     keys = state.null.keys
-    off = [i for i in np.flatnonzero(state.chances < FAMILY) if keys[i].statistic in left]
+    off = [int(i) for i in np.flatnonzero(state.chances < FAMILY) if keys[i].statistic in left]
     # All frames show it, and no number of these does.
     return True if left - {keys[i].statistic for i in off} else off
 

@@ -33,9 +33,12 @@ def of_jumps(x: Array, noise_dn2: Array, heights_dn: Array, switching: Array) ->
     switching
         Probabilities, from one frame to the next.
     """
-    chances = np.stack([_chains(x.shape[1], w) for w in switching])
+    frames = x.shape[1]
+    switches = np.abs(np.diff(_bits(frames), axis=1)).sum(1).astype(np.int64)
+    number = np.arange(frames)
+    chances = np.stack([0.5 * w**number * (1 - w) ** (frames - 1 - number) for w in switching])
     out = np.empty((len(x), len(heights_dn), len(switching)))
-    _jumps(_centred(x), noise_dn2, heights_dn, chances, out)
+    _jumps(_centred(x), noise_dn2, heights_dn, (switches, chances), out)
     return out
 
 
@@ -51,10 +54,11 @@ def of_spikes(x: Array, noise_dn2: Array, added_dn2: Array, shares: Array) -> Ar
     shares
         Of such frames.
     """
-    count = _bits(x.shape[1]).sum(1)
-    chances = np.stack([p**count * (1 - p) ** (x.shape[1] - count) for p in shares])
+    count = _bits(x.shape[1]).sum(1).astype(np.int64)
+    number = np.arange(x.shape[1] + 1)
+    chances = np.stack([p**number * (1 - p) ** (x.shape[1] - number) for p in shares])
     out = np.empty((len(x), len(added_dn2), len(shares)))
-    _spikes(_centred(x), noise_dn2, added_dn2, chances, out)
+    _spikes(_centred(x), noise_dn2, added_dn2, (count, chances), out)
     return out
 
 
@@ -95,13 +99,6 @@ def _bits(frames: int) -> Array:
     return np.asarray((number[:, None] >> np.arange(frames)) & 1, np.float64)
 
 
-def _chains(frames: int, switching: float) -> Array:
-    """Return how probable each sequence is, (sequence,)."""
-    switches = np.abs(np.diff(_bits(frames), axis=1)).sum(1)
-    stays = frames - 1 - switches
-    return np.asarray(0.5 * switching**switches * (1 - switching) ** stays)
-
-
 @kernel
 def _sums(x: Any, frames: int, sums: Any, squares: Any, counts: Any) -> None:
     """Sum samples and squares over the frames of each sequence that are in the second state."""
@@ -115,15 +112,21 @@ def _sums(x: Any, frames: int, sums: Any, squares: Any, counts: Any) -> None:
 
 
 @kernel
-def _mean(terms: Any, most: float, chances: Any, out: Any) -> None:
-    """Set the log of the mean of exp(term) over all sequences, by each of their probabilities."""
-    out[:] = 0.0
+def _mean(terms: Any, most: float, chances: Any, sums: Any, out: Any) -> None:
+    """Set the log of the mean of exp(term) over all sequences, by each of their probabilities.
+
+    `chances` are the class of each sequence, and the probability of one of each class:
+    (probability, class); `sums` is written to, (class,).
+    """
+    kinds, likely = chances
+    sums[:] = 0.0
     for s in range(terms.size):
-        likely = exp(terms[s] - most)
-        for p in range(out.size):
-            out[p] += chances[p, s] * likely
+        sums[kinds[s]] += exp(terms[s] - most)
     for p in range(out.size):
-        out[p] = most + log(max(out[p], 1e-300))
+        own = 0.0
+        for k in range(sums.size):
+            own += likely[p, k] * sums[k]
+        out[p] = most + log(max(own, 1e-300))
 
 
 @kernel
@@ -131,6 +134,7 @@ def _jumps(x: Any, noise: Any, heights: Any, chances: Any, out: Any) -> None:
     pixels, frames = x.shape
     sums, squares = np.empty(1 << frames), np.empty(1 << frames)
     counts = np.empty(1 << frames, np.int64)
+    classes = np.empty(chances[1].shape[1])
     for i in range(pixels):
         _sums(x[i], frames, sums, squares, counts)
         for h in range(heights.size):
@@ -140,7 +144,7 @@ def _jumps(x: Any, noise: Any, heights: Any, chances: Any, out: Any) -> None:
                 k = counts[s]
                 squares[s] = (a * sums[s] - a * a * k * (frames - k) / (2 * frames)) / noise[i]
                 most = max(most, squares[s])
-            _mean(squares, most, chances, out[i, h])
+            _mean(squares, most, chances, classes, out[i, h])
 
 
 @kernel
@@ -149,16 +153,54 @@ def _spikes(x: Any, noise: Any, added: Any, chances: Any, out: Any) -> None:
     sums, squares = np.empty(1 << frames), np.empty(1 << frames)
     counts = np.empty(1 << frames, np.int64)
     terms = np.empty(1 << frames)
+    weights, logs = np.empty(frames + 1), np.empty(frames + 1)  # of so many noisier frames
+    classes = np.empty(frames + 1)
     for i in range(pixels):
         _sums(x[i], frames, sums, squares, counts)
         b = 1 / noise[i]
         for v in range(added.size):
             a = 1 / (noise[i] + added[v])
+            for k in range(frames + 1):
+                weights[k] = (a - b) ** 2 / ((frames - k) * b + k * a)
+                logs[k] = k * log(a / b) - log(((frames - k) * b + k * a) / (frames * b))
             most = -1e300
             for s in range(sums.size):
                 k = counts[s]
-                weight = (frames - k) * b + k * a
-                bent = (a - b) * squares[s] - (a - b) ** 2 * sums[s] ** 2 / weight
-                terms[s] = (k * log(a / b) - log(weight / (frames * b)) - bent) / 2
+                bent = (a - b) * squares[s] - weights[k] * sums[s] ** 2
+                terms[s] = (logs[k] - bent) / 2
                 most = max(most, terms[s])
-            _mean(terms, most, chances, out[i, v])
+            _mean(terms, most, chances, classes, out[i, v])
+
+
+@kernel
+def of_mixtures(own: Any, beside: Any, weight: Any, parts: Any, out: Any) -> None:
+    """Set the log-likelihood of all pixels, of which a share has laws of its own: (law, share).
+
+    Parameters
+    ----------
+    own
+        Likelihood under each law, at most about 1: (law, pixel).
+    beside
+        The same under the law of all others, (pixel,).
+    weight
+        For how many pixels each stands, (pixel,): those that stand for as many follow each other.
+    parts
+        Shares.
+    """
+    product, sums = np.empty(parts.size), np.empty(parts.size)
+    for law in range(own.shape[0]):
+        product[:] = 1.0
+        sums[:] = 0.0
+        for i in range(beside.size):
+            other, more = beside[i], own[law, i] - beside[i]
+            last = i == beside.size - 1 or weight[i + 1] != weight[i]
+            for k in range(parts.size):
+                likely = other + parts[k] * more
+                if likely < 1e-100:  # a product of two is a number still
+                    sums[k] += weight[i] * log(max(likely, 1e-300))
+                else:
+                    product[k] *= likely
+                if last or product[k] < 1e-200:
+                    sums[k] += weight[i] * log(product[k])
+                    product[k] = 1.0
+        out[law] = sums

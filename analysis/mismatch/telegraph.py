@@ -18,7 +18,7 @@ from scipy.special import logsumexp, ndtr
 
 from analysis.mismatch.layout import Layout
 from analysis.mismatch.pixelframes import blocks_of, chosen
-from analysis.mismatch.pixellaw import of_drifts, of_jumps, of_spikes, of_variances
+from analysis.mismatch.pixellaw import of_drifts, of_jumps, of_mixtures, of_spikes, of_variances
 from analysis.mismatch.projections import FramesOf
 from analysis.mismatch.rank import TOLD_APART
 from dsis.recording.ahead import in_order
@@ -232,12 +232,11 @@ def could_jump(layout: Layout, frames_of: FramesOf, least: float) -> bool:
     jumping, likely = np.exp(jumps - top[:, None, None]), np.exp(own - top[:, None])
     laws = [np.exp(-top), *(likely @ _log_normal(s, c) for s in _SPREADS for c in _CENTRES)]
     beside = max(laws, key=lambda one: _sum(one, weight))
+    amplitudes = np.geomspace(heights[0], heights[-1] / 2, _FEW_HEIGHTS)
+    least += _sum(beside, weight)
     return any(
-        float(_of_shares(of(jumping[:, :, w], heights, a), beside, weight, _PARTS).max())
-        >= _sum(beside, weight) + least
+        float(_of_shares(of(jumping, heights, amplitudes), beside, weight, _PARTS).max()) >= least
         for of in (_of_heights, _of_height)
-        for w in range(switching.size)
-        for a in np.geomspace(heights[0], heights[-1] / 2, _FEW_HEIGHTS)
     )
 
 
@@ -248,16 +247,14 @@ def _fitted(jumps: Array, others: _Others, weight: Array, heights: Array) -> Tel
     still = np.exp(others.twins - top[:, None])
     amplitudes = np.geomspace(heights[0], heights[-1] / 2, _GRID)
     parts = np.concatenate([_PARTS, _MORE])
+    exponential = _of_heights(jumping, heights, amplitudes)
+    noisier = _of_heights(still[:, :, None], heights, amplitudes)
     found, alone, spreading, many, rivals = [], [], [], [], []
-    for beside, cost in others.laws(top, weight):
+    laws = list(others.laws(top, weight))
+    for beside, cost in laws:
         alone.append(_sum(beside, weight))
-        own = np.array(
-            [[_of_shares(_of_heights(jumping[:, :, w], heights, a), beside, weight, parts)
-              for a in amplitudes] for w in range(_SWITCHING.size)]
-        )  # fmt: skip
-        twins = [
-            _of_shares(_of_heights(still, heights, a), beside, weight, parts) for a in amplitudes
-        ]
+        own = _of_shares(exponential, beside, weight, parts)
+        twins = _of_shares(noisier, beside, weight, parts)
         few = own[:, :, : parts.size if cost is None else _PARTS.size]
         best, chosen = max(alone[-1], float(few.max())), cost or 0.0
         spreading.append((cost is not None, best - chosen))
@@ -272,11 +269,8 @@ def _fitted(jumps: Array, others: _Others, weight: Array, heights: Array) -> Tel
     # A mixture of laws takes some of the jumps; so sizes are those beside the best single law.
     single = max(range(len(found) - 1), key=lambda i: float(np.max(found[i])))
     sizes, gains = found[single], (gain, spread - other, max(many) - max(rivals))
-    beside = [own for own, _ in others.laws(top, weight)][single]
-    equal = np.array(
-        [[_of_shares(_of_height(jumping[:, :, w], heights, a), beside, weight, _PARTS)
-          for a in amplitudes] for w in range(_SWITCHING.size)]
-    )  # fmt: skip
+    one = _of_height(jumping, heights, amplitudes)
+    equal = _of_shares(one, laws[single][0], weight, _PARTS)
     more = _mean(equal) - _mean(sizes)
     if more > TOLD_APART:
         told = _told(equal, amplitudes, (gain + more, gains[1], gains[2]))
@@ -291,9 +285,14 @@ def _mean(likely: Array) -> float:
 
 
 def _of_shares(own: Array, beside: Array, weight: Array, parts: Array) -> Array:
-    """Return the log-likelihood of each share of pixels that jump: (share,)."""
-    likely = beside + parts[:, None] * (own - beside)
-    return np.asarray(np.log(np.maximum(likely, 1e-300)) @ weight)
+    """Return the log-likelihood of each share of pixels that jump: (switching, amplitude, share).
+
+    From likelihoods (switching, amplitude, pixel).
+    """
+    out = np.empty((*own.shape[:2], parts.size))
+    laws = np.ascontiguousarray(own).reshape(-1, own.shape[2])
+    of_mixtures(laws, np.ascontiguousarray(beside), weight, parts, out.reshape(len(laws), -1))
+    return out
 
 
 def _told(likely: Array, amplitudes: Array, gains: tuple[float, float, float]) -> Telegraph | None:
@@ -325,21 +324,24 @@ def _told(likely: Array, amplitudes: Array, gains: tuple[float, float, float]) -
     return Telegraph(share, c, amplitude, b, switching, a, gain, spread, jumping)
 
 
-def _of_heights(jumping: Array, heights: Array, amplitude: float) -> Array:
-    """Return the likelihood of exponential heights of a mean: (pixel,).
+def _of_heights(jumping: Array, heights: Array, amplitudes: Array) -> Array:
+    """Return the likelihood of exponential heights of a mean: (switching, amplitude, pixel).
 
     Jumps that are too small to be seen are Gaussian noise, as the lowest of the heights nearly is.
+    From likelihoods (pixel, height, switching).
     """
     edges = np.concatenate([[0.0], np.sqrt(heights[1:] * heights[:-1]), [np.inf]])
-    return np.asarray(jumping @ -np.diff(np.exp(-edges / amplitude)))
+    parts = -np.diff(np.exp(-edges / amplitudes[:, None]), axis=1)
+    return np.asarray(parts @ jumping.transpose(2, 1, 0))
 
 
-def _of_height(jumping: Array, heights: Array, amplitude: float) -> Array:
-    """Return the likelihood of jumps of one height, by its neighbours' logarithms: (pixel,)."""
-    at = float(np.interp(log(amplitude), np.log(heights), np.arange(heights.size)))
-    low = min(int(at), heights.size - 2)
-    ends = np.log(np.maximum(jumping[:, low : low + 2], 1e-300))
-    return np.asarray(np.exp(ends @ np.array([low + 1 - at, at - low])))
+def _of_height(jumping: Array, heights: Array, amplitudes: Array) -> Array:
+    """Return the same of jumps of one height, by its neighbours' logarithms."""
+    at = np.interp(np.log(amplitudes), np.log(heights), np.arange(heights.size))
+    low = np.minimum(at.astype(np.intp), heights.size - 2)
+    logs = np.log(np.maximum(jumping.transpose(2, 1, 0), 1e-300))
+    part = (at - low)[:, None]
+    return np.asarray(np.exp((1 - part) * logs[:, low] + part * logs[:, low + 1]))
 
 
 def _shares(classes: Array, weight: Array) -> Array:
@@ -349,6 +351,6 @@ def _shares(classes: Array, weight: Array) -> Array:
     """
     shares = np.full(classes.shape[1], 1 / classes.shape[1])
     for _ in range(_STEPS):
-        each = classes * shares
-        shares = weight @ (each / np.maximum(each.sum(1, keepdims=True), 1e-300)) / weight.sum()
+        likely = np.maximum(classes @ shares, 1e-300)
+        shares = shares * (weight / likely @ classes) / weight.sum()
     return np.asarray(shares)

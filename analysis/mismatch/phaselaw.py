@@ -21,6 +21,7 @@ _STRENGTHS = np.array([0.7, 0.9, 1.1, 1.4])  # of an amplitude that is not exact
 _WITHIN, _EXACT, _ASIDE = (0.4, 1.6), 2e-3, 0.02  # of an amplitude by its mean square
 _STEP = 0.5  # of m at most, in standard deviations of the noise
 _REACH = 3.5  # standard deviations of m
+_AT_ONCE = 256  # frames whose factors, each of half to one, a product of them holds
 _MOST = 6.0  # amplitude of one frame beyond which less noise tells no more
 
 
@@ -40,9 +41,8 @@ def kept_rather_than_free(found: Sequence[Complex], amplitudes: Sequence[float])
     for own, amplitude in zip(found, amplitudes, strict=True):
         for i, strength in enumerate(_STRENGTHS):
             scale = _MOST / max(strength * amplitude, _MOST)
-            one, other = _likelihoods(own * scale, strength * amplitude * scale)
-            kept[i] += one
-            free[i] += other
+            kept[i] += _of_kept(own * scale, strength * amplitude * scale)
+            free[i] += _of_free(own * scale, strength * amplitude * scale)
     both = (scipy.special.logsumexp(x) - np.log(x.size) for x in (kept, free))
     return float(next(both) - next(both))
 
@@ -77,9 +77,9 @@ def there_in(own: Complex, amplitude: float, *, kept: bool, real: bool) -> Array
     line = np.empty((_STRENGTHS.size, len(phases)))
     for i, strength in enumerate(_STRENGTHS):
         scale = unit * _MOST / max(strength * amplitude, _MOST)
-        one, other = _likelihoods(own * scale, strength * amplitude * scale, phases)
-        _, nothing = _likelihoods(own * scale, 0.0, phases[:1])
-        line[i] = (one if kept or real else other) - nothing
+        seen, size = own * scale, strength * amplitude * scale
+        likely = _of_kept(seen, size, phases) if kept or real else _of_free(seen, size)
+        line[i] = likely - _of_free(seen, 0.0)
     return line
 
 
@@ -172,7 +172,7 @@ def strength_of(
     def unlikely(strength: float) -> float:
         total = np.zeros(len(phases))
         for own, amplitude, scale in zip(found, amplitudes, scales, strict=True):
-            total += _likelihoods(own * scale, strength * amplitude * scale, phases)[0]
+            total += _of_kept(own * scale, strength * amplitude * scale, phases)
         return -float(scipy.special.logsumexp(total))
 
     best = scipy.optimize.minimize_scalar(
@@ -183,32 +183,41 @@ def strength_of(
     return float(best.x), 1 / float(np.sqrt(bend))
 
 
-def _likelihoods(
-    found: Complex, amplitude: float, phases: Sequence[complex] | None = None
-) -> tuple[Array, float]:
-    """Return log-likelihoods of each phase that is kept, and of free phases, up to a constant."""
-    phases = tuple(_phases()) if phases is None else phases
+def _of_kept(found: Complex, amplitude: float, phases: Sequence[complex] | None = None) -> Array:
+    """Return the log-likelihood of each phase that is kept, up to a constant: (phase,)."""
+    shared, squares = _shared(found, amplitude)
+    turned = 2 * amplitude * np.array(tuple(_phases()) if phases is None else phases)
+    kept = np.zeros((len(turned), shared.size))
+    for some in np.array_split(found, -(-found.size // _AT_ONCE)):
+        halves = np.ones_like(kept)
+        for apart in (one - shared for one in some):
+            along = np.abs(np.outer(turned.real, apart.real) - np.outer(turned.imag, apart.imag))
+            kept += along
+            halves *= 0.5 + 0.5 * np.exp(-2 * along)  # cosh is exp times this
+        kept += np.log(halves)
+    return np.asarray(scipy.special.logsumexp(kept + squares, axis=1))
+
+
+def _of_free(found: Complex, amplitude: float) -> float:
+    """Return the log-likelihood of free phases, up to the same constant."""
+    shared, squares = _shared(found, amplitude)
+    for apart in (one - shared for one in found):
+        turned = 2 * amplitude * np.abs(apart)
+        squares += np.log(scipy.special.i0e(turned)) + turned
+    return float(scipy.special.logsumexp(squares))
+
+
+def _shared(found: Complex, amplitude: float) -> tuple[Complex, Array]:
+    """Return what all frames may share, and the log-likelihood of noise about it and a line."""
     centre = found.mean()
     reach = _REACH * (amplitude + 1) / np.sqrt(found.size)
     reach = min(reach, amplitude + _REACH)
     step = min(_STEP, 1 / np.sqrt(found.size))
     side = np.arange(-reach, reach + step, step)
     shared = (centre + side[:, np.newaxis] + 1j * side).reshape(-1)
-    squares = np.full(shared.size, -found.size * amplitude**2)
-    free = np.zeros(shared.size)
-    kept = np.zeros((len(phases), shared.size))
-    for apart in (one - shared for one in found):
-        size = np.abs(apart)
-        squares -= size**2
-        turned = 2 * amplitude * size
-        free += np.log(scipy.special.i0e(turned)) + turned
-        for i, phase in enumerate(phases):
-            along = np.abs(2 * amplitude * np.real(apart * phase))
-            kept[i] += along + np.log1p(np.exp(-2 * along)) - np.log(2)  # of cosh
-    return (
-        scipy.special.logsumexp(kept + squares, axis=1),
-        float(scipy.special.logsumexp(free + squares)),
-    )
+    # About the mean: squares of the frames, and of the mean itself.
+    about = float((np.abs(found - centre) ** 2).sum()) + found.size * np.abs(shared - centre) ** 2
+    return shared, -about - found.size * amplitude**2
 
 
 def _phases() -> Iterator[complex]:

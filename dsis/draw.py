@@ -163,6 +163,27 @@ def _scatter(
         out[1, i] = (np.float64(b) + 0.5) / 4294967296.0
 
 
+@kernel
+def _chain(
+    out: NDArray[np.bool_],
+    places: NDArray[np.int64],
+    key: NDArray[np.uint64],
+    frame: int,
+    forgetting: float,
+) -> None:
+    """Fill `out` (pixel,) with the states of two that chains of places (3, pixel) are in."""
+    for i in range(places.shape[1]):
+        row, column, channel = places[0, i], places[1, i], places[2, i]
+        for back in range(frame, -1, -1):
+            a, b, _, _ = philox(
+                np.uint64(column), np.uint64(row), np.uint64(back), np.uint64(channel),
+                key[0], key[1],
+            )  # fmt: skip
+            if back == 0 or (np.float64(a) + 0.5) / 4294967296.0 < forgetting:
+                out[i] = (np.float64(b) + 0.5) / 4294967296.0 < 0.5
+                break
+
+
 @dataclass(frozen=True)
 class Draw:
     """Random fields of one seed.
@@ -228,6 +249,21 @@ class Draw:
         out = np.empty((2, places.shape[1]), np.float64)
         key = _key(self.seed, self.scope, purpose)
         _scatter(out, np.ascontiguousarray(places), key, np.uint64(frame))
+        return out
+
+    def chained(
+        self, purpose: str, places: NDArray[np.int64], frame: int, switching: float
+    ) -> NDArray[np.bool_]:
+        """Return the state in a frame of chains of two states, equally long: bool (pixel,).
+
+        Each switches with probability `switching`, 0.5 at most, from frame to frame: it forgets
+        with twice that and is drawn anew, so its state is that of the last frame, counted back, at
+        which it forgot; frame 0 is drawn for all. `places` as of `scattered`, whose deviates they
+        are.
+        """
+        out = np.empty(places.shape[1], np.bool_)
+        key = _key(self.seed, self.scope, purpose)
+        _chain(out, np.ascontiguousarray(places), key, frame, 2 * switching)
         return out
 
     def normal_rows(

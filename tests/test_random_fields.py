@@ -166,3 +166,30 @@ def test_a_field_that_is_kept_is_the_field_and_nobody_changes_it() -> None:
     assert (kept != Draw(6).within("sensor").fixed("prnu", grid)).all()
     with pytest.raises(ValueError, match="read-only"):
         kept[0, 0] = 0
+
+
+PLACES = np.stack([np.arange(20_000) // 100, np.arange(20_000) % 100, np.zeros(20_000, int)])
+
+
+@pytest.mark.parametrize("switching", [0.02, 0.2, 0.5])
+def test_chains_hold_and_switch_as_often_as_said(switching: float) -> None:
+    """Over k frames states are correlated by (1 - 2 w)^k: Kac, American Math. Monthly 54, 1947."""
+    draw = Draw(3)
+    states = np.array([draw.chained("test", PLACES, k, switching) for k in range(12)]) - 0.5
+    error = 1 / np.sqrt(PLACES.shape[1])
+    for lag in (0, 1, 2, 5):
+        own = 4 * (states[0] * states[lag]).mean()
+        assert abs(own - (1 - 2 * switching) ** lag) < Z_MAX * error
+        assert abs(2 * states[lag].mean()) < Z_MAX * error
+
+
+@given(st.integers(0, 9), st.floats(0.01, 0.5), st.integers(0, 99))
+def test_a_chain_is_where_it_was_when_it_last_forgot(
+    frame: int, switching: float, seed: int
+) -> None:
+    draw, places = Draw(seed), PLACES[:, :50]
+    state = draw.scattered("test", places, 0)[1] < 0.5
+    for k in range(1, frame + 1):
+        forgets, drawn = draw.scattered("test", places, k)
+        state = np.where(forgets < 2 * switching, drawn < 0.5, state)
+    assert np.array_equal(draw.chained("test", places, frame, switching), state)

@@ -1,14 +1,20 @@
 """Random telegraph signal: some pixels jump between two levels."""
 
 from collections.abc import Mapping
-from typing import Annotated, Any, ClassVar, Literal
+from functools import lru_cache
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 from scipy.special import ndtr, ndtri
 
+from dsis.draw import Draw
 from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, Stage
+from dsis.grid import PixelGrid
+
+_Traps = tuple[tuple[NDArray[np.intp], ...], NDArray[np.int64], NDArray[np.float64]]
+_MOST_KEPT = 1 << 18  # pixels of a field whose traps are kept
 
 _ABOUT: Literal["about"] = "about"
 _DRAWN: Literal["exponential"] = "exponential"
@@ -65,39 +71,21 @@ class Rts(Effect):
         """Add the state of each trap."""
         if not self.pixel_fraction:
             return image
-        deviates = exposure.sensor.fixed("rts", exposure.grid, threads=exposure.threads)
-        places = np.nonzero(deviates < ndtri(self.pixel_fraction))
-        filled = self._filled(places, exposure)
+        sensor, grid = exposure.sensor, exposure.grid
+        find = _kept_traps if grid.rows * grid.columns <= _MOST_KEPT else _traps
+        places, sites, heights = find(sensor, grid, self.pixel_fraction, exposure.threads)
+        filled = exposure.temporal.chained(
+            "rts states", sites, exposure.frame, self.switch_probability
+        )
         height = np.full(filled.size, self.amplitude_dn)
         if self.heights == _DRAWN:
-            # Below the threshold the normal law's tail is uniform: it gives the height as well.
-            height *= -np.log(ndtr(deviates[places].astype(np.float64)) / self.pixel_fraction)
+            height *= heights
         if self.levels == "either":
-            signs = exposure.sensor.fixed("rts signs", exposure.grid, threads=exposure.threads)
+            signs = sensor.fixed("rts signs", grid, threads=exposure.threads)
             height *= np.where(signs[places] < 0, -1, 1)
         made = image.copy()
         made[places] += height * (filled - (0.5 if self.levels == _ABOUT else 0.0))
         return made
-
-    def _filled(self, places: tuple[NDArray[np.intp], ...], exposure: Exposure) -> Any:
-        """Return which traps are filled in the frame.
-
-        At each frame a trap forgets with probability 2 w and is drawn anew: so its state is that
-        of the last frame, counted back, at which it forgot. Frame 0 is drawn for all.
-        """
-        grid = exposure.grid
-        rows, columns = places[0] + grid.first_row, places[1] + grid.first_column
-        channels = places[2] if grid.cfa is None else grid.channels()[rows % 2, columns % 2, 0]
-        sites = np.stack([rows, columns, channels]).astype(np.int64)
-        filled, waiting = np.zeros(rows.size, bool), np.arange(rows.size)
-        for frame in range(exposure.frame, -1, -1):
-            forgets, state = exposure.temporal.scattered("rts states", sites[:, waiting], frame)
-            done = (forgets < 2 * self.switch_probability) | (frame == 0)
-            filled[waiting[done]] = state[done] < 0.5
-            waiting = waiting[~done]
-            if not waiting.size:
-                break
-        return filled
 
     def contributions(self, point: OperatingPoint) -> Mapping[str, float]:
         """Return q a^2 / 2, or half of it; what correlated frames share goes to the fixed pattern.
@@ -117,3 +105,17 @@ class Rts(Effect):
             "fixed_pixel_variance": variance * pairs + fixed,
             "level": level,
         }
+
+
+def _traps(sensor: Draw, grid: PixelGrid, share: float, threads: int) -> _Traps:
+    """Return where a field has traps, and exponential heights of mean 1: frames share them."""
+    deviates = sensor.fixed("rts", grid, threads=threads)
+    places = np.nonzero(deviates < ndtri(share))
+    rows, columns = places[0] + grid.first_row, places[1] + grid.first_column
+    channels = places[2] if grid.cfa is None else grid.channels()[rows % 2, columns % 2, 0]
+    sites = np.stack([rows, columns, channels]).astype(np.int64)
+    # Below the threshold the normal law's tail is uniform: it gives the height as well.
+    return places, sites, -np.log(ndtr(deviates[places].astype(np.float64)) / share)
+
+
+_kept_traps = lru_cache(maxsize=8)(_traps)

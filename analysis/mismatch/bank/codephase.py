@@ -7,11 +7,10 @@ light is left. Where that is nothing, the transform of the folded histogram is c
 """
 
 from collections.abc import Mapping
-from math import isfinite, log, pi
+from math import log, pi
 
 import numpy as np
 import scipy.special
-import scipy.stats
 from numpy.typing import NDArray
 
 from analysis.mismatch.bank.lines import any_of
@@ -92,9 +91,9 @@ class CodePhases:
 
 def _log_chance(chi2: float, dof: float) -> float:
     """Return the logarithm of the probability that chi-squared is larger, however small that is."""
-    chance = float(scipy.stats.chi2.logsf(chi2, dof))
-    if isfinite(chance):
-        return chance
+    chance = float(scipy.special.chdtrc(dof, chi2))
+    if chance > 0:
+        return log(chance)
     # The first term of the tail's asymptotic series (DLMF 8.11.2).
     half, shape = chi2 / 2, dof / 2
     return (shape - 1) * log(half) - half - float(scipy.special.gammaln(shape))

@@ -6,7 +6,7 @@ import scipy.special
 from numpy.typing import NDArray
 
 from analysis.mismatch import phaselaw
-from analysis.mismatch.phaselaw import kept_rather_than_free, moving_on, there
+from analysis.mismatch.phaselaw import _of_free, _of_kept, kept_rather_than_free, moving_on, there
 
 Complex = NDArray[np.complex128]
 
@@ -31,7 +31,7 @@ def test_two_frames_are_told_as_their_difference_is(amplitude: float) -> None:
     around = 2 * np.pi * np.arange(400) / 400
     circle = np.exp(1j * around[:, np.newaxis]) - np.exp(1j * around)
     free = np.mean(np.exp(-(np.abs(difference - amplitude * circle) ** 2) / 2))
-    one, other = phaselaw._likelihoods(found, amplitude)
+    one, other = _of_kept(found, amplitude), _of_free(found, amplitude)
     assert one - other == pytest.approx(np.log(kept) - np.log(free), abs=0.01)
 
 
@@ -77,10 +77,23 @@ def test_of_many_frames_what_they_share_is_integrated_as_finely_as_it_is_known(
 ) -> None:
     rng = np.random.default_rng(10)
     found = 1.5 * rng.choice([-1, 1], frames) * np.exp(0.7j) + _noise(rng, frames)
-    one, other = phaselaw._likelihoods(found, 1.5)
+    one, other = _of_kept(found, 1.5), _of_free(found, 1.5)
     monkeypatch.setattr(phaselaw, "_STEP", 0.05)
-    fine, finer = phaselaw._likelihoods(found, 1.5)
+    fine, finer = _of_kept(found, 1.5), _of_free(found, 1.5)
     assert one.max() - other == pytest.approx(fine.max() - finer, abs=0.3)
+
+
+@pytest.mark.parametrize("frames", [255, 257, 1500])
+def test_any_number_of_frames_is_as_likely_as_their_cosh_says(frames: int) -> None:
+    rng = np.random.default_rng(frames)
+    found, a = _noise(rng, frames), 1.2
+    shared, squares = phaselaw._shared(found, a)
+    (own,) = _of_kept(found, a, (1.0 + 0.0j,))
+    along = 2 * a * (found[:, np.newaxis] - shared).real
+    cosh = np.logaddexp(along, -along) - np.log(2)
+    apart = (np.abs(found[:, np.newaxis] - shared) ** 2).sum(0) + frames * a**2
+    assert squares == pytest.approx(-apart, rel=1e-9)
+    assert own == pytest.approx(scipy.special.logsumexp(cosh.sum(0) - apart), rel=1e-9)
 
 
 @pytest.mark.parametrize("amplitude", [3.0, 10.0, 20.0, 100.0])

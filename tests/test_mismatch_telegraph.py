@@ -12,7 +12,7 @@ from scipy.stats import multivariate_normal
 
 from analysis.mismatch.layout import Layout, Taken
 from analysis.mismatch.phase import WholeFrames
-from analysis.mismatch.pixellaw import of_drifts, of_jumps, of_spikes, of_variances
+from analysis.mismatch.pixellaw import of_drifts, of_jumps, of_mixtures, of_spikes, of_variances
 from analysis.mismatch.telegraph import Telegraph, could_jump, telegraph
 from dsis.cfa import Cfa
 from dsis.effects.rts import Rts
@@ -76,6 +76,22 @@ def test_frames_that_drift_are_as_likely_as_their_covariance_says(
             for covariance in (noise * np.eye(FRAMES), noise * np.eye(FRAMES) + np.outer(way, way))
         )
         assert found[0, 0, k] == pytest.approx(own - plain, rel=1e-6, abs=1e-6)
+
+
+UNLIKELY = st.one_of(st.just(0.0), st.floats(0, 700).map(lambda x: float(np.exp(-x))))
+
+
+@given(st.lists(st.tuples(UNLIKELY, UNLIKELY), min_size=1, max_size=60), st.integers(0, 60))
+def test_products_of_likelihoods_are_sums_of_their_logarithms(
+    pixels: list[tuple[float, float]], noisy: int
+) -> None:
+    own, beside = np.array(pixels).T.copy()
+    weight = np.where(np.arange(len(pixels)) < noisy, 1.0, 7.5)
+    parts = np.array([1e-4, 0.3, 1.0])
+    out = np.empty((1, 3))
+    of_mixtures(own[np.newaxis], beside, weight, parts, out)
+    likely = np.maximum(beside + parts[:, np.newaxis] * (own - beside), 1e-300)
+    assert out[0] == pytest.approx(np.log(likely) @ weight, rel=1e-12, abs=1e-12)
 
 
 SHAPE, STACK = (72, 96), 8

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from functools import lru_cache
+from math import prod
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
@@ -14,7 +15,7 @@ from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, Stage
 from dsis.grid import PixelGrid
 
 _Traps = tuple[tuple[NDArray[np.intp], ...], NDArray[np.int64], NDArray[np.float64]]
-_MOST_KEPT = 1 << 18  # pixels of a field whose traps are kept
+_MOST_KEPT = 1 << 18  # deviates of a field whose traps are kept
 
 _ABOUT: Literal["about"] = "about"
 _DRAWN: Literal["exponential"] = "exponential"
@@ -72,8 +73,10 @@ class Rts(Effect):
         if not self.pixel_fraction:
             return image
         sensor, grid = exposure.sensor, exposure.grid
-        find = _kept_traps if grid.rows * grid.columns <= _MOST_KEPT else _traps
-        places, sites, heights = find(sensor, grid, self.pixel_fraction, exposure.threads)
+        if prod(grid.shape) <= _MOST_KEPT:
+            places, sites, heights = _kept_traps(sensor, grid, self.pixel_fraction)
+        else:
+            places, sites, heights = _traps(sensor, grid, self.pixel_fraction, exposure.threads)
         filled = exposure.temporal.chained(
             "rts states", sites, exposure.frame, self.switch_probability
         )
@@ -107,15 +110,23 @@ class Rts(Effect):
         }
 
 
-def _traps(sensor: Draw, grid: PixelGrid, share: float, threads: int) -> _Traps:
-    """Return where a field has traps, and exponential heights of mean 1: frames share them."""
+def _traps(sensor: Draw, grid: PixelGrid, share: float, threads: int = 1) -> _Traps:
+    """Return where a field has traps, and exponential heights of mean 1, read-only.
+
+    Frames share them.
+    """
     deviates = sensor.fixed("rts", grid, threads=threads)
     places = np.nonzero(deviates < ndtri(share))
     rows, columns = places[0] + grid.first_row, places[1] + grid.first_column
     channels = places[2] if grid.cfa is None else grid.channels()[rows % 2, columns % 2, 0]
     sites = np.stack([rows, columns, channels]).astype(np.int64)
     # Below the threshold the normal law's tail is uniform: it gives the height as well.
-    return places, sites, -np.log(ndtr(deviates[places].astype(np.float64)) / share)
+    heights = -np.log(ndtr(deviates[places].astype(np.float64)) / share)
+    for shared in (*places, sites, heights):
+        shared.flags.writeable = False
+    return places, sites, heights
 
 
-_kept_traps = lru_cache(maxsize=8)(_traps)
+@lru_cache(maxsize=4)
+def _kept_traps(sensor: Draw, grid: PixelGrid, share: float) -> _Traps:
+    return _traps(sensor, grid, share)

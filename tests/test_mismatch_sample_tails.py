@@ -94,3 +94,26 @@ def test_tails_of_noise_that_has_others_beside_it_are_not_denied(df: float, shar
     assert ring.denial(_student(df), share * READ) is None
     rows = _ring(rng.standard_normal(SHAPE) + rng.normal(0, 3.0, (SHAPE[0], SHAPE[1], 1)))
     assert rows.variance_dn2 == pytest.approx(READ, rel=0.05)  # rows are taken off
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_tails_of_both_sides_are_no_spikes(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    noise = rng.standard_t(8.0, SHAPE)
+    ring = _ring(noise)
+    denial = ring.even("impulse", frozenset())
+    assert denial is not None
+    assert "below" in denial.why
+    assert ring.even("heavy_tailed_read_noise", frozenset()) is None
+    assert ring.even("impulse", frozenset({"heavy_tailed_read_noise"})) is None
+    noise[rng.random(SHAPE) < 2e-4] += 15.0  # beside tails spikes are told by what is far above
+    assert _ring(noise).even("impulse", frozenset()) is None
+
+
+@pytest.mark.parametrize("height", [3.0, 8.0, 60.0])
+@pytest.mark.parametrize("share", [3e-5, 1e-3, 0.01])
+def test_spikes_of_normal_noise_are_on_one_side(height: float, share: float) -> None:
+    rng = np.random.default_rng(int(height))
+    hit = rng.random(SHAPE) < share
+    ring = _ring(rng.standard_normal(SHAPE) + hit * rng.exponential(height, SHAPE))
+    assert ring.even("impulse", frozenset()) is None

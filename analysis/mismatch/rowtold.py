@@ -86,8 +86,9 @@ def _of_frames(state: State, frames: WholeFrames, best: Ranked) -> Denial | None
     if kind in SHARED:
         return frames.sided.denial(kind)
     if kind in TAILS:
-        bursts = frames.bursts.denial(kind)
-        return bursts or frames.ring.denial(best.polished.effects[0], _read_dn2(state))
+        there = frozenset(own.kind for own in state.camera.effect)
+        few = frames.bursts.denial(kind) or frames.ring.even(kind, there)
+        return few or frames.ring.denial(best.polished.effects[0], _read_dn2(state))
     if kind not in OFFSETS or any(own.kind in LINES for own in state.camera.effect):
         return None
     lined = any("spectral_peak" in own.statistic for own in state.mismatches)

@@ -87,6 +87,8 @@ def _of_frames(state: State, frames: WholeFrames, best: Ranked) -> Denial | None
         return frames.sided.denial(kind)
     if kind in TAILS:
         there = frozenset(own.kind for own in state.camera.effect)
+        if frames.located is not None:
+            there |= {"rts"}  # that they jump is said for itself
         few = frames.bursts.denial(kind) or frames.ring.even(kind, there)
         return few or frames.ring.denial(best.polished.effects[0], _read_dn2(state))
     if kind not in OFFSETS or any(own.kind in LINES for own in state.camera.effect):

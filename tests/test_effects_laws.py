@@ -142,6 +142,18 @@ def test_rts_pixels_at_rest_are_as_any_other(levels: str, below: float) -> None:
     assert abs((middle < 0).mean() - below) <= Z_MAX * np.sqrt(below * (1 - below) / n)
 
 
+@pytest.mark.parametrize("heights", ["exponential", "equal"])
+def test_rts_pixels_of_a_large_field_are_drawn_as_those_of_a_small_one(
+    heights: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Traps are kept from frame to frame where a field is small, and found anew where it is not."""
+    one = effect("rts", pixel_fraction=0.1, amplitude_dn=9.0, levels="either", heights=heights)
+    kept = [apply(one, flat(0, 48), t) for t in range(3)]
+    monkeypatch.setattr("dsis.effects.rts._MOST_KEPT", 0)
+    for t, frame in enumerate(kept):
+        np.testing.assert_array_equal(apply(one, flat(0, 48), t), frame)
+
+
 def test_flicker_and_drift_move_whole_frames() -> None:
     light = np.array(
         [apply(effect("flicker", sigma_percent=2.0), flat(500, 2), t)[0, 0] for t in range(2000)]

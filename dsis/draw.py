@@ -50,6 +50,12 @@ def philox(c0: Any, c1: Any, c2: Any, c3: Any, k0: Any, k1: Any) -> Any:
 
 
 @inlined
+def unit(word: Any) -> Any:
+    """Return a 32-bit word as a deviate uniform on (0, 1)."""
+    return (np.float64(word) + 0.5) / 4294967296.0
+
+
+@inlined
 def log_of_uniform(word: Any) -> Any:
     """Return ln of (word/2 + 1/2) / 2^31: Cephes' logf on mantissa and exponent, error 1e-7."""
     x = np.float32(_I(word >> _ONE)) + _F(0.5)
@@ -159,8 +165,7 @@ def _scatter(
         a, b, _, _ = philox(
             np.uint64(column), np.uint64(row), frame, np.uint64(channel), key[0], key[1]
         )
-        out[0, i] = (np.float64(a) + 0.5) / 4294967296.0
-        out[1, i] = (np.float64(b) + 0.5) / 4294967296.0
+        out[0, i], out[1, i] = unit(a), unit(b)
 
 
 @kernel
@@ -179,8 +184,8 @@ def _chain(
                 np.uint64(column), np.uint64(row), np.uint64(back), np.uint64(channel),
                 key[0], key[1],
             )  # fmt: skip
-            if back == 0 or (np.float64(a) + 0.5) / 4294967296.0 < forgetting:
-                out[i] = (np.float64(b) + 0.5) / 4294967296.0 < 0.5
+            if back == 0 or unit(a) < forgetting:
+                out[i] = unit(b) < 0.5
                 break
 
 

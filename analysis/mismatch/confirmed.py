@@ -307,9 +307,9 @@ def _calls_left(search: Search, state: State, named: Named) -> bool:
 
     Of numbers that it changes: what darks differ by with time is no matter of a bend.
     """
-    off = _left_off(state, named)
-    if isinstance(off, bool):
-        return off
+    off, unseen = _left_off(state, named)
+    if unseen or not off:
+        return unseen
     null = state.null
     change = null.mean - state.predictor().mean(search.without(state, named))
     change = np.where(null.known & np.isfinite(change), change, 0.0) / null.sd
@@ -317,28 +317,33 @@ def _calls_left(search: Search, state: State, named: Named) -> bool:
     return bool((np.abs(both[off]) > _LITTLE * np.abs(state.departures[off])).any())
 
 
-def _left_off(state: State, named: Named) -> list[int] | bool:
-    """Return which numbers are off, of statistics left that call for an effect.
+def _left_off(state: State, named: Named) -> tuple[list[int], bool]:
+    """Return which numbers are off of statistics left that call for an effect.
 
-    False: none is left. True: one is that no number shows, or no simulation is to be asked.
+    And whether one is left that no number shows, or of which no simulation is to be asked.
     """
     if named.kind not in CANDIDATES:
-        return False
+        return [], False
     left = {m.statistic for m in state.mismatches}.intersection(CANDIDATES[named.kind].calls)
     if not left or named.proposal is None:
-        return bool(left)
+        return [], bool(left)
     keys = state.null.keys
     off = [int(i) for i in np.flatnonzero(state.chances < FAMILY) if keys[i].statistic in left]
-    # All frames show it, and no number of these does.
-    return True if left - {keys[i].statistic for i in off} else off
+    # All frames may show what no number of these does.
+    return off, bool(left - {keys[i].statistic for i in off})
 
 
 def _simulated(search: Search, state: State) -> None:
     """Simulate side by side what `small` asks for one by one."""
-    asked = [one for one in search.named if one.effect is not None and one.effect.draws]
-    off = [one for one in asked if not isinstance(_left_off(state, one), bool)]
-    if len(off) > 1:
-        state.predictor().ready(search.without(state, one) for one in off)
+
+    def asked(one: Named) -> bool:
+        off, unseen = _left_off(state, one)
+        return bool(off) and not unseen
+
+    drawn = [one for one in search.named if one.effect is not None and one.effect.draws]
+    some = [one for one in drawn if asked(one)]
+    if len(some) > 1:
+        state.predictor().ready(search.without(state, one) for one in some)
 
 
 def _foretold(search: Search, named: Named, without: Camera, trial: Trial, told: Gained) -> Gained:

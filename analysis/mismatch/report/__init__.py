@@ -147,14 +147,14 @@ def _differences(finding: Finding) -> list[Difference]:
 
 def _difference(some: Sequence[Mismatch], explained: str) -> Difference:
     first = some[0]
-    after = [abs(m.z_after) for m in some if not np.isnan(m.z_after)]
+    after = [m.z_after for m in some if not np.isnan(m.z_after)]
     statistics = {m.statistic for m in some}
     words = first.statistic if len(statistics) == 1 else parted(first.statistic)[0]
     return Difference(
         statistic_words(words),
         place(first.where),
         first.z,
-        max(after, default=float("nan")),
+        max(after, key=abs, default=float("nan")),
         explained,
         first.says,
         len(some),

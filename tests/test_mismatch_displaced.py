@@ -84,6 +84,7 @@ def _state(
         setting=SimpleNamespace(
             seen=SimpleNamespace(levels=levels, images={}, lines={}, surfaces={}),
             layout=SimpleNamespace(uniform=uniform, channels=("MONO",)),
+            noisy_rows=lambda: -np.inf,
         ),
         vector=SimpleNamespace(keys=tuple(keys), values=np.array(found)),
         null=SimpleNamespace(
@@ -248,6 +249,8 @@ def test_rows_that_are_alike_are_no_white_noise_of_rows(length: float) -> None:
     denial = displaced(state, "row_noise", _none(state))
     assert denial is not None
     assert denial.share < 0.25
+    state.setting.noisy_rows = lambda: 4.0  # nats, by which frames show it besides
+    assert displaced(state, "row_noise", _none(state)) is None
 
 
 def test_a_half_that_moves_is_no_white_noise_of_rows() -> None:

@@ -43,7 +43,7 @@ def test_a_stand_in_is_not_claimed_for_two_that_frames_show_alike(
         alike = [one for one in found if any(one.mean @ other > 1 for other in apart)]
         return [one for one in found if one.kind in kinds and one not in alike][:1]
 
-    def denied(_state: Any, _lines: Any, best: Any, _others: Any) -> Denial | None:
+    def denied(_state: Any, _lines: Any, best: Any, *_: Any) -> Denial | None:
         return Denial(0.0, why) if best.kind == "row_banding" else None
 
     monkeypatch.setattr(choice, "ranked", ranked)

@@ -8,10 +8,13 @@ import numpy as np
 import pytest
 from scipy.linalg import toeplitz
 
+from analysis.mismatch.named import Named
 from analysis.mismatch.rank import LEAST_GAIN, TOLD_APART, Ranked
-from analysis.mismatch.rowlaw import RowLaw, bands, beside, constant_of, fitted, pink, waves_of
+from analysis.mismatch.rowlaw import bands, beside, constant_of, fitted, pink, waves_of
+from analysis.mismatch.rowodds import RowLaw
 from analysis.mismatch.rowpower import SLOW, Powers, Size, powers_of, without_lines
-from analysis.mismatch.rowtold import as_shown, unlike_frames
+from analysis.mismatch.rowtold import as_shown, beside_undecided, unlike_frames
+from exposing import effect
 
 SURE = 5.0  # standard errors
 ROWS, COLUMNS, FRAMES = 64, 96, 8
@@ -155,6 +158,29 @@ def test_sizes_beside_row_noise_are_those_that_were_drawn() -> None:
     assert 0.6 < np.std(off, ddof=1) < 1.4
 
 
+@pytest.mark.parametrize("cause", [_pink, _bands(7.0)])
+def test_noise_of_single_rows_is_told_with_its_size_whatever_it_is_beside(cause: Rows) -> None:
+    """Odds of 20 for what is not there are wrong in one of 20 at most."""
+    rng, wrong, sizes = np.random.default_rng(31), 0, []
+    for _ in range(5):
+        law = RowLaw(SIZE, _powers(cause, 0.1, rng, rows=0.2))
+        assert law.beside_either("row_noise", NOTHING) > TOLD_APART
+        sizes.append(law.size_besides("row_noise", NOTHING))
+        alone = RowLaw(SIZE, _powers(cause, 0.2, rng))
+        wrong += alone.beside_either("row_noise", NOTHING) > TOLD_APART
+    assert wrong <= 1
+    known = [own for own in sizes if own is not None]
+    assert len(known) == len(sizes)
+    error = np.std(known, ddof=1) / np.sqrt(len(known))
+    assert abs(np.mean(known) - 0.2) < 4 * error
+
+
+def test_of_frames_that_tell_nothing_no_row_has_noise_of_its_own() -> None:
+    law = RowLaw(SIZE, [])
+    assert law.beside_either("row_noise", NOTHING) == -np.inf
+    assert law.size_besides("row_noise", NOTHING) is None
+
+
 def test_of_rows_that_neither_makes_nothing_is_told() -> None:
     """Rows that tilt each by itself: neither bands nor 1/f noise do that, and keep no level."""
 
@@ -165,6 +191,7 @@ def test_of_rows_that_neither_makes_nothing_is_told() -> None:
     law = RowLaw(SIZE, _powers(tilted, 0.5, np.random.default_rng(12)))
     assert law.odds("pink_noise", "row_banding", NOTHING) is None
     assert law.odds("row_banding", "pink_noise", NOTHING) is None
+    assert law.beside_either("row_noise", NOTHING) == -np.inf
 
 
 @pytest.mark.parametrize(
@@ -222,9 +249,10 @@ def _ranked(kind: str, gain: float, *mean: float) -> Ranked:
     return Ranked(gain, kind, proposal, polished)
 
 
-def _state(*there: str) -> Any:
+def _state(*there: str, noisy_rows: float = -np.inf) -> Any:
     null = Stub(mean=np.zeros(2), sd=np.ones(2), known=np.ones(2, bool))
-    return Stub(null=null, camera=Stub(effect=[Stub(kind=kind) for kind in there]))
+    setting = Stub(noisy_rows=lambda: noisy_rows)
+    return Stub(null=null, setting=setting, camera=Stub(effect=[Stub(kind=k) for k in there]))
 
 
 def _frames(odds: float) -> Any:
@@ -266,3 +294,28 @@ def test_what_another_is_as_likely_as_that_was_not_fitted_is_denied() -> None:
     assert unlike_frames(state, _frames(-4.0), best, OTHERS) is None
     assert unlike_frames(_state("pink_noise"), _frames(9.0), best, OTHERS) is None
     assert unlike_frames(state, _frames(9.0), OTHERS[0], []) is None
+
+
+def test_noise_of_single_rows_comes_first_where_frames_show_it_with_either() -> None:
+    best, other = BOTH
+
+    def denied(odds: float, left: set[str], *there: str) -> bool:
+        state = _state(*there, noisy_rows=4.0)
+        return unlike_frames(state, _frames(odds), best, [*OTHERS, other], left) is not None
+
+    assert denied(0.0, {"row_noise"})
+    assert not denied(0.0, set())  # no word for it, or it was denied
+    assert not denied(0.0, {"row_noise"}, "row_noise")  # the user's own
+    assert not denied(-4.0, {"row_noise"})  # what it is beside is told
+    sure = unlike_frames(_state(noisy_rows=2.0), _frames(0.0), best, [other], {"row_noise"})
+    assert sure is None
+
+
+def test_a_size_beside_what_is_undecided_may_hold_a_part_of_it() -> None:
+    proposal: Any = Stub(effect=effect("row_noise", sigma_dn=5.0))
+    named = Named("row_noise", proposal, {"sigma_dn": 0.3}, 40.0, ())
+    wide = beside_undecided(named, [tuple(BOTH)], lambda: 4.6)
+    assert wide.errors == {"sigma_dn": pytest.approx(0.5)}
+    assert beside_undecided(named, [tuple(BOTH)], lambda: None) is named
+    assert beside_undecided(named, [(BOTH[0], OTHERS[0])], lambda: 4.6) is named
+    assert beside_undecided(named, [], lambda: 4.6) is named

@@ -137,6 +137,18 @@ def test_memory_and_lag_return_noise(base: Case) -> None:
     assert abs(step / expected - 1) < FIVE_SIGMA * np.sqrt(4 / z.size)
 
 
+def test_memory_carries_over_noise_and_no_error_of_an_amplifier(base: Case) -> None:
+    """The first samples of a line, which have none before them, lie where all others do."""
+    case = planted(base, "readout_memory", fraction=0.2, lag_pixels=3, along="columns")
+    case = planted(case, "tap_mismatch", gain_percent=20.0, regions="even_odd_columns")
+    frames = stack(case, len(case.exposures) - 1).astype(float)
+    first, others = frames[:, :3].mean(1), frames[:, 3:].mean(1)
+    error = np.hypot(first.std(0, ddof=1), others.std(0, ddof=1)) / np.sqrt(len(frames))
+    off = (first - others).mean(0) / error
+    for amplifier in (off[::2], off[1::2]):
+        assert abs(amplifier.mean()) < FIVE_SIGMA / np.sqrt(amplifier.size)
+
+
 def test_tails_skew_and_spread_have_their_moments() -> None:
     case = draw_case(5, Layout(240, 240, 2, 8, 8), replace(PLAIN, electrons=400.0))
     tails = residuals(planted(case, "heavy_tailed_read_noise", tail_df=12.0), 0)

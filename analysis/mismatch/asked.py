@@ -11,7 +11,7 @@ from analysis.mismatch.paired import Pairs, pairs_of
 from analysis.mismatch.projections import FramesOf
 from analysis.mismatch.rank import TOLD_APART
 from analysis.mismatch.repeated import Repeated, repeats_of
-from analysis.mismatch.rowlaw import RowLaw
+from analysis.mismatch.rowodds import RowLaw
 from analysis.mismatch.rowpower import Size, row_powers
 from analysis.mismatch.sampletails import Ring, ring_of
 from analysis.mismatch.sidedneighbours import Sided, sided

@@ -232,7 +232,8 @@ class Choice(Fitted):
             best, *others = fitted
             predictor = state.predictor(replicates_for(self.setting, [best.proposal.effect]))
             denial = refuted(state, predictor, best.kind, best.polished, self._left())
-            denial = denial or unlike_frames(state, self.lines, best, others)
+            left = self._left() - self.doubted.keys()
+            denial = denial or unlike_frames(state, self.lines, best, others, left)
             if (denial := denial or displaced(state, best.kind, best.polished.mean)) is None:
                 break
             fitted = others

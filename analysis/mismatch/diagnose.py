@@ -35,6 +35,7 @@ from analysis.mismatch.phase import WholeFrames
 from analysis.mismatch.pictures import Album, evidence_of
 from analysis.mismatch.recalibrate import Calibrated
 from analysis.mismatch.remarks import remark_on_sizes, remarks_on
+from analysis.mismatch.rowtold import SINGLE_ROWS, beside_undecided
 from analysis.mismatch.segments import as_settled, second_path
 from analysis.mismatch.settle import would_settle
 from analysis.mismatch.source import Source
@@ -125,7 +126,12 @@ def _found(
     trial = Trial.of(recording, split, source, setting)
     # Of a large recording lines are looked for, and measured, in the same frames.
     frames = WholeFrames(with_all_frames(layout) if large else layout, frames_of, how[1])
-    setting = replace(setting, jumping=_jumping(camera, trial.lines, frames))
+    lines = frames if large else trial.lines
+    setting = replace(
+        setting,
+        jumping=_jumping(camera, trial.lines, frames),
+        noisy_rows=partial(_noisy_rows, camera, lines),
+    )
     whole = State.of(setting if large else _of_all_frames(setting, trial), camera, step)
     if not (words and whole.mismatches):
         search = Search(setting, camera, whole, words, step)
@@ -147,7 +153,7 @@ def _found(
         words,
         step,
         whole=None if large else whole.setting,
-        lines=frames if large else trial.lines,
+        lines=lines,
         measuring=frames,
     )
     final = _searched(search, source) if large else search.run()
@@ -172,6 +178,7 @@ def _found(
         final = whole if everything is None else everything
         departures = Change(len(whole.mismatches), len(final.mismatches))
         proof = replace(proof, discrepancies=departures)
+    search.named = [_beside_undecided(search, one, lines, final.camera) for one in search.named]
     found = with_first_frames(_finding(camera, whole, final, search, gains, proof, known), first)
     found = with_spikes(found, spikes, stored, split, asked)
     return _said(found, remarks, evidence, asked)
@@ -218,6 +225,20 @@ def _jumping(camera: Camera, lines: WholeFrames, measuring: WholeFrames) -> Jump
         return None
     found = lines.located
     return None if found is None else replace(found, effect=measuring.jumps)
+
+
+def _noisy_rows(camera: Camera, lines: WholeFrames) -> float:
+    """Return by how much likelier frames are with noise of single rows beside bands of any law."""
+    return lines.rows.beside_either(SINGLE_ROWS, frozenset(own.kind for own in camera.effect))
+
+
+def _beside_undecided(search: Search, named: Named, lines: WholeFrames, camera: Camera) -> Named:
+    """Return an effect with an error that allows for what is undecided; see `beside_undecided`."""
+
+    def size_dn() -> float | None:
+        return lines.rows.size_besides(named.kind, frozenset(own.kind for own in camera.effect))
+
+    return beside_undecided(named, search.ties, size_dn)
 
 
 def _calibrated_to(setting: Setting, whole: State, camera: Camera) -> Calibrated:

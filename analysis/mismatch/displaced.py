@@ -26,6 +26,7 @@ from analysis.mismatch.leftopen import left_open
 from analysis.mismatch.leftout import left_out
 from analysis.mismatch.movinglines import LINES, moving_lines
 from analysis.mismatch.otherlags import other_lags
+from analysis.mismatch.rank import TOLD_APART
 from analysis.mismatch.recalibrate import code_step
 from analysis.mismatch.resolved import FAR_OFF
 from analysis.mismatch.sharing import shared_otherwise
@@ -255,7 +256,7 @@ def _of_alike_rows(state: State) -> Denial | None:
 
     Correlations that fall as any mixture of exponentials are log-convex: at lag 0 they have r1^2 /
     r2 at least, of lags 1 and 2. Where that is half of what is not noise of single pixels, there
-    may be no more.
+    may be no more; unless whole frames show it besides.
     """
     if all(m.statistic != "row_correlation" for m in state.mismatches):
         return None
@@ -273,7 +274,7 @@ def _of_alike_rows(state: State) -> Denial | None:
     if not shares:
         return None
     alike, whole = min(max(shares), 1.0), _beyond_pixels(state)
-    if whole <= 0 or alike < _MOST * whole:
+    if whole <= 0 or alike < _MOST * whole or state.setting.noisy_rows() > TOLD_APART:
         return None
     return Denial(
         max(1 - alike / whole, 0.0), "rows are alike for another reason, and differ by as much"

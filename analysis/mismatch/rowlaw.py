@@ -9,27 +9,20 @@ frames so large (Sykulski et al., Biometrika 106, 2019).
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import lru_cache
-from itertools import combinations
-from math import log
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 from scipy.linalg import toeplitz
-from scipy.special import digamma, logsumexp, polygamma
+from scipy.special import digamma, polygamma
 
 from analysis.mismatch.rowpower import SLOW, Powers, Size, down
 
 Array = NDArray[np.float64]
 _STEPS, _HALVES = 30, 10
 _ENOUGH = 1e-4  # nats
-_UNLIKE = 5.0  # standard deviations of the misfit: what is farther off, no cause here makes
-_LENGTHS = 24  # of bands, in equal ratios
-_SHORTEST, _LONGEST = 0.72, 1 / 4  # rows, and of the frame's
-BESIDE = frozenset({"row_noise", "black_level_drift", "flicker"})
-"""What may move rows or frames besides."""
 
 
 @dataclass(frozen=True)
@@ -290,80 +283,3 @@ def _scored(parts: Sequence[_Part], found: Array) -> tuple[float, Array]:
         if gained < _ENOUGH:
             break
     return value, found
-
-
-@dataclass(frozen=True)
-class RowLaw:
-    """What whole frames say of the causes that make rows alike.
-
-    Attributes
-    ----------
-    size
-        Of the frames.
-    powers
-        Of each exposure.
-    """
-
-    size: Size
-    powers: Sequence[Powers]
-    _found: dict[str, list[list["_Beside"]]] = field(default_factory=dict)
-
-    def odds(self, kind: str, other: str, known: frozenset[str]) -> float | None:
-        """Return by how much one cause is likelier than another, nats; None: nothing tells.
-
-        Of what neither makes, no likelihood tells which of them is there.
-
-        Parameters
-        ----------
-        kind, other
-            `row_banding` and `pink_noise`.
-        known
-            Effects of `BESIDE` that are there.
-        """
-        if not self.powers:
-            return None
-        (one, off), (two, farther) = self._evidence(kind, known), self._evidence(other, known)
-        return None if (off if one > two else farther) > _UNLIKE else one - two
-
-    def _evidence(self, kind: str, known: frozenset[str]) -> tuple[float, float]:
-        """Return the log-likelihood of a cause, and by how much powers are off it.
-
-        Of bands the mean over all lengths, alike likely before, and the misfit of the best.
-
-        Their variances cost both the same. What may be there besides, and is not known, costs half
-        of the logarithm of how many numbers show it (Schwarz, 1978).
-        """
-        if kind not in self._found:
-            self._found[kind] = [self._fitted(own) for own in self._causes(kind)]
-        each = [self._best(own, known) for own in self._found[kind]]
-        loglik = float(logsumexp([one for one, _ in each])) - log(len(each))
-        return loglik, max(each)[1]
-
-    def _causes(self, kind: str) -> list[Cause]:
-        """Return a cause of each length it may have."""
-        if kind == "pink_noise":
-            return [pink(self.size)]
-        lengths = np.geomspace(_SHORTEST, _LONGEST * self.size.rows, _LENGTHS)
-        return [bands(self.size, float(length)) for length in lengths]
-
-    def _fitted(self, own: Cause) -> list["_Beside"]:
-        """Return the fits of a cause beside whatever else may be there."""
-        causes, found = beside(self.size), []
-        for count in range(len(causes) + 1):
-            for kinds in combinations(causes, count):
-                fit = fitted(self.powers, self.size, [own, *(causes[kind] for kind in kinds)])
-                found += [] if fit is None else [(kinds, fit)]
-        return found
-
-    def _best(self, fits: list["_Beside"], known: frozenset[str]) -> tuple[float, float]:
-        frames = sum(own.frames for own in self.powers)
-        numbers = dict.fromkeys(BESIDE, frames) | {"row_noise": frames * (self.size.rows - 1)}
-        best = (-np.inf, np.inf)
-        for kinds, fit in fits:
-            cost = sum(log(numbers[kind]) / 2 for kind in kinds if kind not in known)
-            best = max(best, (fit.loglik - cost, fit.off))
-        return best
-
-
-_Beside = tuple[tuple[str, ...], Fit]
-"""What else is there beside a cause, and the fit of all."""

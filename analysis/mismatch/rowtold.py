@@ -1,9 +1,9 @@
 """Bands of rows and 1/f noise: which of them is claimed, as whole frames tell them apart."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Container, Iterable, Sequence
 from dataclasses import replace
 from functools import partial
-from math import isfinite
+from math import hypot, isfinite
 
 from analysis.mismatch.burst import TAILS
 from analysis.mismatch.contradicted import Denial, rival
@@ -11,20 +11,25 @@ from analysis.mismatch.forms import OTHER_LEVELS
 from analysis.mismatch.instance import LINES
 from analysis.mismatch.jumptold import PIXELS, as_pixels_show, unlike_pixels
 from analysis.mismatch.mapped import as_maps_show
+from analysis.mismatch.named import Named
 from analysis.mismatch.nofield import no_field
 from analysis.mismatch.paired import STEADY
 from analysis.mismatch.phase import WholeFrames
 from analysis.mismatch.polish import with_effects
 from analysis.mismatch.rank import LEAST_GAIN, TOLD_APART, Ranked, alike, replicates_for
 from analysis.mismatch.repeated import OFFSETS
+from analysis.mismatch.segments import Path
 from analysis.mismatch.sidedneighbours import SHARED
 from analysis.mismatch.state import State
 from dsis.effects import Effect
 from dsis.effects.pink_noise import PinkNoise
+from dsis.effects.row_noise import RowNoise
 from dsis.effects.rts import Rts
 
 _OTHER = {"pink_noise": "row_banding", "row_banding": "pink_noise"}
 AS_WELL = "whole frames may as well show"
+SINGLE_ROWS = "row_noise"
+_COMES_FIRST = "noise of single rows comes first, which is there with either of bands and 1/f noise"
 _WORDS = {"pink_noise": "1/f noise", "row_banding": "bands of rows"}
 
 
@@ -56,12 +61,16 @@ def as_shown(state: State, frames: WholeFrames | None, fitted: Sequence[Ranked])
 
 
 def unlike_frames(
-    state: State, frames: WholeFrames | None, best: Ranked, others: Sequence[Ranked]
+    state: State,
+    frames: WholeFrames | None,
+    best: Ranked,
+    others: Sequence[Ranked],
+    left: Container[str] = (),
 ) -> Denial | None:
     """Return how whole frames, pixels, or the gain's map deny the best of ranked effects.
 
     None: they do not. Frames do where the other of both, which was not fitted or has no word, is as
-    likely.
+    likely; and where neither is told, but noise of single rows is, as long as it is `left`.
     """
     if frames is not None and (denial := _of_frames(state, frames, best)) is not None:
         return denial
@@ -70,9 +79,36 @@ def unlike_frames(
     if (denial := no_field(state, best.polished.effects[0])) is not None:
         return denial
     odds = _odds(state, frames, best)
-    if odds is None or odds > TOLD_APART or _any(others, _OTHER[best.kind]):
+    if odds is None or odds > TOLD_APART:
         return None
-    return rival(-odds, f"{AS_WELL} {_WORDS[_OTHER[best.kind]]}")
+    if odds > -TOLD_APART and SINGLE_ROWS in left and _noisy_rows(state):
+        return Denial(1 / 2, _COMES_FIRST)
+    other = _OTHER[best.kind]
+    return None if _any(others, other) else rival(-odds, f"{AS_WELL} {_WORDS[other]}")
+
+
+def _noisy_rows(state: State) -> bool:
+    """Return whether frames show noise of single rows besides, which the camera has not yet."""
+    there = any(own.kind == SINGLE_ROWS for own in state.camera.effect)
+    return not there and state.setting.noisy_rows() > TOLD_APART
+
+
+def beside_undecided(
+    named: Named, ties: Iterable[tuple[Ranked | Path, ...]], size_dn: Callable[[], float | None]
+) -> Named:
+    """Return noise of single rows with an error that allows for what else makes rows differ.
+
+    Where bands and 1/f noise tie neither is taken in, and the size of what is has a part of theirs.
+    `size_dn` is what frames say it has beside either.
+    """
+    tied = any({one.kind for one in pair} == _OTHER.keys() for pair in ties)
+    if not tied or named.kind != SINGLE_ROWS or not isinstance(named.effect, RowNoise):
+        return named
+    own = size_dn()
+    if own is None or "sigma_dn" not in named.errors:
+        return named
+    error = hypot(named.errors["sigma_dn"], named.effect.sigma_dn - own)
+    return replace(named, errors={**named.errors, "sigma_dn": error})
 
 
 def _of_frames(state: State, frames: WholeFrames, best: Ranked) -> Denial | None:

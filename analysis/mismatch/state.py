@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
+from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,6 +56,9 @@ class Setting:
         Whether all frames will be asked what these leave undecided.
     jumping
         Pixels that jump, as all frames show them; None: they do not.
+    noisy_rows
+        By how much likelier all frames are with noise of single rows than without, whichever of
+        bands and 1/f noise is beside it: nats.
     """
 
     layout: Layout
@@ -71,6 +75,7 @@ class Setting:
     given: int = 0
     asked_again: bool = False
     jumping: Jumping | None = None
+    noisy_rows: Callable[[], float] = lambda: -inf
 
     @classmethod
     def of(

@@ -43,10 +43,16 @@ def frame_codes(case: Case, exposure: int, frame: int) -> np.ndarray:
         _, before = _collected(View(case, exposure, frame - 1))
         charge = (1 - lag["fraction"]) * charge + lag["fraction"] * before
         charge = charge.astype(np.float32)
-    signal = _through(AMPLIFIERS, _through(WELLS, charge, view), view)
+    signal = _amplified(charge, view)
     signal = _through(OFFSETS, _through(PIXELS, read(signal, view), view), view)
-    signal = _through(AFTER, _through(MEMORY, signal, view), view)
+    # What is noise to a memory is beyond what wells and amplifiers make of the expected charge.
+    steady = replace(view, expected=_amplified(view.expected, view))
+    signal = _through(AFTER, _through(MEMORY, signal, steady), view)
     return converted(signal, view)
+
+
+def _amplified(charge: Image, view: View) -> Image:
+    return _through(AMPLIFIERS, _through(WELLS, charge, view), view)
 
 
 def stack(case: Case, exposure: int) -> np.ndarray:

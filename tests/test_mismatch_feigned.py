@@ -237,6 +237,26 @@ def test_what_neighbours_have_in_common_is_no_pattern_of_single_pixels(
     assert coloured(state, "prnu") is None
 
 
+@pytest.mark.parametrize(("pattern", "denied"), [(0.25, True), (0.75, False)])
+@pytest.mark.parametrize("left", ["fixed_patch_variance", "fixed_spectral_peak"])
+def test_beside_alike_neighbours_single_pixels_must_be_seen_by_themselves(
+    pattern: float, denied: bool, left: str
+) -> None:
+    """Of a sixteenth of the noise's variance the median bin says nothing for certain."""
+    rng, found = np.random.default_rng(9), []
+    for _ in range(20):
+        image = np.hypot(1, pattern) * rng.normal(0, 1, (48, 64))
+        state: Any = SimpleNamespace(
+            setting=SimpleNamespace(
+                seen=SimpleNamespace(images={("MONO", "offset"): (image, 1.0)})
+            ),
+            mismatches=[SimpleNamespace(statistic=left)],
+        )
+        found.append(coloured(state, "dsnu") is not None)
+    assert (sum(found) > 15) == (denied and left == "fixed_patch_variance")
+    assert denied or not any(found)
+
+
 def test_a_map_that_is_noise_but_for_few_pixels_denies_nothing_by_chance() -> None:
     """Its variance beyond noise is a hundredth: the median bin is known no better than that."""
     rng, denied = np.random.default_rng(6), 0

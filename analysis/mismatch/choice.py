@@ -1,6 +1,7 @@
 """What a search takes in next: the effect that explains most, if any may be claimed."""
 
 from dataclasses import dataclass, field, replace
+from functools import cache, partial
 from math import log
 
 import numpy as np
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 from analysis.mismatch.bothneeded import both_needed
 from analysis.mismatch.candidates import CANDIDATES, measured
 from analysis.mismatch.clues import NO_LINE
-from analysis.mismatch.codegain import gain_by_codes
+from analysis.mismatch.codegain import gain_by_codes, of_electrons
 from analysis.mismatch.contradicted import refuted
 from analysis.mismatch.credited import joined
 from analysis.mismatch.displaced import displaced
@@ -37,6 +38,7 @@ from analysis.mismatch.state import State
 from analysis.mismatch.ties import akin, bends_as_well, by_numbers, plainest, ties, twin
 from dsis.camera import Camera
 from dsis.effects import Effect
+from dsis.effects.adc_dnl import AdcDnl
 from dsis.effects.rts import Rts
 
 Array = NDArray[np.float64]
@@ -182,12 +184,17 @@ class Choice(Fitted):
         worse. What is taken in besides may decide: they are tried again in the next round.
         """
         self.ties, self.doubted, self.apart, self.second = [], {}, [], None
+        counted = cache(partial(of_electrons, state))
+
+        def shown(effect: Effect) -> float:
+            return -np.inf if isinstance(effect, AdcDnl) and counted() else self._shown(effect)
+
         while True:
             apart = [*self.apart, *(one.mean for pair in self.ties for one in pair)]
             settled = tuple(self.settled)
             left = self._left() - self.doubted.keys() - akin(self.ties)
             fitted = ranked(
-                state, left, self.memory, self.step, settled, apart, self._possible, self._shown
+                state, left, self.memory, self.step, settled, apart, self._possible, shown
             )
             if len(self.settled) > len(settled):
                 continue  # a line was refused: behind it another may be

@@ -1,18 +1,27 @@
 """What histograms of codes gain by uneven widths that are in step with powers of two."""
 
 from math import inf, isfinite
+from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.mismatch.bank.codephase import DETAIL, LABEL
 from analysis.mismatch.bank.sawtooth import PERIODS, explained
+from analysis.mismatch.candidates import CANDIDATES
+from analysis.mismatch.polish import with_effects
 from analysis.mismatch.state import Setting, State
+from dsis.camera import Camera
 from dsis.effects import Effect
 from dsis.effects.adc_dnl import AdcDnl
 from dsis.effects.adc_memory import AdcMemory
+from dsis.effects.poisson_shot_noise import PoissonShotNoise
 
+Array = NDArray[np.float64]
+_COUNTED: Literal["poisson_shot_noise"] = "poisson_shot_noise"
 _OF_DIFFERENCES = 2 / 3  # of many frames: successive ones share a frame
 _CHANCE = 2.0  # standard deviations
+_MOST = 0.5  # of a score that others may make
 _PAID = 2.0  # nats: for the size, and for the period that is the best of six
 
 
@@ -43,13 +52,40 @@ def gain_of_codes(setting: Setting, effect: Effect) -> float:
 def in_step_already(state: State, effect: Effect) -> bool:
     """Return whether a state's model has codes as much in step as the recording, within chance.
 
-    Electrons of whole codes, or of as many as a power of two, are. False of any effect but widths.
+    Electrons of whole codes, or of as many as a power of two, are. Of others it hangs on where
+    levels lie to less than an electron: half of what is seen is theirs as well. False of any
+    effect but widths.
     """
     if not isinstance(effect, AdcDnl):
         return False
     own = np.array([key.detail == DETAIL for key in state.vector.keys]) & state.null.known
     left = (state.vector.values - state.null.mean)[own] / state.null.sd[own]
-    return bool(own.any() and (left < _CHANCE).all())
+    within = bool(own.any() and (left < _CHANCE).all())
+    return within or (_counts(state.camera) and _of_half(state, state.null.mean))
+
+
+def of_electrons(state: State) -> bool:
+    """Return whether electrons that are counted make codes in step, or would: half of it or more.
+
+    Of a camera that does not count them this is asked where skewness differs, which calls for it.
+    """
+    if _counts(state.camera):
+        return _of_half(state, state.null.mean)
+    if {m.statistic for m in state.mismatches}.isdisjoint(CANDIDATES[_COUNTED].calls):
+        return False
+    camera = with_effects(state.camera, [PoissonShotNoise(kind=_COUNTED)])
+    return camera is not None and _of_half(state, state.predictor().mean(camera))
+
+
+def _counts(camera: Camera) -> bool:
+    counted = any(own.kind == _COUNTED for own in camera.effect)
+    return counted or camera.noise.shot == "poisson"
+
+
+def _of_half(state: State, mean: Array) -> bool:
+    """Return whether numbers that are predicted are in step by half of what is seen, or more."""
+    own = np.array([key.detail == DETAIL for key in state.vector.keys]) & state.null.known
+    return bool(own.any() and (mean[own] >= _MOST * state.vector.values[own]).all())
 
 
 def gain_of_residue(setting: Setting, effect: Effect) -> float:

@@ -48,6 +48,7 @@ _MAPS = {
     "prnu": ("gain", "gain alone"),
     "hot_pixels": ("time", "time alone"),
 }
+_OF_ALL = frozenset({"dsnu", "prnu"})
 _AXES = {"row_fpn": "rows", "column_fpn": "columns", "row_prnu": "rows", "column_prnu": "columns"}
 _GROWING = frozenset({"row_prnu", "column_prnu"})
 _CLEAR = 5.0  # standard errors of what stands out
@@ -323,7 +324,8 @@ def coloured(state: State, kind: str) -> Denial | None:
     Where a wave is left unexplained, or that neighbours are alike, and half of the map's variance
     beyond noise, lines and smooth surfaces is of few frequencies, all pixels may be alike but for
     it: the median bin knows of the many. By chance it differs from the mean of all bins by what its
-    own error is beyond theirs.
+    own error is beyond theirs. Nor is it certain that all differ, where neighbours are alike and
+    the median bin does not say so.
     """
     called = {m.statistic for m in state.mismatches} & {FIXED_WAVE, *_NEIGHBOURS}
     if kind not in _MAPS or not called:
@@ -334,8 +336,11 @@ def coloured(state: State, kind: str) -> Denial | None:
         power = np.abs(np.fft.rfft2(part.pixels)[1:, 1:-1]) ** 2 / image.size
         plain += part.square - 1
         most += white_level(power, 1) - 1
-        square += 2 / image.size * (1 / log(2) ** 2 - 1)
-    if plain <= 0 or most >= _MOST * plain or plain - most < _SURE * square**0.5:
+        square += 2 / image.size
+    error, beyond = square**0.5 / log(2), (square * (1 / log(2) ** 2 - 1)) ** 0.5
+    few = most < _MOST * plain and plain - most >= _SURE * beyond
+    unsure = most < _SURE * error and kind in _OF_ALL and not called.isdisjoint(_NEIGHBOURS)
+    if plain <= 0 or not (few or unsure):
         return None
     why = "a wave that stands still makes" if FIXED_WAVE in called else "neighbours have in common"
     return Denial(max(most / plain, 0.0), f"{why} most of what it would explain")

@@ -185,12 +185,15 @@ def middle_of_gamma(degrees: float) -> float:
 
 
 def _largest(channel: Channel, frames: int) -> Number:
-    """Return the normal score of the largest pixel variance, chi-squared in white noise."""
-    if frames < 3:
+    """Return the normal score of the largest pixel variance, chi-squared in white noise.
+
+    Unknown where half of the pixels have one code in all frames: that is no such noise.
+    """
+    middle = median(channel.variance_map)
+    if frames < 3 or not middle > 0:
         return UNKNOWN
     dof = frames - 1
-    ratio = float(channel.variance_map.max()) / median(channel.variance_map)
-    largest = ratio * 2 * middle_of_gamma(dof / 2)
+    largest = float(channel.variance_map.max()) / middle * 2 * middle_of_gamma(dof / 2)
     single = float(scipy.special.gammaincc(dof / 2, largest / 2))
     chance = -np.expm1(channel.variance_map.size * np.log1p(-min(single, 0.5)))
     return normal_score(float(chance)), 1.0

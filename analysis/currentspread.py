@@ -88,7 +88,9 @@ class _Pixels:
         own = hypot(noise, scatter, more)
         seen = Binned.of((rest - np.median(rest))[~out], own)
         stray = _stray(seen.values, float(np.abs(seen.values).max()))
-        return cls(seen, Body(mean / own, 0.0, shot * (noise / own) ** 2), stray)
+        # Codes may hide noise: what is left of it has no more than all from dark current.
+        share = min(shot * (noise / own) ** 2, 1.0)
+        return cls(seen, Body(mean / own, 0.0, share), stray)
 
     def of_mean(self, mean: float) -> "_Pixels":
         """Return the pixels where those that are not hot have another mean, in noises."""

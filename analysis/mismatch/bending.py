@@ -24,26 +24,37 @@ Pair = tuple[float, float]
 """Level and variance."""
 
 
-def bends(effects: Iterable[Effect]) -> bool:
-    """Return whether effects change levels or variances; of coarse codes that is known exactly."""
-    return any(e.changes & _BENT for e in effects if not isinstance(e, Quantisation))
+def bends(effects: Iterable[Effect], *, narrow: bool = False) -> bool:
+    """Return whether effects change levels or variances; of coarse codes that is known exactly.
+
+    Where noise is `narrow` beside a code, whatever spreads pixels changes how they are rounded.
+    """
+    others = [e for e in effects if not isinstance(e, Quantisation)]
+    return bool(others) if narrow else any(e.changes & _BENT for e in others)
 
 
-def bent_by(effects: Iterable[Effect], *, spiky: bool) -> tuple[Effect, ...]:
+def bent_by(effects: Iterable[Effect], *, spiky: bool, narrow: bool = False) -> tuple[Effect, ...]:
     """Return the effects that are simulated to know what they add; see `bending_offsets`."""
     bending = _BENT | {"kurtosis"} if spiky else _BENT
-    return tuple(e for e in effects if isinstance(e, Quantisation) or e.changes & bending)
+    return tuple(e for e in effects if narrow or isinstance(e, Quantisation) or e.changes & bending)
 
 
 def bending_offsets(
-    model: Model, layout: Layout, seed: int, jobs: int, *, spiky: bool = False
+    model: Model,
+    layout: Layout,
+    seed: int,
+    jobs: int,
+    *,
+    spiky: bool = False,
+    narrow: bool = False,
 ) -> Offsets:
     """Return what the camera's own effects add to level and variance, by simulation.
 
     Only effects that change either are simulated, with and without: the draws are the same. Where
-    recordings are `spiky`, the variance of the many counts as well, which tails change.
+    recordings are `spiky`, the variance of the many counts as well, which tails change; where
+    noise is `narrow`, see `bends`, all effects count.
     """
-    bent = bent_by(model.camera.effect, spiky=spiky)
+    bent = bent_by(model.camera.effect, spiky=spiky, narrow=narrow)
     codes = tuple(e for e in bent if isinstance(e, Quantisation))
     if len(codes) == len(bent):
         return Offsets()

@@ -15,14 +15,14 @@ from analysis.mismatch.layout import Layout, Place, sites
 from analysis.mismatch.limited import lit
 from analysis.mismatch.model import Model, Sites
 from analysis.mismatch.observe import Level, Observation
-from analysis.mismatch.rounding import rounded, unrounded
 from analysis.mismatch.staging import with_pictures
 from analysis.mismatch.touches import SPIKES
+from analysis.mismatch.undone import halfway, narrow, rounding, together, undone
 from dsis.camera import BaseNoise, Camera, Segment
 from dsis.effects.quantisation import Quantisation
 from dsis.measures.spikes import SPIKED
 
-_ROUNDS = 4
+_ROUNDS, _FINE_ROUNDS = 4, 8  # the latter where each pixel is rounded in its own way
 _LEAST = 0.01  # of a signal: with the above, half a thousandth of it is as good as none
 _SAME = 0.05  # of an error: the fit has settled
 _CLOSER = 0.3  # a round's change beside that of the one before, unless two have shown it
@@ -114,13 +114,17 @@ def calibrate(
     start = camera.black_level - layout.black_dn
     slopes = [s.slope for s in camera.noise.segment]
     spiky = _spiky(seen.levels)
-    undone = _undone(layout, seen.levels, codes_of(camera), spiky=spiky)
-    bending = spiky or bends(camera.effect)
+    fine = narrow(seen.levels, code_step(camera))
+    bending = spiky or bends(camera.effect, narrow=fine)
     effects = near.bent if near is not None and bending else Offsets()
-    known = near is not None and _bends_alike(near, camera, spiky=spiky)
+    known = near is not None and _bends_alike(near, camera, spiky=spiky, fine=fine)
 
     held: float | None = None
     cut = _cut(layout, seen)
+
+    def before_codes(effects: Offsets, noise: BaseNoise = camera.noise) -> Offsets:
+        own = camera.model_copy(update={"noise": noise})
+        return undone(own, layout, seen.levels, codes_of(camera), effects, spiky=spiky)
 
     def fitted(
         offsets: Offsets, at: tuple[float, ...], levels: Mapping[Place, Level] = seen.levels
@@ -128,13 +132,13 @@ def calibrate(
         free = partial(fit_base, black_dn=start, left_out=left_out, slopes=slopes)
         return free(layout, levels, at, offsets, intercept=held, cut=cut)
 
-    held = _held(camera, fitted(_sum(undone, effects), switches))
+    held = _held(camera, fitted(before_codes(effects), switches))
 
     before: BaseFit | None = None
-    change = nan
+    change, noise = nan, camera.noise
     settled = False
-    for _ in range(_ROUNDS if bending else 1):
-        recorded = _sum(undone, effects)
+    for _ in range(_FINE_ROUNDS if fine else _ROUNDS if bending else 1):
+        recorded = before_codes(effects, noise)
         fit = fitted(recorded, switches)
         settled = known
         if before is not None:
@@ -145,15 +149,20 @@ def calibrate(
             again = partial(fitted, replace(added, bulk_dn2={}), levels=many)
             switches = _moved(many, left_out, switches, fit, again)
             fit = fitted(recorded, switches)
-        before = fit
-        own = with_numbers(camera, fit, switches, layout.black_dn)
+        # Where each pixel is rounded in its own way the user's numbers are the better start.
+        first = fine and bending and before is None and not effects.variance_dn2
+        own = camera if first else with_numbers(camera, fit, switches, layout.black_dn)
+        before, noise = fit, own.noise
         model = Model(own, lit(own, layout, signals_of(layout, fit)))
         if settled:
             break
-        effects = bending_offsets(model, layout, seed + 1, jobs, spiky=spiky)
+        made = bending_offsets(model, layout, seed + 1, jobs, spiky=spiky, narrow=fine)
+        # What is rounded by itself swings about where both agree.
+        effects = halfway(effects, made) if fine and effects.variance_dn2 else made
     if layout.scenes:
         model = with_pictures(model, layout, fit, effects, seed=seed + 1, jobs=jobs)
-    offsets = _sum(_rounding(model, layout, fit, spiky=spiky), effects)
+    by_codes = rounding(model, layout, fit, codes_of(model.camera), spiky=spiky)
+    offsets = together(by_codes, effects)
     final = fitted(offsets, switches)
     return Calibrated(model, fit, final, offsets, switches, left_out, effects, settled, held, cut)
 
@@ -190,14 +199,15 @@ def _held(camera: Camera, fit: BaseFit) -> float | None:
     return given if untold and chance else None
 
 
-def _bends_alike(near: Calibrated, camera: Camera, *, spiky: bool) -> bool:
+def _bends_alike(near: Calibrated, camera: Camera, *, spiky: bool, fine: bool) -> bool:
     """Return whether a model that has settled differs in no effect that bends, nor in a switch."""
     own = near.model.camera
+    asked = partial(bent_by, spiky=spiky, narrow=fine)
     return (
         near.settled
         and spiky == bool(near.offsets.bulk_dn2)
         and [s.upper_dn for s in own.noise.segment] == [s.upper_dn for s in camera.noise.segment]
-        and bent_by(own.effect, spiky=spiky) == bent_by(camera.effect, spiky=spiky)
+        and asked(own.effect) == asked(camera.effect)
     )
 
 
@@ -289,55 +299,6 @@ def codes_of(camera: Camera) -> tuple[float, float]:
 def _spiky(levels: Mapping[Place, Level]) -> bool:
     """Return whether spikes dominate variances: the base numbers are then those of the many."""
     return any(level.variance_dn2 > SPIKED * level.bulk_dn2 > 0 for level in levels.values())
-
-
-def _undone(
-    layout: Layout, levels: Mapping[Place, Level], codes: tuple[float, float], *, spiky: bool
-) -> Offsets:
-    """Return what rounding added to the recorded levels and variances, by undoing it.
-
-    `codes` are step and phase, see `codes_of`.
-    """
-    shift, added, stretch, bulk, wider = {}, {}, {}, {}, {}
-    for place, level in levels.items():
-        mean = level.level_dn + layout.black_dn
-        before, variance, slope, grown = unrounded(
-            mean, level.variance_dn2, layout.white_dn, *codes
-        )
-        shift[place], added[place] = mean - before, level.variance_dn2 - variance
-        stretch[place], wider[place] = slope, grown
-        if spiky:
-            many = unrounded(mean, level.bulk_dn2, layout.white_dn, *codes)
-            shift[place], bulk[place] = mean - many[0], level.bulk_dn2 - many[1]
-            stretch[place], wider[place] = many[2:]
-    return Offsets(shift, added, stretch, bulk, wider)
-
-
-def _rounding(model: Model, layout: Layout, fit: BaseFit, *, spiky: bool) -> Offsets:
-    """Return what rounding and clipping add under a model, exactly."""
-    level, variance = {}, {}
-    for e in layout.uniform:
-        for channel, (y, x) in sites(layout.cfa).items():
-            signal = float(model.signals[e.name][y, x])
-            line = float(fit.line_dn2(np.array([signal]))[0])
-            mean = layout.black_dn + fit.black_dn[channel] + signal
-            level[e.name, channel], variance[e.name, channel] = rounded(
-                mean, line, layout.white_dn, *codes_of(model.camera)
-            )
-    return Offsets(level, variance, bulk_dn2=variance if spiky else {})
-
-
-def _sum(first: Offsets, second: Offsets) -> Offsets:
-    def added(a: Mapping[Place, float], b: Mapping[Place, float]) -> dict[Place, float]:
-        return {place: value + b.get(place, 0.0) for place, value in a.items()}
-
-    return Offsets(
-        added(first.level_dn, second.level_dn),
-        added(first.variance_dn2, second.variance_dn2),
-        first.stretch,
-        added(first.bulk_dn2, second.bulk_dn2),
-        first.wider,
-    )
 
 
 def _moved(

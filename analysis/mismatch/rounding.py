@@ -15,6 +15,7 @@ _LEAST_LOG = -14.0  # of a variance, codes^2: less is none
 _SOLVED = 1e-8  # codes and squared codes
 _CUT = 5.0  # recorded standard deviations: nearer to an end noise was cut, and was wider before
 _WIDER = 4.0  # times as wide, and as far out of it, at most: beyond, little is left of its shape
+_THIRD = 1e-3  # share of the third code, below which two are all there is
 _NARROW = (0.08, 0.12, 0.17, 0.24, 0.34, 0.48)  # standard deviations, codes
 
 
@@ -91,7 +92,8 @@ def unrounded(
     that of a normal variate of the recorded variance, the fourth that of the mean over that of the
     recorded one: mean and variance of few codes err together, as their third and fourth moments
     say. Where all samples have one code nothing can be told: the variance comes back as recorded,
-    and the third and the fourth are infinite.
+    and the third and the fourth are infinite. So they are where all but one in a thousand have two
+    codes: their variance follows from their mean, and says nothing besides.
     """
     if step_dn != 1:
         last, before, variance = last_step(white_dn, step_dn, phase_dn), mean_dn, variance_dn2
@@ -134,10 +136,11 @@ def unrounded(
     inverse = np.linalg.pinv(np.asarray(found.jac), rcond=1e-9)
     inverse[1] *= variance
     codes, share = _codes(mean, variance**0.5, white_dn)
-    second, third, fourth = (float((share * (codes - mean_dn) ** k).sum()) for k in (2, 3, 4))
-    apart = np.array([[second, third], [third, fourth - second**2]])
+    second, cube, fourth = (float((share * (codes - mean_dn) ** k).sum()) for k in (2, 3, 4))
+    apart = np.array([[second, cube], [cube, fourth - second**2]])
     of_mean, of_variance = (float(row @ apart @ row) for row in inverse)
-    if np.abs(found.fun).max() >= _SOLVED or not of_variance > 0:
+    third = np.sort(share)[-3] if share.size > 2 else 0.0
+    if np.abs(found.fun).max() >= _SOLVED or not of_variance > 0 or third < _THIRD:
         return mean, variance, np.inf, np.inf
     grown = np.sqrt([of_variance / (2 * variance_dn2**2), of_mean / variance_dn2])
     return mean, variance, float(grown[0]), float(grown[1])

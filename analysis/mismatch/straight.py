@@ -64,13 +64,19 @@ def curves(
 ) -> Iterator[tuple[Array, Array, Array, list[Place]]]:
     """Yield signals, variances, weights of their logarithms and places of each channel.
 
-    `beside`: variances as they would be without the effects of the model, which bend them.
+    `beside`: variances as they would be without the effects of the model, which bend them. None of
+    places where there would be no noise.
     """
     levels, signals = state.setting.seen.levels, state.calibrated.fit.signal_dn
     bends = _bends(state) if beside and state.camera.effect else {}
     uniform = {e.name for e in state.setting.layout.uniform}
     for channel in state.setting.layout.channels:
-        places = [at for at in levels if at[0] in uniform and at[1] == channel and at in signals]
+        places = [
+            at
+            for at, own in levels.items()
+            if at[0] in uniform and at[1] == channel and at in signals
+            if own.variance_dn2 * bends.get(at, 1.0) > 0
+        ]
         if len(places) >= _LEAST_LEVELS:
             yield (
                 np.array([signals[at] for at in places]),

@@ -1,0 +1,156 @@
+"""What rounding to codes made of levels and variances, and what it makes of a model's."""
+
+from collections.abc import Mapping
+from math import inf, isfinite
+
+import numpy as np
+from scipy.optimize import brentq
+
+from analysis.mismatch.basefit import BaseFit, Offsets
+from analysis.mismatch.layout import Layout, Place, sites
+from analysis.mismatch.model import Model
+from analysis.mismatch.observe import Level
+from analysis.mismatch.rounding import rounded, unrounded
+from dsis.camera import Camera
+
+Codes = tuple[float, float]
+"""Step between codes, and the lowest code, its phase, DN."""
+_NARROW = 1 / 3  # codes^2, recorded: of half a code of noise between two codes
+_NEAR = 0.75  # codes from its mean code within which a level lies
+_CHANCE = 4.0  # standard errors
+_STEP, _FLAT = 1e-3, 1e-2  # codes; by how much less than a level its mean code moves at least
+
+
+def narrow(levels: Mapping[Place, Level], step_dn: float) -> bool:
+    """Return whether noise is so narrow beside a code that each pixel is rounded in its own way."""
+    return any(0 < own.variance_dn2 < _NARROW * step_dn**2 for own in levels.values())
+
+
+def undone(
+    camera: Camera,
+    layout: Layout,
+    levels: Mapping[Place, Level],
+    codes: Codes,
+    effects: Offsets,
+    *,
+    spiky: bool,
+) -> Offsets:
+    """Return what rounding, and effects before it, added to recorded levels and variances.
+
+    Where noise is narrow rounding is undone of what is left without the effects. Two codes say
+    nothing of the noise: where they hide it the level is that to which the camera's own noise makes
+    their mean.
+
+    Parameters
+    ----------
+    camera
+        What it says of noise and of the black level holds where codes hide both.
+    layout, levels
+        What was observed.
+    codes
+        Of the camera.
+    effects
+        What the camera's effects add to levels and variances.
+    spiky
+        Whether variances of the many are fitted.
+    """
+    shift, added, stretch, bulk, wider = {}, {}, {}, {}, {}
+    darks = {e.name for e in layout.uniform if e.kind == "dark"}
+    of_many = effects.bulk_dn2 if spiky else effects.variance_dn2
+    for place, level in levels.items():
+        bent, more = effects.level_dn.get(place, 0.0), of_many.get(place, 0.0)
+        mean, square = (
+            level.level_dn + layout.black_dn,
+            level.bulk_dn2 if spiky else level.variance_dn2,
+        )
+        # Rounding is no sum: narrow noise that is wider by an effect is rounded as that.
+        first = (bent, more) if square - more < _NARROW * codes[0] ** 2 else (0.0, 0.0)
+        own = mean - first[0], max(square - first[1], 0.0)
+        before, variance, stretch[place], wider[place] = unrounded(*own, layout.white_dn, *codes)
+        if not isfinite(stretch[place]):
+            given = camera.black_level if place[0] in darks else None
+            error = level.level_error_dn
+            before, wider[place] = _placed(camera, own[0], error, layout.white_dn, codes, given)
+        shift[place] = mean - before - first[0] + bent
+        whole = square - variance - first[1] + more
+        if spiky:
+            bulk[place] = whole
+            plain = unrounded(mean, level.variance_dn2, layout.white_dn, *codes)[1]
+            whole = level.variance_dn2 - plain + effects.variance_dn2.get(place, 0.0)
+        added[place] = whole
+    return Offsets(shift, added, stretch, bulk, wider)
+
+
+def _placed(
+    camera: Camera,
+    code_dn: float,
+    error_dn: float,
+    white_dn: float,
+    codes: Codes,
+    given_dn: float | None,
+) -> tuple[float, float]:
+    """Return the level whose mean code is known, and by how much its error grows.
+
+    By the camera's own noise. The level of a dark is as `given`, if its mean code is as recorded;
+    what it is off by is no light.
+    """
+    noise, dark = camera.segments, given_dn is not None
+
+    def off(level: float) -> float:
+        signal = np.array([0.0 if dark else max(level - camera.black_level, 0.0)], np.float32)
+        variance = max(float(noise.variance_dn2(signal)[0]), 0.0)
+        return level + rounded(level, variance, white_dn, *codes)[0] - code_dn
+
+    if given_dn is not None and abs(off(given_dn)) <= _CHANCE * error_dn:
+        return given_dn, inf
+    low, high = code_dn - _NEAR * codes[0], code_dn + _NEAR * codes[0]
+    if not off(low) < 0 < off(high):  # clipped, or no such noise
+        return code_dn, inf
+    found = float(brentq(off, low, high))
+    step = _STEP * codes[0]
+    slope = (off(found + step) - off(found - step)) / (2 * step)
+    return found, 1 / slope if slope > _FLAT else inf
+
+
+def rounding(model: Model, layout: Layout, fit: BaseFit, codes: Codes, *, spiky: bool) -> Offsets:
+    """Return what rounding and clipping add under a model, exactly."""
+    level, variance = {}, {}
+    for e in layout.uniform:
+        for channel, (y, x) in sites(layout.cfa).items():
+            signal = float(model.signals[e.name][y, x])
+            line = float(fit.line_dn2(np.array([signal]))[0])
+            mean = layout.black_dn + fit.black_dn[channel] + signal
+            level[e.name, channel], variance[e.name, channel] = rounded(
+                mean, line, layout.white_dn, *codes
+            )
+    return Offsets(level, variance, bulk_dn2=variance if spiky else {})
+
+
+def together(first: Offsets, second: Offsets) -> Offsets:
+    """Return what both add, with the errors of the first."""
+
+    def added(a: Mapping[Place, float], b: Mapping[Place, float]) -> dict[Place, float]:
+        return {place: value + b.get(place, 0.0) for place, value in a.items()}
+
+    return Offsets(
+        added(first.level_dn, second.level_dn),
+        added(first.variance_dn2, second.variance_dn2),
+        first.stretch,
+        added(first.bulk_dn2, second.bulk_dn2),
+        first.wider,
+    )
+
+
+def halfway(first: Offsets, second: Offsets) -> Offsets:
+    """Return what lies halfway between what two models add, with the errors of the first."""
+
+    def middle(a: Mapping[Place, float], b: Mapping[Place, float]) -> dict[Place, float]:
+        return {place: (value + b.get(place, value)) / 2 for place, value in a.items()}
+
+    return Offsets(
+        middle(first.level_dn, second.level_dn),
+        middle(first.variance_dn2, second.variance_dn2),
+        first.stretch,
+        middle(first.bulk_dn2, second.bulk_dn2),
+        first.wider,
+    )

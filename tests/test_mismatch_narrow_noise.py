@@ -1,0 +1,133 @@
+"""Noise narrower than half a code: what two codes hide, and pixels that differ beside it."""
+
+from types import SimpleNamespace as Stub
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.stats import norm
+
+from analysis.currentspread import current_spread
+from analysis.mismatch import find_mismatch
+from analysis.mismatch.basefit import Offsets
+from analysis.mismatch.bending import bends, bent_by
+from analysis.mismatch.rounding import rounded, unrounded
+from analysis.mismatch.undone import halfway, narrow, together, undone
+from dsis.effects.dsnu import Dsnu
+from dsis.effects.nonlinearity import Nonlinearity
+from dsis.effects.quantisation import Quantisation
+from mismatch_recordings import camera, recorded
+
+BLACK, WHITE = 8.4, 4095.0
+DARK, FLAT = ("dark-0", "MONO"), ("flat-0", "MONO")
+SPREAD = Dsnu(sigma_dn=0.1)
+
+
+def _user(sigma: float) -> Any:
+    return camera(segments=((0.05, sigma**2, None),), black=BLACK)
+
+
+def _layout() -> Any:
+    uniform = [Stub(name=name, kind=name[:4]) for name in ("dark-0", "flat-0")]
+    return Stub(uniform=uniform, black_dn=BLACK, white_dn=WHITE)
+
+
+def _level(mean: float, square: float, error: float = 1e-4) -> Any:
+    """Return a recorded level: mean code and variance of codes."""
+    own = mean - BLACK
+    return Stub(level_dn=own, level_error_dn=error, variance_dn2=square, bulk_dn2=square)
+
+
+def _of_two(share: float) -> tuple[float, float]:
+    return 8 + share, share * (1 - share)
+
+
+def _undone(user: Any, place: tuple[str, str], level: Any, effects: Offsets | None = None) -> Any:
+    none = effects or Offsets()
+    return undone(user, _layout(), {place: level}, (1.0, 0.0), none, spiky=False)
+
+
+@pytest.mark.parametrize("share", [0.001, 0.05, 0.3, 0.5, 0.9])
+def test_two_codes_say_nothing_of_the_noise(share: float) -> None:
+    """Their variance is that of a coin: it follows from their mean."""
+    *_, stretch, wider = unrounded(*_of_two(share), WHITE)
+    assert stretch == wider == np.inf
+
+
+@pytest.mark.parametrize(("sigma", "off"), [(0.1, 0.05), (0.15, -0.2), (0.2, 0.0)])
+def test_a_level_of_two_codes_is_where_the_users_noise_puts_it(sigma: float, off: float) -> None:
+    """By the share of the upper code, as scipy's normal law has it."""
+    level = BLACK + off
+    share = float(norm.sf(8.5, level, sigma))
+    found = _undone(_user(sigma), DARK, _level(*_of_two(share)))
+    assert 8 + share - found.level_dn[DARK] == pytest.approx(level, abs=1e-4)
+    assert found.stretch[DARK] == np.inf
+    grown = 1 / float(norm.pdf(8.5, level, sigma))  # of the share against the level
+    held = off == 0.0  # as given, if its mean code is as recorded
+    assert found.wider[DARK] == (np.inf if held else pytest.approx(grown, rel=1e-3))
+
+
+def test_what_effects_add_is_taken_off_before_narrow_noise_is_unrounded() -> None:
+    """Rounding is no sum: the same comes out for noise alone as for noise with an effect."""
+    sigma, more = 0.3, 0.02
+    shift, added = rounded(BLACK, sigma**2, WHITE)
+    plain = _undone(_user(sigma), DARK, _level(BLACK + shift, sigma**2 + added))
+    effects = Offsets({DARK: 0.01}, {DARK: more})
+    bent = _level(BLACK + shift + 0.01, sigma**2 + added + more)
+    found = _undone(_user(sigma), DARK, bent, effects)
+    assert found.variance_dn2[DARK] - plain.variance_dn2[DARK] == pytest.approx(more, abs=1e-9)
+    assert found.level_dn[DARK] - plain.level_dn[DARK] == pytest.approx(0.01, abs=1e-9)
+    assert bent.variance_dn2 - found.variance_dn2[DARK] == pytest.approx(sigma**2, abs=1e-6)
+
+
+def test_of_wide_noise_rounding_and_effects_are_a_sum() -> None:
+    effects = Offsets({FLAT: 0.5}, {FLAT: 3.0})
+    found = _undone(_user(2.0), FLAT, _level(400.2, 40.0), effects)
+    assert found.level_dn[FLAT] == pytest.approx(0.5)
+    assert found.variance_dn2[FLAT] == pytest.approx(3 + 1 / 12)
+
+
+def test_beside_narrow_noise_what_spreads_pixels_bends_levels() -> None:
+    steps, bend = Quantisation(step_dn=4), Nonlinearity(percent_full_scale=1.0)
+    assert narrow({DARK: _level(8.4, 0.2)}, 1.0)
+    assert not narrow({DARK: _level(8.4, 0.4), FLAT: _level(8.4, 0.0)}, 1.0)
+    assert narrow({DARK: _level(8.4, 0.4)}, 4.0)
+    assert not bends([SPREAD])
+    assert bends([SPREAD], narrow=True)
+    assert not bends([steps], narrow=True)
+    assert bent_by([SPREAD, steps, bend], spiky=False) == (steps, bend)
+    assert bent_by([SPREAD, steps, bend], spiky=False, narrow=True) == (SPREAD, steps, bend)
+
+
+def test_halfway_is_the_mean_and_together_the_sum() -> None:
+    first = Offsets({DARK: 1.0}, {DARK: 2.0}, {DARK: 1.5}, wider={DARK: 1.1})
+    second = Offsets({DARK: 3.0}, {DARK: 8.0})
+    middle, both = halfway(first, second), together(first, second)
+    assert (middle.level_dn[DARK], middle.variance_dn2[DARK]) == (2.0, 5.0)
+    assert (both.level_dn[DARK], both.variance_dn2[DARK]) == (4.0, 10.0)
+    assert middle.stretch == both.stretch == first.stretch
+
+
+def test_codes_that_hide_noise_leave_dark_current_no_more_than_all() -> None:
+    """What shot noise would be is more than the noise that is left of it."""
+    rng = np.random.default_rng(3)
+    image = 5 + rng.exponential(1.0, (48, 64)) + 0.2 * rng.standard_normal((48, 64))
+    found = current_spread(
+        [(image, 0.2, np.zeros(image.shape, bool))], float(image.mean()), 0.0, 9.0
+    )
+    assert found is None or np.isfinite(found.log_sigma)
+
+
+@pytest.mark.parametrize(
+    ("sigma", "off", "spread"),
+    [(0.1, 0.2, False), (0.15, 0.4, False), (0.25, 0.4, True), (0.3, 0.2, True), (0.2, 0.5, True)],
+)
+def test_a_camera_that_is_right_is_right_beside_coarse_codes(
+    sigma: float, off: float, spread: bool
+) -> None:
+    """As of cameras of 8 bits: read noise of a tenth to a third of a code, darks between codes."""
+    effects = (SPREAD,) if spread else ()
+    user = camera(*effects, segments=((0.05, sigma**2, None),), black=8.0 + off)
+    levels = (2.0, 10.0, 60.0, 200.0)
+    found = find_mismatch(user, recorded(user, 3, rows=64, columns=96, levels=levels), seed=1)
+    assert found.verdict == "match"

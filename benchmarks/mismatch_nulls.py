@@ -4,7 +4,8 @@ Recordings of random base cameras without any hidden effect, mono and Bayer, one
 6 to 100 frames an exposure, read noise of 0.3 to 50 DN, codes of 12 to 16 bits; camera.toml is
 true, or fitted by `dsis camera fit` to the same recording or to another one of the same camera.
 Goal: a mismatch claimed in at most 1 % + 2 standard errors of them. `--large N` adds N recordings
-of 10^7 pixels a frame. Resumable: finished cases are in WORK/nulls.jsonl.
+of 10^7 pixels a frame, `--narrow N` such whose read noise is a tenth to four tenths of a code, half
+of them with offsets of pixels. Resumable: finished cases are in WORK/nulls.jsonl.
 """
 
 import argparse
@@ -20,7 +21,7 @@ from typing import Any
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))  # processes that are started afresh need it too
-from planter import Case, Choice, Layout, draw_case, plant
+from planter import Case, Choice, Effect, Layout, draw_case, plant
 from planter.finder import FINDER, diagnose, largest, named
 from planter.fitted import fit_into
 from planter.layout import BAYER
@@ -63,10 +64,30 @@ def large(seed: int, number: int) -> tuple[Case, str]:
     return draw_case(seed + 10**6 + number, "large", choice), "true"
 
 
+def narrow(seed: int, number: int) -> tuple[Case, str]:
+    """Return null case `number` whose read noise is narrower than half a code."""
+    rng = np.random.default_rng([seed, number, 43])
+    choice = Choice(
+        cfa=("MONO", "RGGB")[number // 2 % 2],
+        segments=1,
+        bit_depth=12,
+        read_noise_dn=float(rng.uniform(0.1, 0.4)),
+        electrons=float(rng.uniform(3e4, 9e4)),
+    )
+    case = draw_case(seed + 2 * 10**6 + number, "small", choice)
+    if number % 2:
+        offsets = Effect("dsnu", {"sigma_dn": float(rng.uniform(0.05, 0.3))})
+        case = replace(case.having(offsets), known=("dsnu",))
+    return case, "true"
+
+
+KINDS = {"null": drawn, "large": large, "narrow": narrow}
+
+
 def judged(task: Task) -> dict[str, Any]:
     """Plant, diagnose, return what a null must not show."""
-    case, origin = (large if task["large"] else drawn)(task["seed"], task["number"])
-    folder = Path(task["work"]) / f"null-{task['large']:d}-{task['number']}"
+    case, origin = KINDS[task["kind"]](task["seed"], task["number"])
+    folder = Path(task["work"]) / f"{task['kind']}-{task['number']}"
     try:
         plant(folder, case)
         if origin != "true":
@@ -96,7 +117,7 @@ def judged(task: Task) -> dict[str, Any]:
         "segments": len(case.segments),
         "frames": case.exposures[0].frames,
         "read_noise_dn": round(case.segments[0].intercept ** 0.5, 2),
-        "large": task["large"],
+        "kind": task["kind"],
     }
 
 
@@ -135,13 +156,13 @@ def strata(entries: list[dict[str, Any]]) -> Iterable[tuple[str, str, str]]:
         "segments": lambda e: e["segments"],
         "frames": lambda e: e["frames"],
         "read noise": lambda e: (
-            "0.3-1 DN"
+            "0.1-1 DN"
             if e["read_noise_dn"] < 1
             else "1-7 DN"
             if e["read_noise_dn"] < 7
             else "7-50 DN"
         ),
-        "10^7 pixels": lambda e: e["large"],
+        "recordings": lambda e: {"null": "small", "large": "10^7 pixels"}.get(e["kind"], e["kind"]),
     }
     for name, key in groups.items():
         for value in sorted({key(e) for e in entries}):
@@ -155,6 +176,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--cases", type=int, default=200)
     parser.add_argument("--large", type=int, default=0)
+    parser.add_argument("--narrow", type=int, default=0)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--work", type=Path, default=Path(gettempdir()) / "dsis-nulls")
@@ -163,14 +185,10 @@ def main() -> None:
     options = parser.parse_args()
     common = {"work": str(options.work), "seed": options.seed, "finder": options.finder}
     common["keep"] = options.keep
-    counts = {False: options.cases, True: options.large}
+    counts = {"null": options.cases, "large": options.large, "narrow": options.narrow}
     tasks = {
-        f"{'large' if is_large else 'null'}-{options.seed}-{i}": {
-            **common,
-            "number": i,
-            "large": is_large,
-        }
-        for is_large, count in counts.items()
+        f"{kind}-{options.seed}-{i}": {**common, "number": i, "kind": kind}
+        for kind, count in counts.items()
         for i in range(count)
     }
     done = work_through(options.work / "nulls.jsonl", tasks, judged, options.jobs)

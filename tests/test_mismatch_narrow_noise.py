@@ -5,18 +5,20 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 from scipy.stats import norm
 
 from analysis.currentspread import current_spread
 from analysis.mismatch import find_mismatch
 from analysis.mismatch.basefit import Offsets
 from analysis.mismatch.bending import bends, bent_by
-from analysis.mismatch.rounding import rounded, unrounded
-from analysis.mismatch.undone import halfway, narrow, together, undone
+from analysis.mismatch.polish import with_effects
+from analysis.mismatch.rounding import of_two_codes, rounded, unrounded
+from analysis.mismatch.undone import WHOLE, halfway, narrow, together, undone
 from dsis.effects.dsnu import Dsnu
 from dsis.effects.nonlinearity import Nonlinearity
 from dsis.effects.quantisation import Quantisation
-from mismatch_recordings import camera, recorded
+from mismatch_recordings import camera, recorded, state_of_all
 
 BLACK, WHITE = 8.4, 4095.0
 DARK, FLAT = ("dark-0", "MONO"), ("flat-0", "MONO")
@@ -50,8 +52,9 @@ def _undone(user: Any, place: tuple[str, str], level: Any, effects: Offsets | No
 @pytest.mark.parametrize("share", [0.001, 0.05, 0.3, 0.5, 0.9])
 def test_two_codes_say_nothing_of_the_noise(share: float) -> None:
     """Their variance is that of a coin: it follows from their mean."""
-    *_, stretch, wider = unrounded(*_of_two(share), WHITE)
-    assert stretch == wider == np.inf
+    before, variance, *_ = unrounded(*_of_two(share), WHITE)
+    assert of_two_codes(before, variance, WHITE)
+    assert not of_two_codes(BLACK, 0.16, WHITE)
 
 
 @pytest.mark.parametrize(("sigma", "off"), [(0.1, 0.05), (0.15, -0.2), (0.2, 0.0)])
@@ -64,7 +67,48 @@ def test_a_level_of_two_codes_is_where_the_users_noise_puts_it(sigma: float, off
     assert found.stretch[DARK] == np.inf
     grown = 1 / float(norm.pdf(8.5, level, sigma))  # of the share against the level
     held = off == 0.0  # as given, if its mean code is as recorded
-    assert found.wider[DARK] == (np.inf if held else pytest.approx(grown, rel=1e-3))
+    assert found.wider[DARK] == (np.inf if held else pytest.approx(max(grown, 1.0), rel=1e-3))
+
+
+def test_where_the_user_has_no_noise_two_codes_say_nothing_of_the_level() -> None:
+    found = _undone(_user(1e-6), DARK, _level(*_of_two(0.3)))
+    assert found.wider[DARK] == np.inf
+
+
+def test_noise_that_is_not_well_known_leaves_the_level_as_unsure() -> None:
+    """A fifth of the variance: by how much the mean code moves with it, over its own error."""
+    sigma, share = 0.2, 0.05
+    user = _user(sigma)
+    sure = _undone(user, DARK, _level(*_of_two(share))).wider[DARK]
+    segment = user.noise.segment[0].model_copy(update={"intercept_se": sigma**2 / 5})
+    vague = user.model_copy(update={"noise": user.noise.model_copy(update={"segment": (segment,)})})
+
+    def share_of(level: float, own: float) -> float:
+        return float(norm.sf(8.5, level, own) - norm.cdf(7.5, level, own))
+
+    level = float(brentq(lambda at: share_of(at, sigma) - share, 8.0, 8.4))
+    moved = share_of(level, sigma * 1.2**0.5) - share
+    wanted = sure * np.hypot(1, moved / 1e-4)
+    assert _undone(vague, DARK, _level(*_of_two(share))).wider[DARK] == pytest.approx(
+        wanted, rel=1e-2
+    )
+
+
+def test_read_noise_that_all_levels_hide_is_as_given_and_is_so_again() -> None:
+    """A start from the same result, and one from a camera with an effect that is gone."""
+    user = camera(segments=((0.001, 0.15**2, None),), black=8.3)
+    dim = recorded(user, 3, rows=64, columns=96, levels=(0.1, 0.2))
+    state = state_of_all(dim, user)
+    first = state.calibrated
+    assert first.fit.pieces[0].intercept == pytest.approx(0.15**2)
+    again = state.setting.calibrated(user, near=first)
+    assert again.model.camera.black_level == pytest.approx(first.model.camera.black_level)
+    own = with_effects(user, [SPREAD])
+    assert own is not None
+    beside = state.setting.calibrated(own)
+    assert beside.bent.variance_dn2
+    assert not state.setting.calibrated(user, near=beside).bent.variance_dn2
+    assert find_mismatch(user, dim, seed=1).verdict in ("match", "parameters")
 
 
 def test_what_effects_add_is_taken_off_before_narrow_noise_is_unrounded() -> None:
@@ -89,9 +133,13 @@ def test_of_wide_noise_rounding_and_effects_are_a_sum() -> None:
 
 def test_beside_narrow_noise_what_spreads_pixels_bends_levels() -> None:
     steps, bend = Quantisation(step_dn=4), Nonlinearity(percent_full_scale=1.0)
-    assert narrow({DARK: _level(8.4, 0.2)}, 1.0)
-    assert not narrow({DARK: _level(8.4, 0.4), FLAT: _level(8.4, 0.0)}, 1.0)
-    assert narrow({DARK: _level(8.4, 0.4)}, 4.0)
+    assert narrow({DARK: _level(8.4, 0.2)}, WHOLE, spiky=False)
+    assert not narrow({DARK: _level(8.4, 0.4), FLAT: _level(8.4, 0.0)}, WHOLE, spiky=False)
+    assert not narrow({DARK: _level(8.4, 0.2)}, (4.0, 0.0), spiky=False)
+    spikes = _level(8.4, 6.0)
+    spikes.bulk_dn2 = 0.2
+    assert narrow({DARK: spikes}, WHOLE, spiky=True)
+    assert not narrow({DARK: spikes}, WHOLE, spiky=False)
     assert not bends([SPREAD])
     assert bends([SPREAD], narrow=True)
     assert not bends([steps], narrow=True)
@@ -115,7 +163,8 @@ def test_codes_that_hide_noise_leave_dark_current_no_more_than_all() -> None:
     found = current_spread(
         [(image, 0.2, np.zeros(image.shape, bool))], float(image.mean()), 0.0, 9.0
     )
-    assert found is None or np.isfinite(found.log_sigma)
+    assert found is not None
+    assert found.log_sigma > 0
 
 
 @pytest.mark.parametrize(

@@ -308,7 +308,7 @@ def _piece(
     `slope` where these do not tell it. An intercept that is `held` is not fitted to a slope.
     """
     if x.size == 0:
-        return Piece(low, slope or 0.0, 0.0, np.inf, np.inf)
+        return Piece(low, slope or 0.0, held or 0.0, np.inf, np.inf)
     free = np.unique(np.round(x / max(np.abs(x).max(), 1e-12), 3)).size > 1
     if not free and slope is None:
         slope = 0.0

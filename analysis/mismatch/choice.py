@@ -201,7 +201,7 @@ class Choice(Fitted):
             before = len(self.doubted)
             fitted = as_shown(state, self.lines, plainest(state, fitted))
             fitted = in_form(state, self.camera, fitted)
-            fitted = self._undoubted(state, fitted)
+            fitted = self._undoubted(state, fitted, left)
             if len(self.doubted) > before:
                 continue  # all that was fitted of a kind is denied: others were too far behind it
             if not fitted or fitted[0].gain < LEAST_GAIN:
@@ -213,7 +213,7 @@ class Choice(Fitted):
             tied = (one for one in fitted[1:] if ties(state, fitted[0], one))
             rival: Ranked | Path | None = next(tied, self._named_otherwise(fitted[0]))
             rival = rival or bends_as_well(state, fitted[0], path)
-            if self._shown(fitted[0].proposal.effect) < SURE_GAIN:  # else frames tell it from all
+            if shown(fitted[0].proposal.effect) < SURE_GAIN:  # else frames tell it from all
                 rival = rival or twin(state, fitted[0], self.vocabulary, self.memory, self.step)
             if rival is None:
                 return fitted
@@ -230,16 +230,16 @@ class Choice(Fitted):
         rival, named = self.tied.get(best.kind), {n.kind for n in self.named}
         return rival if rival is not None and rival.kind in named - LINES else None
 
-    def _undoubted(self, state: State, fitted: list[Ranked]) -> list[Ranked]:
+    def _undoubted(self, state: State, fitted: list[Ranked], left: frozenset[str]) -> list[Ranked]:
         """Leave out the best as long as a statistic which calls for it denies it, for this round.
 
         That of which nothing is left is doubted, until what is named besides shows another of it.
+        `left` are kinds that may be taken in.
         """
         while fitted and fitted[0].gain >= LEAST_GAIN and fitted[0].kind not in LINES:
             best, *others = fitted
             predictor = state.predictor(replicates_for(self.setting, [best.proposal.effect]))
             denial = refuted(state, predictor, best.kind, best.polished, self._left())
-            left = self._left() - self.doubted.keys()
             denial = denial or unlike_frames(state, self.lines, best, others, left)
             if (denial := denial or displaced(state, best.kind, best.polished.mean)) is None:
                 break

@@ -342,5 +342,8 @@ def coloured(state: State, kind: str) -> Denial | None:
     unsure = most < _SURE * error and kind in _OF_ALL and not called.isdisjoint(_NEIGHBOURS)
     if plain <= 0 or not (few or unsure):
         return None
+    if not few:
+        why = "neighbours are alike, and beside that it is not certain that all pixels differ"
+        return Denial(float(np.clip(most / (_SURE * error), 0.0, 1.0)), why)
     why = "a wave that stands still makes" if FIXED_WAVE in called else "neighbours have in common"
     return Denial(max(most / plain, 0.0), f"{why} most of what it would explain")

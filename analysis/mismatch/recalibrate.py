@@ -114,7 +114,7 @@ def calibrate(
     start = camera.black_level - layout.black_dn
     slopes = [s.slope for s in camera.noise.segment]
     spiky = _spiky(seen.levels)
-    fine = narrow(seen.levels, code_step(camera))
+    fine = narrow(seen.levels, codes_of(camera), spiky=spiky)
     bending = spiky or bends(camera.effect, narrow=fine)
     effects = near.bent if near is not None and bending else Offsets()
     known = near is not None and _bends_alike(near, camera, spiky=spiky, fine=fine)
@@ -135,7 +135,7 @@ def calibrate(
     held = _held(camera, fitted(before_codes(effects), switches))
 
     before: BaseFit | None = None
-    change, noise = nan, camera.noise
+    change, noise = nan, near.model.camera.noise if near is not None and known else camera.noise
     settled = False
     for _ in range(_FINE_ROUNDS if fine else _ROUNDS if bending else 1):
         recorded = before_codes(effects, noise)
@@ -150,7 +150,7 @@ def calibrate(
             switches = _moved(many, left_out, switches, fit, again)
             fit = fitted(recorded, switches)
         # Where each pixel is rounded in its own way the user's numbers are the better start.
-        first = fine and bending and before is None and not effects.variance_dn2
+        first = fine and bending and before is None and not (known or effects.variance_dn2)
         own = camera if first else with_numbers(camera, fit, switches, layout.black_dn)
         before, noise = fit, own.noise
         model = Model(own, lit(own, layout, signals_of(layout, fit)))
@@ -158,7 +158,8 @@ def calibrate(
             break
         made = bending_offsets(model, layout, seed + 1, jobs, spiky=spiky, narrow=fine)
         # What is rounded by itself swings about where both agree.
-        effects = halfway(effects, made) if fine and effects.variance_dn2 else made
+        swings = fine and effects.variance_dn2 and made.variance_dn2
+        effects = halfway(effects, made) if swings else made
     if layout.scenes:
         model = with_pictures(model, layout, fit, effects, seed=seed + 1, jobs=jobs)
     by_codes = rounding(model, layout, fit, codes_of(model.camera), spiky=spiky)
@@ -190,9 +191,12 @@ def _held(camera: Camera, fit: BaseFit) -> float | None:
 
     Where darks are cut off at the lowest code, bright flats alone may know of it: no better than
     that it may as well be the given one, or none, or twice that. It would move from one simulation
-    to the next by more than itself, and all that depends on read noise with it.
+    to the next by more than itself, and all that depends on read noise with it. Nor does it where
+    codes hide the noise of every level.
     """
     given, own = camera.noise.segment[0].intercept, fit.pieces[0]
+    if not (isfinite(own.intercept_error) or isfinite(own.slope_error)):
+        return given
     size = max(given, abs(own.intercept))
     untold = isfinite(own.intercept_error) and own.intercept_error > size
     chance = abs(own.intercept - given) <= _CHANCE * own.intercept_error

@@ -92,8 +92,7 @@ def unrounded(
     that of a normal variate of the recorded variance, the fourth that of the mean over that of the
     recorded one: mean and variance of few codes err together, as their third and fourth moments
     say. Where all samples have one code nothing can be told: the variance comes back as recorded,
-    and the third and the fourth are infinite. So they are where all but one in a thousand have two
-    codes: their variance follows from their mean, and says nothing besides.
+    and the third and the fourth are infinite.
     """
     if step_dn != 1:
         last, before, variance = last_step(white_dn, step_dn, phase_dn), mean_dn, variance_dn2
@@ -139,11 +138,19 @@ def unrounded(
     second, cube, fourth = (float((share * (codes - mean_dn) ** k).sum()) for k in (2, 3, 4))
     apart = np.array([[second, cube], [cube, fourth - second**2]])
     of_mean, of_variance = (float(row @ apart @ row) for row in inverse)
-    third = np.sort(share)[-3] if share.size > 2 else 0.0
-    if np.abs(found.fun).max() >= _SOLVED or not of_variance > 0 or third < _THIRD:
+    if np.abs(found.fun).max() >= _SOLVED or not min(of_mean, of_variance) > 0:
         return mean, variance, np.inf, np.inf
     grown = np.sqrt([of_variance / (2 * variance_dn2**2), of_mean / variance_dn2])
     return mean, variance, float(grown[0]), float(grown[1])
+
+
+def of_two_codes(mean_dn: float, variance_dn2: float, white_dn: float) -> bool:
+    """Return whether all but one in a thousand samples of rounded noise have two codes, or one.
+
+    Their variance follows from their mean, and says nothing besides.
+    """
+    _, share = _codes(mean_dn, max(variance_dn2, 1e-12) ** 0.5, white_dn)
+    return bool(share.size < 3 or np.sort(share)[-3] < _THIRD)
 
 
 def _recorded(mean_dn: float, log_variance: float, white_dn: float) -> Array:

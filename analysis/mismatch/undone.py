@@ -1,7 +1,7 @@
 """What rounding to codes made of levels and variances, and what it makes of a model's."""
 
 from collections.abc import Mapping
-from math import inf, isfinite
+from math import hypot, inf, isfinite
 
 import numpy as np
 from scipy.optimize import brentq
@@ -10,20 +10,26 @@ from analysis.mismatch.basefit import BaseFit, Offsets
 from analysis.mismatch.layout import Layout, Place, sites
 from analysis.mismatch.model import Model
 from analysis.mismatch.observe import Level
-from analysis.mismatch.rounding import rounded, unrounded
+from analysis.mismatch.rounding import of_two_codes, rounded, unrounded
 from dsis.camera import Camera
 
 Codes = tuple[float, float]
 """Step between codes, and the lowest code, its phase, DN."""
+WHOLE: Codes = (1.0, 0.0)
 _NARROW = 1 / 3  # codes^2, recorded: of half a code of noise between two codes
 _NEAR = 0.75  # codes from its mean code within which a level lies
 _CHANCE = 4.0  # standard errors
+_NONE, _LEAST = 1e-4, 1e-9  # codes^2 and DN: none to speak of
 _STEP, _FLAT = 1e-3, 1e-2  # codes; by how much less than a level its mean code moves at least
 
 
-def narrow(levels: Mapping[Place, Level], step_dn: float) -> bool:
-    """Return whether noise is so narrow beside a code that each pixel is rounded in its own way."""
-    return any(0 < own.variance_dn2 < _NARROW * step_dn**2 for own in levels.values())
+def narrow(levels: Mapping[Place, Level], codes: Codes, *, spiky: bool) -> bool:
+    """Return whether noise is so narrow beside whole codes that each pixel is rounded by itself.
+
+    That of the many where recordings are `spiky`.
+    """
+    squares = (own.bulk_dn2 if spiky else own.variance_dn2 for own in levels.values())
+    return codes == WHOLE and any(0 < square < _NARROW for square in squares)
 
 
 def undone(
@@ -37,9 +43,10 @@ def undone(
 ) -> Offsets:
     """Return what rounding, and effects before it, added to recorded levels and variances.
 
-    Where noise is narrow rounding is undone of what is left without the effects. Two codes say
-    nothing of the noise: where they hide it the level is that to which the camera's own noise makes
-    their mean.
+    Where noise is narrow rounding to whole codes is undone of what is left without the effects. Two
+    codes say nothing of the noise: where they hide it, or rounding cannot be undone, the level is
+    that of which the camera's own noise makes the mean code. Beside coarser steps nothing is said
+    of that: the camera's numbers may be those from before the steps were known.
 
     Parameters
     ----------
@@ -56,6 +63,7 @@ def undone(
     """
     shift, added, stretch, bulk, wider = {}, {}, {}, {}, {}
     darks = {e.name for e in layout.uniform if e.kind == "dark"}
+    whole, white = codes == WHOLE, layout.white_dn
     of_many = effects.bulk_dn2 if spiky else effects.variance_dn2
     for place, level in levels.items():
         bent, more = effects.level_dn.get(place, 0.0), of_many.get(place, 0.0)
@@ -64,20 +72,21 @@ def undone(
             level.bulk_dn2 if spiky else level.variance_dn2,
         )
         # Rounding is no sum: narrow noise that is wider by an effect is rounded as that.
-        first = (bent, more) if square - more < _NARROW * codes[0] ** 2 else (0.0, 0.0)
+        first = (bent, more) if whole and square - more < _NARROW else (0.0, 0.0)
         own = mean - first[0], max(square - first[1], 0.0)
-        before, variance, stretch[place], wider[place] = unrounded(*own, layout.white_dn, *codes)
-        if not isfinite(stretch[place]):
+        before, variance, stretch[place], wider[place] = unrounded(*own, white, *codes)
+        if whole and (not isfinite(stretch[place]) or of_two_codes(before, variance, white)):
+            stretch[place] = inf
             given = camera.black_level if place[0] in darks else None
             error = level.level_error_dn
-            before, wider[place] = _placed(camera, own[0], error, layout.white_dn, codes, given)
+            before, wider[place] = _placed(camera, own[0], error, white, given)
         shift[place] = mean - before - first[0] + bent
-        whole = square - variance - first[1] + more
+        made = square - variance - first[1] + more
         if spiky:
-            bulk[place] = whole
+            bulk[place] = made
             plain = unrounded(mean, level.variance_dn2, layout.white_dn, *codes)[1]
-            whole = level.variance_dn2 - plain + effects.variance_dn2.get(place, 0.0)
-        added[place] = whole
+            made = level.variance_dn2 - plain + effects.variance_dn2.get(place, 0.0)
+        added[place] = made
     return Offsets(shift, added, stretch, bulk, wider)
 
 
@@ -86,30 +95,36 @@ def _placed(
     code_dn: float,
     error_dn: float,
     white_dn: float,
-    codes: Codes,
     given_dn: float | None,
 ) -> tuple[float, float]:
     """Return the level whose mean code is known, and by how much its error grows.
 
-    By the camera's own noise. The level of a dark is as `given`, if its mean code is as recorded;
-    what it is off by is no light.
+    By the camera's own noise, as well as that is known. The level of a dark is as `given`, if its
+    mean code is as recorded; what it is off by is no light.
     """
     noise, dark = camera.segments, given_dn is not None
 
-    def off(level: float) -> float:
+    def variance(level: float) -> float:
         signal = np.array([0.0 if dark else max(level - camera.black_level, 0.0)], np.float32)
-        variance = max(float(noise.variance_dn2(signal)[0]), 0.0)
-        return level + rounded(level, variance, white_dn, *codes)[0] - code_dn
+        return float(noise.variance_dn2(signal)[0])
+
+    def off(level: float, more_dn2: float = 0.0) -> float:
+        square = max(variance(level) + more_dn2, 0.0)
+        return level + rounded(level, square, white_dn)[0] - code_dn
 
     if given_dn is not None and abs(off(given_dn)) <= _CHANCE * error_dn:
         return given_dn, inf
-    low, high = code_dn - _NEAR * codes[0], code_dn + _NEAR * codes[0]
-    if not off(low) < 0 < off(high):  # clipped, or no such noise
+    low, high = code_dn - _NEAR, code_dn + _NEAR
+    plain = variance(code_dn)
+    if plain <= _NONE or not off(low) < 0 < off(high):  # no noise, or cut off
         return code_dn, inf
     found = float(brentq(off, low, high))
-    step = _STEP * codes[0]
-    slope = (off(found + step) - off(found - step)) / (2 * step)
-    return found, 1 / slope if slope > _FLAT else inf
+    slope = (off(found + _STEP) - off(found - _STEP)) / (2 * _STEP)
+    if slope <= _FLAT:
+        return found, inf
+    unsure = camera.noise.segment[0].intercept_se or 0.0
+    moved = abs(off(found, min(unsure, plain / 2)))
+    return found, max(hypot(1.0, moved / max(error_dn, _LEAST)) / slope, 1.0)
 
 
 def rounding(model: Model, layout: Layout, fit: BaseFit, codes: Codes, *, spiky: bool) -> Offsets:

@@ -167,6 +167,18 @@ def test_codes_that_hide_noise_leave_dark_current_no_more_than_all() -> None:
     assert found.log_sigma > 0
 
 
+def test_read_noise_of_darks_that_hide_it_is_as_given_where_flats_allow_it() -> None:
+    """Flats extrapolate to 0.07 +- 0.012 DN^2, say, where 0.04 is right."""
+    user = camera(segments=((0.085, 0.2**2, None),), black=95.651)
+    for seed in range(3):
+        made = recorded(user, seed, rows=48, columns=64, levels=(34.0, 260.0, 2000.0))
+        own = state_of_all(made, user).calibrated
+        assert own.fit.pieces[0].intercept == pytest.approx(0.04)
+        assert own.model.camera.black_level == pytest.approx(95.651, abs=1e-6)
+    wrong = camera(segments=((0.085, 5.0, None),), black=95.651)  # which flats do not allow
+    assert state_of_all(made, wrong).calibrated.held is None
+
+
 @pytest.mark.parametrize(
     ("sigma", "off", "spread"),
     [(0.1, 0.2, False), (0.15, 0.4, False), (0.25, 0.4, True), (0.3, 0.2, True), (0.2, 0.5, True)],

@@ -29,6 +29,7 @@ _CLOSER = 0.3  # a round's change beside that of the one before, unless two have
 _SWITCH_DEVIANCE = 12.0  # by which another gap must fit better before the switch is moved
 _MOST_OFFSETS = 1.1  # variance of pixels' means beside that of noise: a cut moves by tenths of 1 %
 _CHANCE = 2.0  # standard errors, that a given number may well be off
+_HIDDEN_CHANCE = 4.0  # that are extrapolated from flats
 _FREE = 5  # numbers of two lines and a switch
 _APART = 1.005  # ratio of signals from which they are two levels
 
@@ -132,7 +133,10 @@ def calibrate(
         free = partial(fit_base, black_dn=start, left_out=left_out, slopes=slopes)
         return free(layout, levels, at, offsets, intercept=held, cut=cut)
 
-    held = _held(camera, fitted(before_codes(effects), switches))
+    recorded = before_codes(effects)
+    darks = [(e.name, c) for e in layout.uniform if e.kind == "dark" for c in layout.channels]
+    hidden = bool(darks) and not any(isfinite(recorded.stretch[place]) for place in darks)
+    held = _held(camera, fitted(recorded, switches), hidden=hidden)
 
     before: BaseFit | None = None
     change, noise = nan, near.model.camera.noise if near is not None and known else camera.noise
@@ -186,21 +190,22 @@ def _cut(layout: Layout, seen: Observation) -> frozenset[str]:
     return frozenset(name for name in darks if alike(name))
 
 
-def _held(camera: Camera, fit: BaseFit) -> float | None:
+def _held(camera: Camera, fit: BaseFit, *, hidden: bool) -> float | None:
     """Return the camera's own intercept where a fit does not tell it; None: it does.
 
     Where darks are cut off at the lowest code, bright flats alone may know of it: no better than
     that it may as well be the given one, or none, or twice that. It would move from one simulation
     to the next by more than itself, and all that depends on read noise with it. Nor does it where
-    codes hide the noise of every level.
+    codes hide the noise of every level, or of all darks (`hidden`) and the given one may well be.
     """
     given, own = camera.noise.segment[0].intercept, fit.pieces[0]
     if not (isfinite(own.intercept_error) or isfinite(own.slope_error)):
         return given
     size = max(given, abs(own.intercept))
     untold = isfinite(own.intercept_error) and own.intercept_error > size
-    chance = abs(own.intercept - given) <= _CHANCE * own.intercept_error
-    return given if untold and chance else None
+    most = _HIDDEN_CHANCE if hidden else _CHANCE
+    chance = abs(own.intercept - given) <= most * own.intercept_error
+    return given if (untold or hidden) and chance else None
 
 
 def _bends_alike(near: Calibrated, camera: Camera, *, spiky: bool, fine: bool) -> bool:

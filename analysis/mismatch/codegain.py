@@ -83,9 +83,14 @@ def _counts(camera: Camera) -> bool:
 
 
 def _of_half(state: State, mean: Array) -> bool:
-    """Return whether numbers that are predicted are in step by half of what is seen, or more."""
+    """Return whether numbers that are predicted are in step by half of what is seen, or more.
+
+    Of channels that are seen in step, beyond chance.
+    """
+    seen = state.vector.values
     own = np.array([key.detail == DETAIL for key in state.vector.keys]) & state.null.known
-    return bool(own.any() and (mean[own] >= _MOST * state.vector.values[own]).all())
+    own &= seen > _CHANCE * state.null.sd
+    return bool(own.any() and (mean[own] >= _MOST * seen[own]).all())
 
 
 def gain_of_residue(setting: Setting, effect: Effect) -> float:

@@ -44,15 +44,15 @@ def frame_codes(case: Case, exposure: int, frame: int) -> np.ndarray:
         charge = (1 - lag["fraction"]) * charge + lag["fraction"] * before
         charge = charge.astype(np.float32)
     signal = _amplified(charge, view)
-    signal = _through(OFFSETS, _through(PIXELS, read(signal, view), view), view)
+    signal = through(OFFSETS, through(PIXELS, read(signal, view), view), view)
     # What is noise to a memory is beyond what wells and amplifiers make of the expected charge.
     steady = replace(view, expected=_amplified(view.expected, view))
-    signal = _through(AFTER, _through(MEMORY, signal, steady), view)
+    signal = through(AFTER, through(MEMORY, signal, steady), view)
     return converted(signal, view)
 
 
 def _amplified(charge: Image, view: View) -> Image:
-    return _through(AMPLIFIERS, _through(WELLS, charge, view), view)
+    return through(AMPLIFIERS, through(WELLS, charge, view), view)
 
 
 def stack(case: Case, exposure: int) -> np.ndarray:
@@ -63,12 +63,13 @@ def stack(case: Case, exposure: int) -> np.ndarray:
 
 def _collected(view: View) -> tuple[View, Image]:
     """Return the view with its expected signal, and the charge with shot noise."""
-    expected = _through(LIGHT, clean_signal(view), view)
+    expected = through(LIGHT, clean_signal(view), view)
     view = replace(view, expected=expected)
-    return view, _through(NEIGHBOURS, counted(expected, view), view)
+    return view, through(NEIGHBOURS, counted(expected, view), view)
 
 
-def _through(steps: Mapping[str, Mechanism], image: Image, view: View) -> Image:
+def through(steps: Mapping[str, Mechanism], image: Image, view: View) -> Image:
+    """Return what the planted mechanisms among some make of an image."""
     for kind, step in steps.items():
         parameters = view.case.planted(kind)
         if parameters is not None:

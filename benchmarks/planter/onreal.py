@@ -13,6 +13,7 @@ import numpy as np
 
 from dsis.recording import read_recording
 from planter.case import Case, Plan, Segment
+from planter.chain import through
 from planter.light import LIGHT
 from planter.offsets import OFFSETS
 from planter.readout import AMPLIFIERS, MEMORY, PIXELS
@@ -37,7 +38,8 @@ PLANTABLE = frozenset(
         "bistable_pattern",
     }
 )
-_STEPS = {**LIGHT, **AMPLIFIERS, **PIXELS, **OFFSETS, **MEMORY}
+_STEADY = {**LIGHT, **AMPLIFIERS}
+_STEPS = {**_STEADY, **PIXELS, **OFFSETS}
 TOP, LEVELS, STACK = 0.8, 9, 16  # of full scale; flat levels and frames of a stack that are used
 
 
@@ -110,10 +112,9 @@ class RealFrames:
         view = View(case, exposure, frame, expected)
         analogue = codes[frame] - 0.5 + view.fresh("dither").random(view.shape, dtype=np.float32)
         signal: Image = analogue - np.float32(self.black_level)
-        for kind, step in _STEPS.items():
-            parameters = case.planted(kind)
-            if parameters is not None:
-                signal = step(signal, parameters, view)
+        # What is noise to a memory is beyond what light and amplifiers make of what is expected.
+        steady = replace(view, expected=through(_STEADY, expected, view))
+        signal = through(MEMORY, through(_STEPS, signal, view), steady)
         changed = np.rint(signal + np.float32(self.black_level))
         at_end = (codes[frame] == 0) | (codes[frame] == self.white_level)
         changed = np.where(at_end, codes[frame], changed)  # what was clipped stays so

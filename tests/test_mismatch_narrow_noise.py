@@ -31,7 +31,8 @@ def _user(sigma: float) -> Any:
 
 def _layout() -> Any:
     uniform = [Stub(name=name, kind=name[:4]) for name in ("dark-0", "flat-0")]
-    return Stub(uniform=uniform, black_dn=BLACK, white_dn=WHITE)
+    size = {"rows": 50, "columns": 80, "channels": ("MONO",)}
+    return Stub(uniform=uniform, black_dn=BLACK, white_dn=WHITE, **size)
 
 
 def _level(mean: float, square: float, error: float = 1e-4) -> Any:
@@ -109,6 +110,18 @@ def test_read_noise_that_all_levels_hide_is_as_given_and_is_so_again() -> None:
     assert beside.bent.variance_dn2
     assert not state.setting.calibrated(user, near=beside).bent.variance_dn2
     assert find_mismatch(user, dim, seed=1).verdict in ("match", "parameters")
+
+
+def test_what_pixels_scatter_by_is_no_error_of_a_given_level() -> None:
+    """Offsets put each pixel on one code or the next: a mean of 4000 is known to 0.008."""
+    sigma, off = 0.1, 0.02
+    share = float(norm.sf(8.5, BLACK, sigma))
+    level = _level(*_of_two(share + off + 0.01))
+    more = level.variance_dn2 - _of_two(share + 0.01)[1]
+    held = _undone(_user(sigma), DARK, level, Offsets({DARK: off}, {DARK: more}))
+    assert held.level_dn[DARK] == pytest.approx(level.level_dn, abs=1e-6)  # the level is as given
+    moved = _undone(_user(sigma), DARK, _level(*_of_two(share + 0.01)))
+    assert moved.level_dn[DARK] < level.level_dn - off - 1e-3
 
 
 def test_what_effects_add_is_taken_off_before_narrow_noise_is_unrounded() -> None:

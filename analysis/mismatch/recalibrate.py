@@ -134,15 +134,15 @@ def calibrate(
         return free(layout, levels, at, offsets, intercept=held, cut=cut)
 
     recorded = before_codes(effects)
-    darks = [(e.name, c) for e in layout.uniform if e.kind == "dark" for c in layout.channels]
-    hidden = bool(darks) and not any(isfinite(recorded.stretch[place]) for place in darks)
-    held = _held(camera, fitted(recorded, switches), hidden=hidden)
+    held = _held(camera, fitted(recorded, switches), hidden=_hidden(layout, recorded))
 
     before: BaseFit | None = None
     change, noise = nan, near.model.camera.noise if near is not None and known else camera.noise
     settled = False
     for _ in range(_FINE_ROUNDS if fine else _ROUNDS if bending else 1):
         recorded = before_codes(effects, noise)
+        if fine and held is None:  # beside what effects add darks may hide it
+            held = _held(camera, fitted(recorded, switches), hidden=_hidden(layout, recorded))
         fit = fitted(recorded, switches)
         settled = known
         if before is not None:
@@ -188,6 +188,12 @@ def _cut(layout: Layout, seen: Observation) -> frozenset[str]:
         return all(number**3 < _MOST_OFFSETS for number in numbers)
 
     return frozenset(name for name in darks if alike(name))
+
+
+def _hidden(layout: Layout, recorded: Offsets) -> bool:
+    """Return whether codes hide the noise of every dark, of one or more."""
+    darks = [(e.name, c) for e in layout.uniform if e.kind == "dark" for c in layout.channels]
+    return bool(darks) and not any(isfinite(recorded.stretch[place]) for place in darks)
 
 
 def _held(camera: Camera, fit: BaseFit, *, hidden: bool) -> float | None:

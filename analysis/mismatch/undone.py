@@ -1,7 +1,7 @@
 """What rounding to codes made of levels and variances, and what it makes of a model's."""
 
 from collections.abc import Mapping
-from math import hypot, inf, isfinite
+from math import hypot, inf, isfinite, sqrt
 
 import numpy as np
 from scipy.optimize import brentq
@@ -64,6 +64,7 @@ def undone(
     shift, added, stretch, bulk, wider = {}, {}, {}, {}, {}
     darks = {e.name for e in layout.uniform if e.kind == "dark"}
     whole, white = codes == WHOLE, layout.white_dn
+    scatter = sqrt(len(layout.channels) / (layout.rows * layout.columns)) / 2
     of_many = effects.bulk_dn2 if spiky else effects.variance_dn2
     for place, level in levels.items():
         bent, more = effects.level_dn.get(place, 0.0), of_many.get(place, 0.0)
@@ -78,7 +79,8 @@ def undone(
         if whole and (not isfinite(stretch[place]) or of_two_codes(before, variance, white)):
             stretch[place] = inf
             given = camera.black_level if place[0] in darks else None
-            error = level.level_error_dn
+            # What effects add is the mean of pixels, each of which is on one code or the next.
+            error = hypot(level.level_error_dn, scatter if bent else 0.0)
             before, wider[place] = _placed(camera, own[0], error, white, given)
         shift[place] = mean - before - first[0] + bent
         made = square - variance - first[1] + more

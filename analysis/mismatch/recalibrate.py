@@ -123,7 +123,7 @@ def calibrate(
     held: float | None = None
     cut = _cut(layout, seen)
 
-    def before_codes(effects: Offsets, noise: BaseNoise = camera.noise) -> Offsets:
+    def before_codes(effects: Offsets, noise: BaseNoise) -> Offsets:
         own = camera.model_copy(update={"noise": noise})
         return undone(own, layout, seen.levels, codes_of(camera), effects, spiky=spiky)
 
@@ -133,15 +133,12 @@ def calibrate(
         free = partial(fit_base, black_dn=start, left_out=left_out, slopes=slopes)
         return free(layout, levels, at, offsets, intercept=held, cut=cut)
 
-    recorded = before_codes(effects)
-    held = _held(camera, fitted(recorded, switches), hidden=_hidden(layout, recorded))
-
     before: BaseFit | None = None
     change, noise = nan, near.model.camera.noise if near is not None and known else camera.noise
     settled = False
     for _ in range(_FINE_ROUNDS if fine else _ROUNDS if bending else 1):
         recorded = before_codes(effects, noise)
-        if fine and held is None:  # beside what effects add darks may hide it
+        if held is None and (fine or before is None):  # beside what effects add darks may hide it
             held = _held(camera, fitted(recorded, switches), hidden=_hidden(layout, recorded))
         fit = fitted(recorded, switches)
         settled = known

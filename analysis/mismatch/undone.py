@@ -1,6 +1,6 @@
 """What rounding to codes made of levels and variances, and what it makes of a model's."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from math import hypot, inf, isfinite, sqrt
 
 import numpy as np
@@ -68,10 +68,8 @@ def undone(
     of_many = effects.bulk_dn2 if spiky else effects.variance_dn2
     for place, level in levels.items():
         bent, more = effects.level_dn.get(place, 0.0), of_many.get(place, 0.0)
-        mean, square = (
-            level.level_dn + layout.black_dn,
-            level.bulk_dn2 if spiky else level.variance_dn2,
-        )
+        mean = level.level_dn + layout.black_dn
+        square = level.bulk_dn2 if spiky else level.variance_dn2
         # Rounding is no sum: narrow noise that is wider by an effect is rounded as that.
         first = (bent, more) if whole and square - more < _NARROW else (0.0, 0.0)
         own = mean - first[0], max(square - first[1], 0.0)
@@ -86,7 +84,7 @@ def undone(
         made = square - variance - first[1] + more
         if spiky:
             bulk[place] = made
-            plain = unrounded(mean, level.variance_dn2, layout.white_dn, *codes)[1]
+            plain = unrounded(mean, level.variance_dn2, white, *codes)[1]
             made = level.variance_dn2 - plain + effects.variance_dn2.get(place, 0.0)
         added[place] = made
     return Offsets(shift, added, stretch, bulk, wider)
@@ -145,29 +143,28 @@ def rounding(model: Model, layout: Layout, fit: BaseFit, codes: Codes, *, spiky:
 
 def together(first: Offsets, second: Offsets) -> Offsets:
     """Return what both add, with the errors of the first."""
-
-    def added(a: Mapping[Place, float], b: Mapping[Place, float]) -> dict[Place, float]:
-        return {place: value + b.get(place, 0.0) for place, value in a.items()}
-
-    return Offsets(
-        added(first.level_dn, second.level_dn),
-        added(first.variance_dn2, second.variance_dn2),
-        first.stretch,
-        added(first.bulk_dn2, second.bulk_dn2),
-        first.wider,
-    )
+    return _of_both(first, second, lambda value, more: value + (more or 0.0))
 
 
 def halfway(first: Offsets, second: Offsets) -> Offsets:
     """Return what lies halfway between what two models add, with the errors of the first."""
+    return _of_both(
+        first, second, lambda value, other: value if other is None else (value + other) / 2
+    )
 
-    def middle(a: Mapping[Place, float], b: Mapping[Place, float]) -> dict[Place, float]:
-        return {place: (value + b.get(place, value)) / 2 for place, value in a.items()}
+
+def _of_both(
+    first: Offsets, second: Offsets, of: Callable[[float, float | None], float]
+) -> Offsets:
+    """Return what a function makes of both at each place of the first; None: it is not there."""
+
+    def made(a: Mapping[Place, float], b: Mapping[Place, float]) -> dict[Place, float]:
+        return {place: of(value, b.get(place)) for place, value in a.items()}
 
     return Offsets(
-        middle(first.level_dn, second.level_dn),
-        middle(first.variance_dn2, second.variance_dn2),
+        made(first.level_dn, second.level_dn),
+        made(first.variance_dn2, second.variance_dn2),
         first.stretch,
-        middle(first.bulk_dn2, second.bulk_dn2),
+        made(first.bulk_dn2, second.bulk_dn2),
         first.wider,
     )

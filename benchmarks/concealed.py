@@ -21,6 +21,7 @@ from planter import ranking as rank
 from planter.deck import deal
 from planter.finder import FINDER, diagnose, named
 from planter.judgement import judge
+from planter.layout import LAYOUTS
 from planter.ledger import fingerprint, versions, work_through, write_ledger
 from planter.onreal import RealFrames
 from planter.seal import CROP, conceal, deal_values, reference, seal, vocabulary
@@ -45,6 +46,7 @@ def concealed(options: argparse.Namespace) -> dict[str, dict[str, Any]]:
         names[d.number]: {
             "deal": deal_values(d),
             "seed": options.seed,
+            "layout": options.layout,
             "work": str(options.work),
             "folder": str(options.work / names[d.number]),
             "ccd": str(ccd),
@@ -87,6 +89,7 @@ def main() -> None:
     parser.add_argument(
         "--no-word", action="store_true", help="of these only cases with an effect without a word"
     )
+    parser.add_argument("--layout", choices=sorted(LAYOUTS), default="small")
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--work", type=Path)
     parser.add_argument("--ccd", type=Path, default=CCD)
@@ -95,6 +98,7 @@ def main() -> None:
     if options.work is None:
         drawn = f"{options.seed}-{options.cases}" + (f"-{options.only}" if options.only else "")
         drawn += "-no-word" if options.no_word else ""
+        drawn += "" if options.layout == "small" else f"-{options.layout}"
         options.work = Path(gettempdir()) / f"dsis-concealed-{drawn}"
     options.work.mkdir(parents=True, exist_ok=True)
     key = concealed(options)

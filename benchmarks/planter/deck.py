@@ -133,7 +133,7 @@ def _with_own(rng: np.random.Generator, dealt: Deal) -> Deal:
     return replace(dealt, own=kind, wrong={**dealt.wrong, **wrong})
 
 
-def camera_for(dealt: Deal, seed: int) -> Case:
+def camera_for(dealt: Deal, seed: int, layout: str = "small") -> Case:
     """Return a random camera and layout that the effects and the decoy fit."""
     poisson_decoy = dealt.decoy == "poisson camera"
     for draw in range(CAMERAS):
@@ -150,7 +150,7 @@ def camera_for(dealt: Deal, seed: int) -> Case:
             light=False if dealt.decoy == "unknown light" else None,
             scene=dealt.decoy == "scene",
         )
-        case = draw_case(int(rng.integers(2**31)), "small", choice)
+        case = draw_case(int(rng.integers(2**31)), layout, choice)
         case = replace(case, wrong=dealt.wrong, shot="poisson" if poisson_decoy else "gaussian")
         kinds = dealt.kinds if dealt.own is None else (*dealt.kinds, dealt.own)
         if all(RECIPES[kind].fits(case) for kind in kinds):

@@ -31,7 +31,10 @@ def conceal(task: Mapping[str, Any]) -> dict[str, Any]:
     dealt, folder = Deal(**task["deal"]), Path(task["folder"])
     real = RealFrames.read(Path(task["ccd"]), *CROP) if dealt.real else None
     seed = task["seed"]
-    case = real.twin(seed * 1000 + dealt.number) if real else camera_for(dealt, seed)
+    if real:
+        case = real.twin(seed * 1000 + dealt.number)
+    else:
+        case = camera_for(dealt, seed, task.get("layout", "small"))
     if dealt.own is not None:
         case = replace(_planted(case, dealt.own, OWN_STRENGTH).case, known=(dealt.own,))
     plantings: list[Planting] = []

@@ -12,6 +12,10 @@ from analysis.mismatch.source import Source
 from analysis.mismatch.split import Split
 from analysis.mismatch.taking import layout_of
 from dsis.camera import Camera
+from dsis.effects import Effect
+from dsis.effects.dsnu import Dsnu
+from dsis.effects.prnu import Prnu
+from dsis.recording import Recording
 from mismatch_recordings import InMemory, camera, recorded
 
 GAIN = 5.0  # DN per electron
@@ -92,3 +96,64 @@ def test_few_electrons_beside_a_low_black_are_no_uneven_codes() -> None:
     found = find_mismatch(_model(1.44, 2.0), _recorded(1.2, 2.0, 4), seed=1)
     assert not found.omitted_physics
     assert not found.unexplained
+
+
+OFFSETS, SPREAD, NOISE, SLOPE = 2.0, 0.02, 3.0, 0.5
+
+
+def _with_offsets(black: float, seed: int) -> InMemory:
+    """Return numpy's own recording of pixels of their own offsets and gains, cut off at code 0."""
+    recording = recorded(camera(), seed, rows=64, columns=64, levels=LEVELS[1:])
+    assert recording.stacks is not None
+    rng = np.random.default_rng(seed)
+    offset, gain = rng.normal(0, OFFSETS, (64, 64)), rng.normal(1, SPREAD, (64, 64))
+    for name, frames in recording.stacks.items():
+        level = 0.0 if name.startswith("dark") else LEVELS[1 + int(name[-1])]
+        noise = rng.normal(0, 1, frames.shape) * np.sqrt(NOISE**2 + SLOPE * level * gain)
+        codes = np.rint(black + offset + level * gain + noise)
+        recording.stacks[name] = np.clip(codes, 0, 4095).astype(np.uint16)
+    return recording
+
+
+def _user(black: float, *effects: Effect) -> Camera:
+    return camera(*effects, segments=((SLOPE, NOISE**2, None),), black=black)
+
+
+@pytest.mark.parametrize(("black", "seed"), [(0.0, 11), (3.0, 12)])
+def test_offsets_that_the_user_states_are_cut_off_pixel_by_pixel(black: float, seed: int) -> None:
+    """Half of what is dark lies below code 0, of each pixel another part: no physics of its own."""
+    own = Dsnu(sigma_dn=OFFSETS), Prnu(sigma_percent=100 * SPREAD)
+    found = find_mismatch(_user(black, *own), _with_offsets(black, seed), seed=1)
+    assert found.verdict == "match"
+    black_dn = found.camera.black_level
+    assert black_dn == pytest.approx(black, abs=0.15)  # where darks lie 2 DN above it
+
+
+def test_offsets_beside_a_cut_are_named_with_their_size() -> None:
+    user = _user(0.0, Prnu(sigma_percent=100 * SPREAD))
+    (one,) = find_mismatch(user, _with_offsets(0.0, 13), seed=1).omitted_physics
+    assert one.effect == "dsnu"
+    told = one.parameters["sigma_dn"]
+    assert abs(told.value - OFFSETS) < 4 * told.standard_error < 1.0
+
+
+class _Darks(InMemory):
+    """The darks of a recording alone."""
+
+    @classmethod
+    def of(cls, own: InMemory) -> Recording:
+        darks = tuple(e for e in own.exposures if e.kind == "dark")
+        return cls(own.sensor, darks, own.rows, own.columns, own.folder, own.stacks)
+
+
+def test_darks_of_which_half_is_cut_off_prove_nothing() -> None:
+    """Nothing is left to be proven on; what differs is located."""
+    recording = _with_offsets(0.0, 14)
+    assert recording.stacks is not None
+    rng = np.random.default_rng(14)
+    hot = rng.random((64, 64)) < 0.01
+    recording.stacks["dark-1"] += (60 * hot).astype(np.uint16)
+    found = find_mismatch(_user(0.0), _Darks.of(recording), seed=1)
+    assert not found.omitted_physics
+    assert "outlying_pixels" in {own.statistic for own in found.unexplained}
+    assert all("nan" not in own for own in found.remarks)

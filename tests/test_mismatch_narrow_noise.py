@@ -38,7 +38,8 @@ def _layout() -> Any:
 def _level(mean: float, square: float, error: float = 1e-4) -> Any:
     """Return a recorded level: mean code and variance of codes."""
     own = mean - BLACK
-    return Stub(level_dn=own, level_error_dn=error, variance_dn2=square, bulk_dn2=square)
+    squares = {"variance_dn2": square, "bulk_dn2": square}
+    return Stub(level_dn=own, level_error_dn=error, clipped_low=0.0, **squares)
 
 
 def _of_two(share: float) -> tuple[float, float]:

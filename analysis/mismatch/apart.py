@@ -8,9 +8,8 @@ from analysis.mismatch.finding import ParameterError
 from analysis.mismatch.state import State
 from dsis.camera import Camera
 from dsis.effects import Effect
-from dsis.effects.dark_current import DarkCurrent
+from dsis.effects.dark_current import MOST_APART, DarkCurrent
 
-_MOST = 3.0  # that the effect allows
 _CLEAR = 3.0  # standard errors between two sizes that no chance sets apart
 _CALLS = frozenset({"fixed_pixel_variance", "outlying_pixels"})
 
@@ -22,7 +21,7 @@ def as_far_apart(before: Effect | None, after: Effect) -> Effect:
     if not (before.log_sigma and after.dn_per_s) or after.log_sigma != before.log_sigma:
         return after
     sigma = of_all(before.log_sigma, before.dn_per_s / after.dn_per_s)
-    return after.model_copy(update={"log_sigma": min(sigma, _MOST)})
+    return after.model_copy(update={"log_sigma": min(sigma, MOST_APART)})
 
 
 def known_at_once(effect: Effect) -> bool:
@@ -68,7 +67,7 @@ def apart_of_users(state: State, users: Camera, before: Apart | None) -> Apart |
     spread = None if rate is None else current_spread_of(clues, rate)
     if rate is None or spread is None:
         return None
-    sigma = min(of_all(spread.log_sigma, rate / effect.dn_per_s), _MOST)
+    sigma = min(of_all(spread.log_sigma, rate / effect.dn_per_s), MOST_APART)
     error = sigma * spread.error / spread.log_sigma
     model = effect.log_sigma if before is None else before.model
     return Apart(place, model, sigma, error) if abs(sigma - model) > _CLEAR * error else None

@@ -29,6 +29,7 @@ from dsis.camera import Camera
 Array = NDArray[np.float64]
 IDLE = "all that called for it is left, and nothing that differed is explained by it alone or best"
 UNCALLED = "it explains nothing that differs in all frames, and frames leave it open"
+NO_FRAME = "no locked frame can show it: there is none, or code 0 or white cuts off too much"
 _QUARTER = 0.25  # of what an effect explains, that may be left beside one of no clear size
 _LITTLE = 0.3  # of what a number differs by, that an effect changes
 _DOUBTFUL = 30.0  # gain of log-likelihood below which locked frames may not confirm an effect
@@ -182,6 +183,7 @@ def proven(
         worst = min(weak, key=lambda named: gained[named.name].gain.nats_per_frame)
         nats = gained[worst.name].gain.nats_per_frame
         why = f"gains {nats:.3g} nats per locked frame, no more than chance"
+        why = why if isfinite(nats) else NO_FRAME
         if _calls_left(search, final, worst) and gained[worst.name].gain.ci95[0] <= 0 < nats:
             why += " may where what calls for it is left"
         final = _without(search, final, (worst, why), judged=judged)

@@ -105,7 +105,7 @@ class Trial:
     recording, split
         The frames.
     held
-        What the likelihood reads of them; None where no frame is locked.
+        What the likelihood reads of them; None where no frame is locked, or all are clipped.
     numbers
         The bank's numbers of all frames: a witness where single pixels see too little.
     seed
@@ -125,6 +125,7 @@ class Trial:
     def of(cls, recording: Recording, split: Split, source: Source, setting: Setting) -> "Trial":
         """Return the trial of a recording."""
         held = hold(recording, split.development, split.locked) if split.locked else None
+        held = held if held is not None and held.locked else None  # darks of which half is at 0
         numbers = HeldNumbers(recording, split, source, setting)
         return cls(recording, split, held, numbers, setting.seed)
 

@@ -6,7 +6,7 @@ from math import hypot, inf, isfinite, sqrt
 import numpy as np
 from scipy.optimize import brentq
 
-from analysis.mismatch.basefit import BaseFit, Offsets
+from analysis.mismatch.basefit import CLIPPED_SHARE, BaseFit, Offsets
 from analysis.mismatch.layout import Layout, Place, sites
 from analysis.mismatch.model import Model
 from analysis.mismatch.observe import Level
@@ -26,10 +26,17 @@ _STEP, _FLAT = 1e-3, 1e-2  # codes; by how much less than a level its mean code 
 def narrow(levels: Mapping[Place, Level], codes: Codes, *, spiky: bool) -> bool:
     """Return whether noise is so narrow beside whole codes that each pixel is rounded by itself.
 
-    That of the many where recordings are `spiky`.
+    That of the many where recordings are `spiky`. Or so near to code 0 that each is cut off there
+    by itself.
     """
     squares = (own.bulk_dn2 if spiky else own.variance_dn2 for own in levels.values())
-    return codes == WHOLE and any(0 < square < _NARROW for square in squares)
+    some = any(0 < square < _NARROW for square in squares) or any(map(_cut, levels.values()))
+    return codes == WHOLE and some
+
+
+def _cut(level: Level) -> bool:
+    """Return whether code 0 cuts samples off."""
+    return level.clipped_low > CLIPPED_SHARE
 
 
 def undone(
@@ -70,8 +77,9 @@ def undone(
         bent, more = effects.level_dn.get(place, 0.0), of_many.get(place, 0.0)
         mean = level.level_dn + layout.black_dn
         square = level.bulk_dn2 if spiky else level.variance_dn2
-        # Rounding is no sum: narrow noise that is wider by an effect is rounded as that.
-        first = (bent, more) if whole and square - more < _NARROW else (0.0, 0.0)
+        # Rounding is no sum: narrow noise that is wider by an effect is rounded, or cut, as that.
+        alone = whole and (square - more < _NARROW or _cut(level))
+        first = (bent, more) if alone else (0.0, 0.0)
         own = mean - first[0], max(square - first[1], 0.0)
         before, variance, stretch[place], wider[place] = unrounded(*own, white, *codes)
         if whole and (not isfinite(stretch[place]) or of_two_codes(before, variance, white)):

@@ -166,7 +166,7 @@ def _level(exposure: Taken, channel: str, seen: Observation, fit: BaseFit, darks
             return nan, inf
         return level.level_dn - fit.black_dn[channel], level.level_error_dn
     per_light = fit.light_dn.get(colour(channel))
-    if per_light is None or exposure.light is None or level.clipped_high > CLIPPED_SHARE:
+    if per_light is None or exposure.light is None:
         return nan, inf
     signal = fit.signal_dn[name, channel]
     error = sqrt(level.level_error_dn**2 + (RELATIVE_LIGHT * signal) ** 2)

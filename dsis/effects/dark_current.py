@@ -9,6 +9,7 @@ from pydantic import Field
 
 from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, Stage
 
+MOST_APART = 3.0  # standard deviation of a logarithm: more is no law of a sensor
 _OF_PIXELS = frozenset({"fixed_pixel_variance", "variance_spread", "kurtosis"})
 
 
@@ -23,7 +24,7 @@ class DarkCurrent(Effect):
 
     kind: Literal["dark_current"] = "dark_current"
     dn_per_s: Annotated[float, Field(ge=0, examples=[400.0])]
-    log_sigma: Annotated[float, Field(ge=0, le=3, exclude_if=not_)] = 0.0
+    log_sigma: Annotated[float, Field(ge=0, le=MOST_APART, exclude_if=not_)] = 0.0
 
     stage: ClassVar[Stage] = Stage.LIGHT
     rank: ClassVar[int] = 50  # after what acts on light alone

@@ -13,7 +13,7 @@ from analysis.mismatch.candidates.candidate import Candidate, Proposal, measured
 from analysis.mismatch.clues import Clues
 from analysis.mismatch.counted import Counted
 from analysis.mismatch.hotlaw import hot_laws
-from dsis.effects.dark_current import DarkCurrent
+from dsis.effects.dark_current import MOST_APART, DarkCurrent
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -34,7 +34,7 @@ def _dark_current(clues: Clues) -> Sequence[Proposal]:
         return []
     found = proposals("dark_current", [_RATE], dn_per_s=rate)
     spread = current_spread_of(clues, rate)
-    if spread is None:
+    if spread is None or spread.log_sigma > MOST_APART:
         return found
     of_pixels = spread.gain if _normal(clues) else None
     values, errors = {_SPREAD: spread.log_sigma}, {_SPREAD: spread.error}

@@ -2,11 +2,11 @@
 
 Frames are split by number in alternating blocks (train, select, train, locked), so that slow drift
 is in all parts. Exposures of fewer than six frames are given whole to one part; the brightest is
-not locked, for no other shows where a full well ends or what a long exposure gathers; of four
+not locked, for no other shows where a full well ends or what a long exposure gathers; of three
 frames or more its last one is, for nothing else proves that. Where of few darks, or flats, none
-would be locked, the last frame of each that has four or more is: read noise alone is proven nowhere
-else. One flat level is left out of the re-calibration, so that the line's
-interpolation is tested.
+would be locked, the last frame of each that has three or more is: read noise and offsets are proven
+nowhere else. One flat level is left out of the re-calibration, so that the line's interpolation is
+tested.
 """
 
 from collections.abc import Collection, Mapping
@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from dsis.recording import RecordedExposure, Recording
 
 LEAST_FRAMES = 6
-_LEAST_SPREAD = 4  # frames, of which three are left to look at
+_LEAST_SPREAD = 3  # frames, of which two are left to look at
 _BLOCKS = 16  # about so many blocks in a long exposure
 _ORDER = (0, 1, 0, 2)  # train, select, train, locked
 _LOCKED = 2

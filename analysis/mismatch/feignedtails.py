@@ -1,5 +1,7 @@
 """Tails that something else feigns: codes of unequal width, noise that leans, or has its place."""
 
+from math import inf, sqrt
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,6 +15,7 @@ from analysis.mismatch.recalibrate import code_step
 from analysis.mismatch.resolved import CLEAR, FAR_OFF
 from analysis.mismatch.state import State
 from dsis.effects.adc_dnl import AdcDnl
+from dsis.effects.impulse import Impulse
 
 Array = NDArray[np.float64]
 _CUT, _NEARLY_ALL = -0.1, 0.9  # of a kurtosis; of all exposures and channels
@@ -24,6 +27,7 @@ _ALIKE = frozenset(
     }
 )  # fmt: skip
 _MOST = 0.5  # of tails, that something else may feign
+_TALL = 20.0  # standard deviations, that no noise of some lines has
 _SCATTER = 1.84  # see `coded`
 _OF_PIXELS = frozenset({"variance_spread", "one_off_outliers"})
 _TAILS = TAILS | {"read_noise_spread", "rts"}
@@ -144,7 +148,7 @@ def placed(state: State, kind: str, without: Array) -> Denial | None:
     Pixels of different noise have heavy tails in all of them together, and none by themselves.
     Where noise that varies smoothly, or from line to line, is left unexplained, they must show
     within single pixels, surely and by half, if these tell. Few spikes do not: beside lines that
-    differ they may be those of the noisiest.
+    differ they may be those of the noisiest, unless they tower above all noise.
     """
     lines = any(m.statistic in BY_LINE for m in state.mismatches)
     uneven = lines or any(m.statistic == SURFACE for m in state.mismatches)
@@ -155,11 +159,18 @@ def placed(state: State, kind: str, without: Array) -> Denial | None:
     size, shown = _shown(state, without, own)
     if size < CLEAR:
         few = Denial(0.0, "lines differ in noise, and what is far out may be noise of these")
-        return few if lines and kind == "impulse" else None
+        return few if lines and kind == "impulse" and not _tall(state) else None
     if shown >= max(CLEAR, _MOST * size):
         return None
     why = f"noise differs from place to place, and single pixels show them by {shown:.1f} errors"
     return Denial(0.0, why)
+
+
+def _tall(state: State) -> bool:
+    """Return whether the model's spikes are higher than any noise of the quietest exposure."""
+    heights = [own.mean_dn for own in state.camera.effect if isinstance(own, Impulse)]
+    quietest = min(state.setting.layout.variance_dn2.values(), default=inf)
+    return max(heights, default=0.0) > _TALL * sqrt(quietest)
 
 
 def timed(state: State, kind: str, without: Array) -> Denial | None:

@@ -15,6 +15,7 @@ from dsis.errors import InputError
 from dsis.recording import Recording
 
 _LEAST_FRAMES = 2
+_LEAST_LINES = 4  # rows, and columns
 _CUT = 0.25  # of the largest variance at less light: what is less, a full well has cut
 # Pairs of neighbours that both moved, below which sums of their products are not near normal.
 _LEAST_PAIRS = 30.0
@@ -34,7 +35,7 @@ def layout_of(
     Raises
     ------
     InputError
-        Nothing is left.
+        Nothing is left, or frames are so small that their lines tell nothing.
     """
     sensor = recording.sensor
     taken = []
@@ -43,6 +44,10 @@ def layout_of(
     variances: dict[Place, float] = {}
     plain: dict[Place, float] = {}
     step = 1 if sensor.cfa is Cfa.MONO else 2
+    if min(recording.rows, recording.columns) < _LEAST_LINES * step:
+        size, each = f"{recording.columns} x {recording.rows}", " of each colour" * (step - 1)
+        fact = f"are of {size} pixels, must have at least {_LEAST_LINES} rows and columns{each}"
+        raise InputError.of(recording.folder, "frames", fact)
     for recorded in recording.exposures:
         own = tuple(numbers.get(recorded.name, ()))
         if len(own) < _LEAST_FRAMES:

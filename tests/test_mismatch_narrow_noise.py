@@ -206,3 +206,23 @@ def test_a_camera_that_is_right_is_right_beside_coarse_codes(
     levels = (2.0, 10.0, 60.0, 200.0)
     found = find_mismatch(user, recorded(user, 3, rows=64, columns=96, levels=levels), seed=1)
     assert found.verdict == "match"
+
+
+def test_a_wave_that_rounding_weakens_is_told_as_it_was_before() -> None:
+    """Of noise of 0.3 codes about a whole code 0.66 of a small wave is left: numpy's own frames."""
+    levels, amplitude = (40.0, 160.0), 0.04
+    user = camera(segments=((0.4, 0.09, None),), black=200.0)
+    recording = recorded(user, 1, rows=64, columns=96, frames=16, levels=levels)
+    assert recording.stacks is not None
+    rng = np.random.default_rng(1)
+    y, x = np.mgrid[:64, :96]
+    for name, frames in recording.stacks.items():
+        level = 0.0 if name.startswith("dark") else levels[int(name[-1])]
+        noise = np.sqrt(0.09 + 0.4 * level) * rng.standard_normal(frames.shape)
+        phase = 2 * np.pi * (0.19 * x + 0.11 * y + rng.random((len(frames), 1, 1)))
+        codes = np.rint(200.0 + level + amplitude * np.cos(phase) + noise)
+        recording.stacks[name] = np.clip(codes, 0, 4095).astype(np.uint16)
+    (one,) = find_mismatch(user, recording, seed=1).omitted_physics
+    assert one.effect == "periodic_noise"
+    told = one.parameters["amplitude_dn"]
+    assert abs(told.value - amplitude) < 3 * told.standard_error < amplitude / 4

@@ -18,6 +18,7 @@ from analysis.mismatch.bandgain import gain_of_bands, place_of_bands, turns_of_b
 from analysis.mismatch.instance import Frequency, frequency_of, same_line
 from analysis.mismatch.layout import Layout
 from analysis.mismatch.projections import LEAST, SURE, FramesOf, Power, projections
+from analysis.mismatch.undone import NARROW
 from dsis.effects import Effect
 from dsis.effects.line_flicker import LineFlicker
 from dsis.effects.rts import Rts
@@ -120,7 +121,16 @@ class WholeFrames(FramesAsked):
             known = {name: own for name, (own, _) in told}, {name: own for name, (_, own) in told}
             return known if told else None
         line = self.line(effect)
-        return None if line is None else (line.values, line.errors)
+        if line is None:
+            return None
+        # Of a wave that is small beside a code rounding leaves more or less, as the noise may be.
+        hidden = min(self.layout.variance_dn2.values()) < NARROW
+        known = {"frequency"} if hidden else {"frequency", "amplitude_dn"}
+        values, errors = (
+            {name: own for name, own in some.items() if name in known}
+            for some in (line.values, line.errors)
+        )
+        return values, errors
 
     def line(self, effect: Effect) -> "Line | None":
         """Return amplitude and frequency of a line; None: too little is seen.

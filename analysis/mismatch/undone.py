@@ -16,7 +16,7 @@ from dsis.camera import Camera
 Codes = tuple[float, float]
 """Step between codes, and the lowest code, its phase, DN."""
 WHOLE: Codes = (1.0, 0.0)
-_NARROW = 1 / 3  # codes^2, recorded: of half a code of noise between two codes
+NARROW = 1 / 3  # codes^2, recorded: of half a code of noise between two codes
 _NEAR = 0.75  # codes from its mean code within which a level lies
 _CHANCE = 4.0  # standard errors
 _NONE, _LEAST = 1e-4, 1e-9  # codes^2 and DN: none to speak of
@@ -30,7 +30,7 @@ def narrow(levels: Mapping[Place, Level], codes: Codes, *, spiky: bool) -> bool:
     by itself.
     """
     squares = (own.bulk_dn2 if spiky else own.variance_dn2 for own in levels.values())
-    some = any(0 < square < _NARROW for square in squares) or any(map(_cut, levels.values()))
+    some = any(0 < square < NARROW for square in squares) or any(map(_cut, levels.values()))
     return codes == WHOLE and some
 
 
@@ -78,7 +78,7 @@ def undone(
         mean = level.level_dn + layout.black_dn
         square = level.bulk_dn2 if spiky else level.variance_dn2
         # Rounding is no sum: narrow noise that is wider by an effect is rounded, or cut, as that.
-        alone = whole and (square - more < _NARROW or _cut(level))
+        alone = whole and (square - more < NARROW or _cut(level))
         first = (bent, more) if alone else (0.0, 0.0)
         own = mean - first[0], max(square - first[1], 0.0)
         before, variance, stretch[place], wider[place] = unrounded(*own, white, *codes)

@@ -11,5 +11,5 @@ WORDS = frozenset(
 
 
 def diagnosed(true: Camera, base: Camera, seed: int, words: frozenset[str] = WORDS) -> Finding:
-    recording = recorded(true, seed, levels=FEW_LEVELS)
+    recording = recorded(true, seed, columns=64, levels=FEW_LEVELS)
     return find_mismatch(base, recording, seed=1, vocabulary=words)

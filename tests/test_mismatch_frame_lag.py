@@ -8,13 +8,13 @@ from analysis.mismatch import find_mismatch
 from mismatch_recordings import FEW_LEVELS, InMemory, camera, recorded
 
 BASE = camera()
-KEPT = 0.06
+KEPT = 0.085
 Array = NDArray[np.float64]
 
 
 def _averaged(*, charge_alone: bool) -> InMemory:
     """Return numpy's own recording whose frames keep some of the one before, or of its charge."""
-    made = recorded(BASE, 3, levels=FEW_LEVELS)
+    made = recorded(BASE, 3, rows=64, columns=96, levels=FEW_LEVELS)
     rng = np.random.default_rng(4)
     stacks = {}
     for e in made.exposures:

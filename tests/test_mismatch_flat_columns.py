@@ -91,10 +91,10 @@ def test_covariance_of_lines_is_that_of_drawn_ones() -> None:
 
 @pytest.mark.parametrize("cfa", ["MONO", "RGGB"])
 def test_white_columns_without_their_word_stay_unexplained(cfa: str) -> None:
-    hidden = EFFECTS["column_noise"](sigma_dn=0.3)
+    hidden = EFFECTS["column_noise"](sigma_dn=0.42)
     found = find_mismatch(
         camera(cfa=cfa),
-        recorded(camera(hidden, cfa=cfa), 40, levels=(250.0, 900.0)),
+        recorded(camera(hidden, cfa=cfa), 40, rows=48, levels=(250.0, 900.0)),
         vocabulary=VOCABULARY - {"column_noise"},
     )
     assert not found.omitted_physics

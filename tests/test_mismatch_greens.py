@@ -21,18 +21,18 @@ def _found(folder: Path, planted: Planted, words: frozenset[str] = WORDS) -> Fin
     choice = Choice(cfa="GRBG", segments=1, light=True, times="darks")
     case = draw_case(4, "small", choice)
     few = tuple(one for one in case.exposures if one.name not in {"flat-1", "flat-3"})
-    plant(folder, replace(case, exposures=few).having(planted))
+    plant(folder, replace(case, rows=64, columns=96, exposures=few).having(planted))
     camera = read_camera(folder / "camera.toml")
     return find_mismatch(camera, read_recording(folder), seed=1, vocabulary=words)
 
 
 def test_greens_that_differ_are_named_and_amplifiers_are_their_alternative(tmp_path: Path) -> None:
-    found = _found(tmp_path, Planted("channel_imbalance", {"gain_percent": -0.4}))
+    found = _found(tmp_path, Planted("channel_imbalance", {"gain_percent": -0.56}))
     (named,) = found.omitted_physics
     assert named.effect == "channel_imbalance"
     fitted = named.parameters["gain_percent"]
     assert isinstance(fitted.value, float)
-    assert abs(abs(fitted.value) - 0.4) < 3 * fitted.standard_error
+    assert abs(abs(fitted.value) - 0.56) < 3 * fitted.standard_error
     (other,) = (one for one in named.alternatives if one.effect == "tap_mismatch")
     assert other.would_settle
     assert not found.undecided
@@ -40,7 +40,7 @@ def test_greens_that_differ_are_named_and_amplifiers_are_their_alternative(tmp_p
 
 def test_greens_that_differ_are_no_amplifiers_where_they_have_no_word(tmp_path: Path) -> None:
     words = VOCABULARY - {"channel_imbalance"}
-    found = _found(tmp_path, Planted("channel_imbalance", {"gain_percent": 0.4}), words)
+    found = _found(tmp_path, Planted("channel_imbalance", {"gain_percent": 0.56}), words)
     assert not found.omitted_physics
     assert "channel_ratio" in {one.statistic for one in found.unexplained}
 

@@ -17,9 +17,10 @@ from dsis.cfa import Cfa
 from dsis.effects.shading import Shading
 from mismatch_recordings import InMemory, camera, recorded, state_of_all
 
-ROWS, COLUMNS, FRAMES, LEVELS = 96, 128, 8, (400.0, 1200.0, 2800.0)
-SLOPE, INTERCEPT, BLACK = 0.5, 20.0, 64.0
+ROWS, COLUMNS, FRAMES, LEVELS = 64, 96, 8, (400.0, 1200.0, 2800.0)
+SLOPE, INTERCEPT, BLACK = 0.25, 10.0, 64.0
 ROW_NOISE = 0.9  # DN
+PARTS = ((SLOPE, INTERCEPT, None),)
 WORDS = frozenset({"shading", "row_noise", "tap_mismatch", "line_settling", "channel_imbalance"})
 Array = NDArray[np.float64]
 
@@ -47,7 +48,7 @@ def _recording(light: Array, cfa: Cfa, rows_by: float = 0.0, seed: int = 3) -> I
 
 
 def _measured(light: Array, cfa: Cfa = Cfa.MONO, *own: Shading) -> Named | None:
-    model = camera(*own, cfa=cfa.name)
+    model = camera(*own, cfa=cfa.name, segments=PARTS)
     return measured_light(state_of_all(_recording(light, cfa), model).clues(), beside=bool(own))
 
 
@@ -64,10 +65,10 @@ def _named(found: Finding) -> dict[str, dict[str, tuple[float, float]]]:
 
 @pytest.mark.parametrize("cfa", [Cfa.MONO, Cfa.RGGB])
 def test_a_lens_off_the_centre_is_measured_and_hides_no_row_noise(cfa: Cfa) -> None:
-    """Half of the light is lost in a corner; row noise is a fifth of the read noise."""
-    light = _lens(0.5, (9.0, -20.0))
+    """Half of the light is lost in a corner; row noise is two sevenths of the read noise."""
+    light = _lens(0.5, (6.0, -15.0))
     recording = _recording(light, cfa, ROW_NOISE)
-    found = find_mismatch(camera(cfa=cfa.name), recording, seed=1, vocabulary=WORDS)
+    found = find_mismatch(camera(cfa=cfa.name, segments=PARTS), recording, seed=1, vocabulary=WORDS)
     named = _named(found)
     assert sorted(named) == ["row_noise", "shading"]
     value, error = named["row_noise"]["sigma_dn"]
@@ -82,7 +83,7 @@ def test_a_lens_off_the_centre_is_measured_and_hides_no_row_noise(cfa: Cfa) -> N
 
 
 def test_a_measured_field_is_the_light() -> None:
-    light = _lens(0.5, (9.0, -20.0))
+    light = _lens(0.5, (6.0, -15.0))
     found = _measured(light)
     assert found is not None
     assert found.light is not None
@@ -104,10 +105,10 @@ def test_what_has_few_numbers_or_no_end_is_not_measured() -> None:
     halves = np.ones((ROWS, COLUMNS))
     halves[:, COLUMNS // 2 :] = 1.05
     assert _measured(halves) is None
-    decay = np.broadcast_to(1 - 0.1 * np.exp(-np.arange(COLUMNS) / 8), (ROWS, COLUMNS))
+    decay = np.broadcast_to(1 - 0.1 * np.exp(-np.arange(COLUMNS) / 6), (ROWS, COLUMNS))
     assert _measured(decay) is None
     y, x = (np.minimum(np.arange(n), n - np.arange(n)) for n in (ROWS, COLUMNS))
-    power = np.maximum(np.fft.fft2(np.exp(-np.hypot(y[:, None], x) / 12)).real, 0)
+    power = np.maximum(np.fft.fft2(np.exp(-np.hypot(y[:, None], x) / 9)).real, 0)
     white = np.fft.fft2(np.random.default_rng(2).standard_normal((ROWS, COLUMNS)))
     assert _measured(1 + 0.02 * np.fft.ifft2(np.sqrt(power) * white).real) is None
 
@@ -134,7 +135,7 @@ def test_light_of_the_users_camera_may_be_of_another_size_alone(fall: float) -> 
         np.linspace(-1, 1, COLUMNS) ** 2 * COLUMNS**2
     )
     light = 1 - fall * square / (ROWS**2 + COLUMNS**2)
-    model = camera(Shading(falloff_percent=12.0))
+    model = camera(Shading(falloff_percent=12.0), segments=PARTS)
     words = frozenset({"shading", "row_noise"})
     found = find_mismatch(model, _recording(light, Cfa.MONO), seed=1, vocabulary=words)
     assert not found.omitted_physics
@@ -144,9 +145,11 @@ def test_light_of_the_users_camera_may_be_of_another_size_alone(fall: float) -> 
 
 
 def test_two_amplifiers_behind_a_lens_are_told() -> None:
-    light = _lens(0.5, (9.0, -20.0))
+    light = _lens(0.5, (6.0, -15.0))
     light[:, COLUMNS // 2 :] *= 1.03
-    found = find_mismatch(camera(), _recording(light, Cfa.MONO), seed=1, vocabulary=WORDS)
+    found = find_mismatch(
+        camera(segments=PARTS), _recording(light, Cfa.MONO), seed=1, vocabulary=WORDS
+    )
     named = _named(found)
     assert sorted(named) == ["shading", "tap_mismatch"]
     value, error = named["tap_mismatch"]["gain_percent"]
@@ -155,7 +158,9 @@ def test_two_amplifiers_behind_a_lens_are_told() -> None:
 
 
 def test_without_a_word_for_it_nothing_is_measured() -> None:
-    recording = _recording(_lens(0.5, (9.0, -20.0)), Cfa.MONO)
-    found = find_mismatch(camera(), recording, seed=1, vocabulary=frozenset({"row_noise"}))
+    recording = _recording(_lens(0.5, (6.0, -15.0)), Cfa.MONO)
+    found = find_mismatch(
+        camera(segments=PARTS), recording, seed=1, vocabulary=frozenset({"row_noise"})
+    )
     assert not found.omitted_physics
     assert replace(found, remarks=()).unexplained

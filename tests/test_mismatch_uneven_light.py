@@ -16,7 +16,7 @@ from dsis.effects import registry
 from dsis.recording import read_recording
 from mismatch_recordings import FEW_LEVELS, camera, recorded
 
-FALL, DOWN, RIGHT, BOW = 2.0, -1.5, 1.0, 1.5
+FALL, DOWN, RIGHT, BOW = 2.8, -2.1, 1.4, 2.1
 NUMBERS = (
     "falloff_percent",
     "tilt_down_percent",
@@ -40,7 +40,9 @@ def _shading(**percent: float) -> object:
 )
 def test_uneven_light_is_named_with_its_numbers(percent: dict[str, float]) -> None:
     true = camera(_shading(**percent))  # type: ignore[arg-type] # an effect of the registry
-    found = find_mismatch(camera(), recorded(true, 8, levels=FEW_LEVELS), seed=1)
+    found = find_mismatch(
+        camera(), recorded(true, 8, rows=64, columns=96, levels=FEW_LEVELS), seed=1
+    )
     (named,) = found.omitted_physics
     assert named.effect == "shading"
     assert not found.unexplained
@@ -52,9 +54,9 @@ def test_uneven_light_is_named_with_its_numbers(percent: dict[str, float]) -> No
 
 
 def test_two_amplifiers_that_have_no_word_are_no_tilt_of_the_light() -> None:
-    taps = registry()["tap_mismatch"](gain_percent=1.5, regions="left_right")
+    taps = registry()["tap_mismatch"](gain_percent=2.1, regions="left_right")
     words = VOCABULARY - {"tap_mismatch"}
-    recording = recorded(camera(taps), 9, levels=FEW_LEVELS)
+    recording = recorded(camera(taps), 9, rows=64, columns=96, levels=FEW_LEVELS)
     found = find_mismatch(camera(), recording, seed=1, vocabulary=words)
     assert not found.omitted_physics
     assert found.verdict == "unexplained"

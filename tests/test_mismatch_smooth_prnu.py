@@ -213,12 +213,12 @@ def test_a_field_as_long_as_the_sensor_is_uneven_light(length: float, sane: bool
 
 
 def _found(true: Camera, seed: int, words: frozenset[str] = WORDS) -> Finding:
-    recording = recorded(true, seed, levels=FEW_LEVELS)
+    recording = recorded(true, seed, rows=64, columns=96, levels=FEW_LEVELS)
     return find_mismatch(camera(cfa=true.cfa), recording, seed=1, vocabulary=words)
 
 
 def test_in_a_mosaic_it_is_named_with_its_numbers() -> None:
-    own = {"sigma_percent": 0.13, "length_pixels": 3.0}
+    own = {"sigma_percent": 0.16, "length_pixels": 3.0}
     found = _found(camera(effect("smooth_prnu", **own), cfa="RGGB"), 9)
     (named,) = found.omitted_physics
     assert named.effect == "smooth_prnu"
@@ -229,7 +229,7 @@ def test_in_a_mosaic_it_is_named_with_its_numbers() -> None:
 
 
 def test_without_its_word_nothing_else_is_named() -> None:
-    true = camera(effect("smooth_prnu", sigma_percent=0.1, length_pixels=4.0))
+    true = camera(effect("smooth_prnu", sigma_percent=0.12, length_pixels=4.0))
     found = _found(true, 9, WORDS - {"smooth_prnu"})
     assert not {one.effect for one in found.omitted_physics} - {"prnu"}
     assert any(m.statistic == "fixed_patch_variance" for m in found.unexplained)

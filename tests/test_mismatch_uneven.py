@@ -215,11 +215,10 @@ def test_odds_are_the_mean_of_the_likelihood_over_the_growth(
 
 
 def test_a_glow_that_has_no_word_stays_unexplained() -> None:
-    glow = registry()["amp_glow"](dn_per_s=300.0, place="top_left", extent=0.15)
+    glow = registry()["amp_glow"](dn_per_s=420.0, place="top_left", extent=0.15)
     words = VOCABULARY - {"amp_glow"}
-    found = find_mismatch(
-        camera(), recorded(camera(glow), 7, levels=FEW_LEVELS), seed=3, vocabulary=words
-    )
+    recording = recorded(camera(glow), 7, rows=64, columns=96, levels=FEW_LEVELS)
+    found = find_mismatch(camera(), recording, seed=3, vocabulary=words)
     assert found.verdict == "unexplained"
     assert any(m.statistic.startswith("fixed_smooth") for m in found.unexplained)
 

@@ -124,13 +124,9 @@ class WholeFrames(FramesAsked):
         if line is None:
             return None
         # Of a wave that is small beside a code rounding leaves more or less, as the noise may be.
-        hidden = min(self.layout.variance_dn2.values()) < NARROW
-        known = {"frequency"} if hidden else {"frequency", "amplitude_dn"}
-        values, errors = (
-            {name: own for name, own in some.items() if name in known}
-            for some in (line.values, line.errors)
-        )
-        return values, errors
+        hidden = {"amplitude_dn"} if min(self.layout.variance_dn2.values()) < NARROW else set()
+        values = {name: own for name, own in line.values.items() if name not in hidden}
+        return values, {name: own for name, own in line.errors.items() if name not in hidden}
 
     def line(self, effect: Effect) -> "Line | None":
         """Return amplitude and frequency of a line; None: too little is seen.

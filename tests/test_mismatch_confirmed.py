@@ -149,6 +149,7 @@ def _beside(
     gain: float = 15.0,
     *,
     measured: bool = False,
+    large: bool = False,
 ) -> Any:
     """Return what is said of one effect beside row noise, that explains what `why` says."""
     own = {
@@ -185,7 +186,7 @@ def _beside(
         one.name: np.array([z[i] * (why.get(key) == one.name) for i, key in enumerate(keys)])
         for one in some
     }
-    search: Any = Stub(named=some)
+    search: Any = Stub(named=some, setting=Stub(large=large))
     first, last = states
     return confirmed.idle(search, first, last, changes)
 
@@ -203,8 +204,14 @@ def test_what_explains_nothing_goes_where_all_that_calls_for_it_is_left() -> Non
 
 
 def test_what_calls_for_an_effect_may_be_explained_with_a_stronger_one() -> None:
+    """Not of a large recording, whose weakest departures are far above chance: no law is exact."""
     nothing = {"row_mean_variance": "row_noise", "pixel_variance": "row_noise"}
     assert _beside(["level"], nothing) is None
+    found = _beside(["level"], nothing, large=True)
+    assert found is not None
+    assert (found[0].kind, found[1]) == ("nonlinearity", confirmed.SOME_LEFT)
+    assert _beside(["spectral_peak"], nothing, large=True) is None  # that calls for others
+    assert _beside(["level"], nothing, gain=100.0, large=True) is None
 
 
 def test_lines_behind_a_stronger_one_may_explain_nothing() -> None:

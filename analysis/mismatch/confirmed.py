@@ -28,6 +28,7 @@ from dsis.camera import Camera
 
 Array = NDArray[np.float64]
 IDLE = "all that called for it is left, and nothing that differed is explained by it alone or best"
+SOME_LEFT = "what calls for it is left, and nothing that differed is explained by it alone or best"
 UNCALLED = "it explains nothing that differs in all frames, and frames leave it open"
 NO_FRAME = "no locked frame can show it: there is none, or code 0 or white cuts off too much"
 _QUARTER = 0.25  # of what an effect explains, that may be left beside one of no clear size
@@ -58,19 +59,21 @@ def idle(
     """Return an effect to which nothing that differed is put down; None: there is none.
 
     It gained little, and all that called for it is left: it fits beside something else, that no
-    effect explains. Lines, and what else is measured, are shown by whole frames: where spectra peak
-    only the strongest is located. `known` is what each effect changes in the numbers of `base`, if
-    that was asked for already.
+    effect explains. Of a large recording, where the weakest is far above chance and no law is
+    exact, some of it. Lines, and what else is measured, are shown by whole frames: where spectra
+    peak only the strongest is located. `known` is what each effect changes in the numbers of
+    `base`, if that was asked for already.
     """
+    some, why = (True, SOME_LEFT) if search.setting.large else (False, IDLE)
     first, left = ({m.statistic for m in own.mismatches} for own in (base, final))
     asked = [
         n
         for n in search.named
         if n.gain < _DOUBTFUL and n.kind in CANDIDATES and not (n.kind in LINES or n.measured)
         if (calls := left.intersection(CANDIDATES[n.kind].calls))
-        and calls >= first.intersection(CANDIDATES[n.kind].calls)
+        and (some or calls >= first.intersection(CANDIDATES[n.kind].calls))
     ]
-    return _explaining_nothing(search, base, final, asked, IDLE, known)
+    return _explaining_nothing(search, base, final, asked, why, known)
 
 
 def _explaining_nothing(

@@ -185,8 +185,8 @@ def proven(
             return final, {name: one.gain for name, one in gained.items()}
         worst = min(weak, key=lambda named: gained[named.name].gain.nats_per_frame)
         nats = gained[worst.name].gain.nats_per_frame
-        why = f"gains {nats:.3g} nats per locked frame, no more than chance"
-        why = why if isfinite(nats) else NO_FRAME
+        chance = f"gains {nats:.3g} nats per locked frame, no more than chance"
+        why = chance if isfinite(nats) else NO_FRAME
         if _calls_left(search, final, worst) and gained[worst.name].gain.ci95[0] <= 0 < nats:
             why += " may where what calls for it is left"
         final = _without(search, final, (worst, why), judged=judged)

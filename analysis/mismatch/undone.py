@@ -30,12 +30,12 @@ def narrow(levels: Mapping[Place, Level], codes: Codes, *, spiky: bool) -> bool:
     by itself.
     """
     squares = (own.bulk_dn2 if spiky else own.variance_dn2 for own in levels.values())
-    some = any(0 < square < NARROW for square in squares) or any(map(_cut, levels.values()))
+    some = any(0 < square < NARROW for square in squares) or any(map(_clipped, levels.values()))
     return codes == WHOLE and some
 
 
-def _cut(level: Level) -> bool:
-    """Return whether code 0 cuts samples off."""
+def _clipped(level: Level) -> bool:
+    """Return whether the lowest code cuts samples off."""
     return level.clipped_low > CLIPPED_SHARE
 
 
@@ -78,7 +78,7 @@ def undone(
         mean = level.level_dn + layout.black_dn
         square = level.bulk_dn2 if spiky else level.variance_dn2
         # Rounding is no sum: narrow noise that is wider by an effect is rounded, or cut, as that.
-        alone = whole and (square - more < NARROW or _cut(level))
+        alone = whole and (square - more < NARROW or _clipped(level))
         first = (bent, more) if alone else (0.0, 0.0)
         own = mean - first[0], max(square - first[1], 0.0)
         before, variance, stretch[place], wider[place] = unrounded(*own, white, *codes)

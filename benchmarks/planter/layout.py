@@ -26,7 +26,7 @@ LAYOUTS = {
     "tiny": Layout(48, 64, 5, 6, 6),
     "small": Layout(96, 128, 5, 8, 8),
     "medium": Layout(192, 256, 9, 8, 16),
-    "video": Layout(480, 640, 9, 8, 16),  # so many samples that a search thins the recording
+    "video": Layout(480, 640, 9, 12, 16),  # 28 million samples to search: it is thinned
     "large": Layout(2736, 3648, 4, 6, 6),
 }
 

@@ -91,8 +91,8 @@ def test_odds_count_where_nothing_that_calls_for_the_effect_is_left(
     """Of the real CCD without its uneven codes, spikes gained 10 nats in 75 frames."""
     told = Gained(Gain(0.13, (low, 0.32)), certain=True)
     final = _left_open([left], [1.0])
-    spikes: Any = Stub(kind="impulse", proposal=Stub())
-    search: Any = Stub(without=lambda *_: None)
+    spikes: Any = Stub(kind="impulse", name="impulse", proposal=Stub())
+    search: Any = Stub(without=lambda *_: None, changes={})
     assert confirmed._believed(search, final, spikes, told).certain is certain
 
 
@@ -129,8 +129,8 @@ def _left_open(left: list[str], changes: list[float]) -> Any:
 def test_what_is_left_counts_where_the_effect_acts(
     left: list[str], changes: list[float], counts: bool
 ) -> None:
-    bend: Any = Stub(kind="nonlinearity", proposal=Stub())
-    search: Any = Stub(without=lambda *_: None)
+    bend: Any = Stub(kind="nonlinearity", name="nonlinearity", proposal=Stub())
+    search: Any = Stub(without=lambda *_: None, changes={})
     assert confirmed._calls_left(search, _left_open(left, changes), bend) is counts
     path: Any = Stub(kind="nonlinearity", proposal=None)
     called = not {"level", "pixel_variance"}.isdisjoint(left)

@@ -144,10 +144,10 @@ def undenied_by_all(
     return final, gains, None
 
 
-def undenied_by_many(search: Search, final: State, whole: State) -> tuple[State, dict[str, Array]]:
+def undenied_by_many(search: Search, final: State, whole: State) -> State:
     """Drop, one by one, what all frames of a large recording deny, as some did not.
 
-    Also returned is what each effect left changes in the numbers of `whole`: see `idle`.
+    What each effect that is left changes in the numbers is kept.
     """
     final = undenied(search, final)
     while (denied := denied_by_rest(search, final, whole)) is not None:
@@ -156,7 +156,8 @@ def undenied_by_many(search: Search, final: State, whole: State) -> tuple[State,
         known = changes(whole, final, search.named, partial(search.without, final))
         nothing = idle(search, whole, final, known)
         if nothing is None:
-            return final, known
+            search.changes = {name: own * whole.null.sd for name, own in known.items()}
+            return final
         final = undenied(search, search.drop(final, *nothing))
 
 
@@ -316,7 +317,9 @@ def _calls_left(search: Search, state: State, named: Named) -> bool:
     if unseen or not off:
         return unseen
     null = state.null
-    change = null.mean - state.predictor().mean(search.without(state, named))
+    change = search.changes.get(named.name)
+    if change is None:
+        change = null.mean - state.predictor().mean(search.without(state, named))
     change = np.where(null.known & np.isfinite(change), change, 0.0) / null.sd
     both = np.concatenate([change, null.contrasts.matrix @ change / null.contrast_sd])
     return bool((np.abs(both[off]) > _LITTLE * np.abs(state.departures[off])).any())
@@ -343,7 +346,7 @@ def _simulated(search: Search, state: State) -> None:
 
     def asked(one: Named) -> bool:
         off, unseen = _left_off(state, one)
-        return bool(off) and not unseen
+        return bool(off) and not unseen and one.name not in search.changes
 
     drawn = [one for one in search.named if one.effect is not None and one.effect.draws]
     some = [one for one in drawn if asked(one)]

@@ -55,7 +55,6 @@ from dsis.freed import keep_freed
 from dsis.recording import Recording
 
 Progress = Callable[[int, int, str], None]
-Array = NDArray[np.float64]
 VOCABULARY = frozenset({*CANDIDATES, "dual_gain"})
 _NEAR = 8.0  # of log-likelihood: a rival worth naming a recording that would decide
 _LOCATED = "No physics was looked for: it is only said where recording and model differ."
@@ -142,7 +141,7 @@ def _found(
             partial(evidence_of, whole, whole, album, split),
             setting.jobs,
         )
-        found = with_first_frames(_finding(camera, whole, whole, search, {}, proof, {}), first)
+        found = with_first_frames(_finding(camera, whole, whole, search, {}, proof), first)
         found = with_spikes(found, spikes, stored, split, asked)
         return _said(found, remarks, evidence, asked)
     base = whole if large else State.of(setting, camera, step)
@@ -157,18 +156,16 @@ def _found(
         measuring=frames,
     )
     final = _searched(search, source) if large else search.run()
-    known: dict[str, Array] = {}
     if large:  # simulations of large recordings tell more, and cost more
         search.setting = replace(setting, nulls=setting.drafts)
-        final, known = undenied_by_many(search, final, whole)
+        final = undenied_by_many(search, final, whole)
     final, gains = proven(search, search.settle(final), trial, judged=large)
     everything: State | None = None
     if not large:
         final, gains, everything = undenied_by_all(search, final, gains, trial, whole)
-    scale, users, whole = whole.null.sd, whole.mismatches, search.rebased(whole)
+    users, whole = whole.mismatches, search.rebased(whole)
     if users and not whole.mismatches:  # all that differed
         remarks = (*remarks, remark_on_sizes(users))
-    known = {name: change * scale / whole.null.sd for name, change in known.items()}
     proof, evidence = both(
         partial(trial.proof, search.base, final, step, source),
         partial(evidence_of, search.base, final, album, split),
@@ -179,7 +176,7 @@ def _found(
         departures = Change(len(whole.mismatches), len(final.mismatches))
         proof = replace(proof, discrepancies=departures)
     search.named = [_beside_undecided(search, one, lines, final.camera) for one in search.named]
-    found = with_first_frames(_finding(camera, whole, final, search, gains, proof, known), first)
+    found = with_first_frames(_finding(camera, whole, final, search, gains, proof), first)
     found = with_spikes(found, spikes, stored, split, asked)
     return _said(found, remarks, evidence, asked)
 
@@ -311,14 +308,13 @@ def _finding(
     search: Search,
     gains: dict[str, Gain],
     proof: Proof,
-    known: Mapping[str, Array],
 ) -> Finding:
-    """Return the finding; `known` are changes by effect asked for before all was settled."""
+    """Return the finding."""
     errors = parameter_errors(camera, final.calibrated, final.setting.layout, final.replicates.fits)
     errors += wrong_sizes(search.own) + wrong_spread(search.unlike)
-    missing = [named for named in search.named if named.name not in known]
-    more = changes(base, final, missing, partial(search.without, final))
-    own = {**known, **more}
+    missing = [named for named in search.named if named.name not in search.changes]
+    own = changes(base, final, missing, partial(search.without, final))
+    own |= {name: change / base.null.sd for name, change in search.changes.items()}
     explanations = explained(base, final, {one.name: own[one.name] for one in search.named})
     mismatches = tuple(
         replace(m, explained_by=None if name is None else kind_of(name), z_after=after)

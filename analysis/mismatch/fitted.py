@@ -3,6 +3,9 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+from numpy.typing import NDArray
+
 from analysis.mismatch.apart import Apart, apart_of_users, as_far_apart, with_apart
 from analysis.mismatch.candidates import CANDIDATES, Proposal
 from analysis.mismatch.candidates.patterns import of_any_shape
@@ -57,6 +60,9 @@ class Fitted:
     beside_path
         By the kinds of those taken in, and the level below it: whether a second path that was
         denied stands beside them.
+    changes
+        What effects taken in change in the numbers, by name, of a large recording: in the end they
+        change what they did before all was settled.
     whole, of_whole
         All frames of a small recording: they say whether anything differs. The model of these that
         was asked last.
@@ -76,6 +82,7 @@ class Fitted:
     beside_path: dict[tuple[str, ...], bool] = field(default_factory=dict)
     whole: Setting | None = None
     of_whole: State | None = None
+    changes: dict[str, NDArray[np.float64]] = field(default_factory=dict)
     unlike: Apart | None = None  # dark currents of the user's camera, otherwise than it has them
     left: State | None = None  # by the user's effects of other sizes, as all frames say
 

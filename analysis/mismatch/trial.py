@@ -22,6 +22,7 @@ from analysis.mismatch.phase import WholeFrames
 from analysis.mismatch.prove.gain import gain_of, heldout_gain, telling
 from analysis.mismatch.prove.gap import gap_closed
 from analysis.mismatch.prove.held import Held, hold
+from analysis.mismatch.prove.learning import Bases
 from analysis.mismatch.prove.likelihood import Loglik
 from analysis.mismatch.prove.proof import hold_seen, loglik_of, prove_held
 from analysis.mismatch.prove.virtual import Signals
@@ -82,7 +83,8 @@ def denied(gain: Gain, frames: int) -> bool:
 
 
 def _logliks_of(held: Held, signals: Signals, seed: int, cameras: Sequence[Camera]) -> list[Loglik]:
-    return [loglik_of(held, camera, signals, seed=seed) for camera in cameras]
+    bases = Bases(held, signals, seed)
+    return [loglik_of(held, camera, signals, seed=seed, bases=bases) for camera in cameras]
 
 
 def _key(camera: Camera, signals: Signals) -> tuple[str, bytes]:

@@ -8,7 +8,7 @@ little.
 """
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from analysis.mismatch.prove.hot import hot_of
 from analysis.mismatch.prove.law import Conspicuous, ExposureLaw, Law
 from analysis.mismatch.prove.marginal import with_groups, with_shapes, with_variances
 from analysis.mismatch.prove.patterns import Halves, Pattern, pattern_of
-from analysis.mismatch.prove.residuals import residuals_of
+from analysis.mismatch.prove.residuals import Residuals, residuals_of
 from analysis.mismatch.prove.shape import NORMAL
 from analysis.mismatch.prove.sites import site_places
 from analysis.mismatch.prove.teeth import teeth_of
@@ -51,7 +51,51 @@ _UNTIED = frozenset(
 )
 
 
-def law_of(camera: Camera, held: Held, signals: Signals, seed: int) -> Law:
+@dataclass(frozen=True)
+class Bases:
+    """Virtual sensors of base models, each made once: cameras that differ in effects share one.
+
+    Attributes
+    ----------
+    held, signals, seed
+        As `law_of` has them.
+    stacks
+        Frames of the sensor, by base model.
+    residuals
+        What is left of them, by base model and the edges of its codes.
+    """
+
+    held: Held
+    signals: Signals
+    seed: int
+    stacks: dict[str, dict[str, Stack]] = field(default_factory=dict)
+    residuals: dict[tuple[str, bytes], Residuals] = field(default_factory=dict)
+
+    def frames(self, base: Camera) -> dict[str, Stack]:
+        """Return the frames of a base model's virtual sensor."""
+        key = base.model_dump_json()
+        if key not in self.stacks:
+            self.stacks[key] = virtual_sensor(base, self.held, self.signals, self.seed)
+        return self.stacks[key]
+
+    def left(self, law: Law, teeth: Mapping[str, Image]) -> Residuals:
+        """Return residuals of a base model under its law; teeth are the camera's own."""
+
+        def made() -> Residuals:
+            return residuals_of(law, self.held, self.frames(law.camera), self.seed, teeth)
+
+        if teeth:
+            return made()
+        edges = law.cells.lower_dn.tobytes() + law.cells.upper_dn.tobytes()
+        key = law.camera.model_dump_json(), edges
+        if key not in self.residuals:
+            self.residuals[key] = made()
+        return self.residuals[key]
+
+
+def law_of(
+    camera: Camera, held: Held, signals: Signals, seed: int, bases: Bases | None = None
+) -> Law:
     """Return the predictive law of a camera model for the exposures held.
 
     Parameters
@@ -64,22 +108,23 @@ def law_of(camera: Camera, held: Held, signals: Signals, seed: int) -> Law:
         Clean signal of each flat and dark, DN above black, by rows 0, 1 and columns 0, 1: (2, 2).
     seed
         Of the virtual sensor.
+    bases
+        Sensors of base models that were made for other cameras; None: there are none.
     """
-    base = base_of(camera)
+    bases, base = bases or Bases(held, signals, seed), base_of(camera)
     cells = cells_of(camera, seed)
     plain = {e.name: _base_law(base, held, e, signals) for e in held.exposures}
     law = Law(camera, cells, plain, (), Conspicuous())
     if camera.effect or camera.saturation_dn or camera.noise.shot != "gaussian":
-        other = virtual_sensor(base, held, signals, seed)
         teeth = teeth_of(camera, held, signals)
         base_law = Law(base, cells, plain, (), Conspicuous())
         model = virtual_sensor(camera, held, signals, seed)
         calm, ties = without_spikes(camera), None
         if calm != camera and not _untied(calm):
             still = virtual_sensor(calm, held, signals, seed)
-            ties = _learned(replace(law, camera=calm), base_law, held, still, other, seed, teeth)
+            ties = _learned(replace(law, camera=calm), base_law, bases, still, teeth)
             ties = None if _odd(ties) else ties
-        law = _learned(law, base_law, held, model, other, seed, teeth, ties)
+        law = _learned(law, base_law, bases, model, teeth, ties)
     return law if cells.plain else _with_widths(law, held)
 
 
@@ -103,10 +148,8 @@ def _base_law(base: Camera, held: Held, exposure: HeldExposure, signals: Signals
 def _learned(
     law: Law,
     base_law: Law,
-    held: Held,
+    bases: Bases,
     model: Mapping[str, Stack],
-    other: Mapping[str, Stack],
-    seed: int,
     teeth: Mapping[str, Image],
     ties: Law | None = None,
 ) -> Law:
@@ -118,13 +161,14 @@ def _learned(
     of a few virtual frames feign them, or drown a pattern that the training frames tell well but
     for the few pixels that were hit.
     """
+    held, other = bases.held, bases.frames(base_law.camera)
     single = ties is not None or _untied(law.camera)
     if ties is not None:
         law = replace(law, patterns=ties.patterns)
     elif not single:
         law = replace(law, patterns=_patterns(law, held, model, other))
-    base = residuals_of(base_law, held, other, seed, teeth)
-    own = residuals_of(law, held, model, seed, teeth)
+    base = bases.left(base_law, teeth)
+    own = residuals_of(law, held, model, bases.seed, teeth)
     own = replace(own, law=with_variances(own, base, held))
     own = replace(own, law=with_groups(own, base, held))
     own = replace(own, law=with_shapes(own, base, held))

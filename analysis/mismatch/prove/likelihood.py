@@ -31,7 +31,7 @@ from analysis.mismatch.prove.law import (
     pixel_variance,
     sense,
 )
-from analysis.mismatch.prove.learning import law_of
+from analysis.mismatch.prove.learning import Bases, law_of
 from analysis.mismatch.prove.levels import frame_means, level_loglik
 from analysis.mismatch.prove.scores import normal_scores
 from analysis.mismatch.prove.shape import Shape
@@ -74,9 +74,11 @@ class LikelihoodModel:
         )
 
 
-def likelihood_model(camera: Camera, held: Held, signals: Signals, seed: int) -> LikelihoodModel:
+def likelihood_model(
+    camera: Camera, held: Held, signals: Signals, seed: int, bases: Bases | None = None
+) -> LikelihoodModel:
     """Return the model of a camera; see `law_of`."""
-    return LikelihoodModel(law_of(camera, held, signals, seed), held, seed)
+    return LikelihoodModel(law_of(camera, held, signals, seed, bases), held, seed)
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ from analysis.mismatch.model import each
 from analysis.mismatch.prove.classifier import Auc, auc_of
 from analysis.mismatch.prove.gain import heldout_gain
 from analysis.mismatch.prove.held import MOST_SEEN, Held, hold
+from analysis.mismatch.prove.learning import Bases
 from analysis.mismatch.prove.likelihood import (
     Loglik,
     frame_loglik,
@@ -145,9 +146,11 @@ def _judged(
     return told, auc_of(seen, camera, signals, seed=seed)
 
 
-def loglik_of(held: Held, camera: Camera, signals: Signals, *, seed: int) -> Loglik:
-    """Return the log-likelihood of the locked frames under a camera."""
-    told = frame_loglik(likelihood_model(camera, held, signals, seed))
+def loglik_of(
+    held: Held, camera: Camera, signals: Signals, *, seed: int, bases: Bases | None = None
+) -> Loglik:
+    """Return the log-likelihood of the locked frames under a camera; see `law_of`."""
+    told = frame_loglik(likelihood_model(camera, held, signals, seed, bases))
     return replace(told, filled=filled(camera, held, signals))
 
 

@@ -24,6 +24,7 @@ from typing import Any, TypeVar, cast
 import numba
 import numpy as np
 from numba.core import event, types
+from numba.core.caching import UserProvidedCacheLocator
 from numba.extending import intrinsic
 from numba.misc.appdirs import AppDirs
 from numpy.typing import NDArray
@@ -32,7 +33,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 ROWS_PER_BLOCK = 64
 _ALONE = 128  # values that are summed in one loop
-_UNUSED_S = 86400.0  # from when on no process can still write there
+_UNUSED_S = 7 * 86400.0  # from when on nobody is taken to need it any more
 _one_places = Lock()  # the compiler has one setting for all threads, and they may import at once
 
 
@@ -75,16 +76,29 @@ def kernel(function: F) -> F:
     """
     settings: Any = numba.config
     with _one_places:
-        default = settings.CACHE_DIR
-        place = _cache(Path(function.__code__.co_filename).parent, default)
-        settings.CACHE_DIR = str(place or default)
+        before = settings.CACHE_DIR, settings.CACHE_LOCATOR_CLASSES
+        place = _cache(Path(function.__code__.co_filename).parent, before[0])
+        settings.CACHE_DIR = str(place or before[0])
+        settings.CACHE_LOCATOR_CLASSES = f"{__name__}.{_There.__name__}"
         try:
             compile_ = numba.njit(
                 cache=place is not None, nogil=True, error_model="numpy", fastmath=False
             )
             return cast("F", compile_(function))
         finally:
-            settings.CACHE_DIR = default
+            settings.CACHE_DIR, settings.CACHE_LOCATOR_CLASSES = before
+
+
+class _There(UserProvidedCacheLocator):
+    """Has a kernel where `_cache` says, whatever the path of its source."""
+
+    def __init__(self, function: Callable[..., Any], file: str) -> None:
+        super().__init__(function, file)  # type: ignore[no-untyped-call] # numba has no types
+        self._cache_path: str = numba.config.CACHE_DIR  # type: ignore[attr-defined] # as above
+
+    def get_source_stamp(self) -> str:
+        """Return what tells sources apart: nothing, for others have another folder."""
+        return ""
 
 
 @lru_cache(maxsize=64)
@@ -92,28 +106,35 @@ def _cache(package: Path, given: str) -> Path | None:
     """Return where the compiled kernels of a folder lie, None: nowhere; old ones are removed.
 
     The compiler's own cache looks at the file of a kernel only, and would keep what calls another.
-    They lie beside the sources, else in the user's cache; in `given` (NUMBA_CACHE_DIR) if not "".
+    They lie in the user's cache, or in `given` (NUMBA_CACHE_DIR) if not "", by the content of the
+    folder: every installation of the same sources has the same. Else they lie beside the sources.
     """
-    stamp = hashlib.blake2b(digest_size=6)
+    stamp = hashlib.blake2b(digest_size=8)
     for file in (Path(__file__), *sorted(package.glob("*.py"))):
-        stat = file.stat()
-        stamp.update(f"{file.name} {stat.st_size} {stat.st_mtime_ns}\n".encode())
-    caches = package / "__pycache__"
-    if given or not os.access(caches if caches.exists() else package, os.W_OK):
-        place = hashlib.blake2b(str(package.resolve()).encode(), digest_size=6).hexdigest()
-        shared = given or AppDirs("dsis", appauthor=False).user_cache_dir  # type: ignore[no-untyped-call] # numba has no types
-        caches = Path(shared) / f"{package.name}-{place}"
-    wanted = caches / f"kernels-{stamp.hexdigest()}"
-    if not wanted.exists():
-        for earlier in caches.glob("kernels-*"):
-            with suppress(FileNotFoundError):  # another process removes them, too
-                if time.time() - earlier.stat().st_mtime > _UNUSED_S:
-                    shutil.rmtree(earlier, ignore_errors=True)
+        stamp.update(f"{file.name} {file.stat().st_size}\n".encode())
+        stamp.update(file.read_bytes())
+    users = given or AppDirs("dsis", appauthor=False).user_cache_dir  # type: ignore[no-untyped-call] # numba has no types
+    for caches in (Path(users) / "kernels", package / "__pycache__"):
+        wanted = caches / f"{package.name}-{stamp.hexdigest()}"
+        known = wanted.exists()
         try:
             wanted.mkdir(parents=True, exist_ok=True)
-        except OSError:  # nothing can be written: each process compiles for itself
-            return None
-    return wanted
+            os.utime(wanted, (time.time(),) * 2)  # in use
+        except OSError:
+            continue
+        if not known:
+            _remove_unused(caches, package.name)
+        if os.access(wanted, os.W_OK):
+            return wanted
+    return None  # nothing can be written: each process compiles for itself
+
+
+def _remove_unused(caches: Path, name: str) -> None:
+    """Remove kernels of a folder of this name that nobody has used for long."""
+    for earlier in caches.glob(f"{name}-*"):
+        with suppress(FileNotFoundError):  # another process removes them, too
+            if time.time() - earlier.stat().st_mtime > _UNUSED_S:
+                shutil.rmtree(earlier, ignore_errors=True)
 
 
 def inlined(function: F) -> F:

@@ -162,65 +162,107 @@ def outer(x):
 """
 
 
-@pytest.mark.parametrize("place", ["NUMBA_CACHE_DIR", "the user's cache"])
-def test_kernels_of_changed_sources_are_compiled_anew_wherever_they_lie(
-    place: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Beside the sources, and from one process to the next, they are as well: `test_startup.py`."""
-    package, elsewhere = tmp_path / "package", tmp_path / "elsewhere"
-    package.mkdir()
-    (package / "outer.py").write_text(OUTER)
-    monkeypatch.syspath_prepend(package)
-    monkeypatch.setattr(sys, "dont_write_bytecode", True)
-    given = place == "NUMBA_CACHE_DIR"
-    monkeypatch.setattr(numba.config, "CACHE_DIR", str(elsewhere) if given else "")
+@pytest.fixture(name="users")
+def _users(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Return an empty folder that is the user's cache."""
     for home in ("HOME", "XDG_CACHE_HOME", "LOCALAPPDATA"):
-        monkeypatch.setenv(home, str(elsewhere))
-    if not given:
-        monkeypatch.setattr(os, "access", lambda *_: False)
-    said = []
-    for step in (1, 2, 2):
-        (package / "inner.py").write_text(INNER.format(step))
-        os.utime(package / "inner.py", (step, step))  # of one size; written at another time
+        monkeypatch.setenv(home, str(tmp_path / "users"))
+    monkeypatch.setattr(numba.config, "CACHE_DIR", "")
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
+    return tmp_path / "users"
+
+
+def imported(package: Path, step: int, monkeypatch: pytest.MonkeyPatch) -> tuple[int, int]:
+    """Return what a kernel in a new process gives and how many were found on disk.
+
+    It calls another, which adds `step`.
+    """
+    package.mkdir(exist_ok=True)
+    (package / "outer.py").write_text(OUTER)
+    (package / "inner.py").write_text(INNER.format(step))
+    with monkeypatch.context() as context:
+        context.syspath_prepend(package)
         importlib.invalidate_caches()
-        _cache.cache_clear()  # as in a new process
+        _cache.cache_clear()
         outer = importlib.import_module("outer").outer
-        said.append((outer(1), sum(outer.stats.cache_hits.values())))
         for name in ("inner", "outer"):
             del sys.modules[name]
+    return outer(1), sum(outer.stats.cache_hits.values())
+
+
+@pytest.mark.parametrize("place", ["NUMBA_CACHE_DIR", "the user's cache", "beside the sources"])
+def test_kernels_of_changed_sources_are_compiled_anew_wherever_they_lie(
+    place: str, users: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """From one process to the next, they are as well: `test_startup.py`."""
+    package, given, beside = tmp_path / "package", tmp_path / "given", place.startswith("beside")
+    if place == "NUMBA_CACHE_DIR":
+        monkeypatch.setattr(numba.config, "CACHE_DIR", str(given))
+    if beside:
+        users.write_text("no folder")
+    said = [imported(package, step, monkeypatch) for step in (1, 2, 2)]
     assert said == [(2, 0), (3, 0), (3, 1)]
-    assert list(elsewhere.rglob("*.nbc"))
-    assert not list(package.rglob("*.nbc"))
+    folder = package if beside else given if given.exists() else users
+    assert {path.name.partition(".")[0] for path in folder.rglob("*.nbc")} == {"outer", "inner"}
+    assert bool(list(package.rglob("*.nbc"))) == beside
+
+
+def test_the_same_sources_elsewhere_are_not_compiled_again(
+    users: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each new virtual environment would spend a minute on it."""
+    said = []
+    for step, place in ((1, "one"), (2, "one"), (1, "two"), (3, "two")):
+        (tmp_path / place).mkdir(exist_ok=True)
+        said.append(imported(tmp_path / place / "package", step, monkeypatch))
+    assert said == [(2, 0), (3, 0), (2, 1), (4, 0)]
+    assert len(list((users / "dsis" / "kernels").iterdir())) == 3
 
 
 def test_only_kernels_that_nobody_uses_any_more_are_removed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    users: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Another process may be at it too: what it has removed meanwhile is no fault."""
-    (tmp_path / "package").mkdir()
-    caches = tmp_path / "package" / "__pycache__"
-    known = {"kernels-new": 0.5, "kernels-old": 2, "kernels-older": 3, "others-old": 2}
+    package, caches = tmp_path / "package", users / "dsis" / "kernels"
+    package.mkdir()
+    in_use = _cache.__wrapped__(package, "")
+    assert in_use is not None
+    known = {
+        in_use.name: 9,
+        "package-new": 6.5,
+        "package-old": 8,
+        "package-older": 9,
+        "other-old": 8,
+    }
     for name, days in known.items():
-        (caches / name).mkdir(parents=True)
+        (caches / name).mkdir(exist_ok=True)
         os.utime(caches / name, (3e9 - 86400 * days,) * 2)
     monkeypatch.setattr(compiled.time, "time", lambda: 3e9)
     remove = shutil.rmtree
 
     def both(folder: Path, **_: bool) -> None:
-        for old in caches.glob("kernels-old*"):  # the other process is quicker
+        for old in caches.glob("package-old*"):  # the other process is quicker
             remove(old)
         assert not folder.exists()
 
     monkeypatch.setattr(compiled.shutil, "rmtree", both)
-    compiled._cache.__wrapped__(tmp_path / "package", "")
+    assert _cache.__wrapped__(package, "") == in_use
+    (package / "changed.py").touch()
+    assert _cache.__wrapped__(package, "") != in_use
     left = {path.name for path in caches.iterdir()}
-    assert left & set(known) == {"kernels-new", "others-old"}
+    assert left & set(known) == {in_use.name, "package-new", "other-old"}
 
 
 def test_where_nothing_can_be_written_kernels_run_all_the_same(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    (tmp_path / "file").write_text("no folder")
-    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path / "file"))
+    def refused(*_: object, **__: object) -> None:
+        raise PermissionError
+
+    monkeypatch.setattr(Path, "mkdir", refused)
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
+    _cache.cache_clear()
     assert kernel(lambda x: x + 1)(1) == 2
-    assert str(tmp_path / "file") == numba.config.CACHE_DIR
+    assert not list(tmp_path.iterdir())
+    assert str(tmp_path) == numba.config.CACHE_DIR
+    _cache.cache_clear()

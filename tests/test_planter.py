@@ -233,6 +233,8 @@ def test_mismatches_are_accepted_where_they_belong(base: Case) -> None:
     dark = {"statistic": "frame_variance", "where": {"exposures": ["dark-0"]}}
     assert located(base, "flicker", [dark]) == (True, False)
     assert located(base, "black_level_drift", [dark]) == (True, True)
+    bent = {"statistic": "pixel_variance", "where": {"exposures": ["flat-1"]}}
+    assert located(base, "nonlinearity", [bent])[0]  # of light that is not known
 
 
 def test_findings_are_judged_by_the_key(base: Case) -> None:

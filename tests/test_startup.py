@@ -54,8 +54,10 @@ def test_kernels_are_compiled_once_and_that_is_said(tmp_path: Path) -> None:
     (tmp_path / "new.py").write_text(
         "from dsis.compiled import kernel\n\n@kernel\ndef one():\n    return 1\n\nprint(one())\n"
     )
-    code = [sys.executable, str(tmp_path / "new.py")]
-    silent = subprocess.run(code, capture_output=True, text=True, check=True)
+    code, elsewhere = [sys.executable, str(tmp_path / "new.py")], {"NUMBA_CACHE_DIR": str(tmp_path)}
+    silent = subprocess.run(
+        code, capture_output=True, text=True, check=True, env=os.environ | elsewhere
+    )
     assert (silent.stdout, silent.stderr) == ("1\n", "")  # nobody is at the terminal
 
 
@@ -75,6 +77,7 @@ def test_a_kernel_is_compiled_anew_when_one_that_it_calls_changes(tmp_path: Path
         os.utime(package / "inner.py", (step, step))  # of one size; written at another time
         code = "from outer import outer; print(outer(1), sum(outer.stats.cache_hits.values()))"
         environment = {k: v for k, v in os.environ.items() if k != "NUMBA_CACHE_DIR"}
+        environment |= dict.fromkeys(("HOME", "XDG_CACHE_HOME", "LOCALAPPDATA"), str(tmp_path))
         found = subprocess.run(
             [sys.executable, "-c", code], capture_output=True, text=True, check=True,
             cwd=package, env=environment,

@@ -38,7 +38,7 @@ STATISTICS: dict[str, tuple[str, ...]] = {
     "dark_current": _TIME,
     "hot_pixels": ("fixed_pixel", "outlying", "pattern", "hot"),
     "amp_glow": ("fixed_smooth", "smooth", "pattern_growth", "fixed_", "dark_level"),
-    "nonlinearity": _RESPONSE,
+    "nonlinearity": (*_RESPONSE, "pixel_variance"),  # of unknown light variances alone show a bend
     "saturation": (*_RESPONSE, "pixel_variance", "kurtosis", "code"),
     "quantisation": ("code",),
     "adc_dnl": ("code",),

@@ -26,6 +26,8 @@ ROWS, COLUMNS = 96, 128
 LEVELS = (100.0, 250.0, 500.0, 900.0, 1600.0, 2600.0)
 FEW_LEVELS = (250.0, 900.0, 2600.0)
 """Enough for what shows at every level: a simulation takes as long as it has exposures."""
+TWO_LEVELS = (250.0, 2600.0)
+"""The fewest that tell what grows with the signal from what does not."""
 FRAMES = 8
 TRAINING, LOCKED = (0, 1, 2, 4, 5, 6), (3, 7)
 Array = NDArray[np.float64]

@@ -31,7 +31,7 @@ from dsis.cfa import Cfa
 from dsis.grid import PixelGrid
 from dsis.simulate.maps import SensorMaps, with_maps
 from exposing import apply, effect
-from mismatch_recordings import FEW_LEVELS, camera, recorded
+from mismatch_recordings import TWO_LEVELS, camera, recorded
 
 NAMED = Finding(
     "omitted_physics",
@@ -191,7 +191,7 @@ def test_a_decay_over_much_of_the_sensor_is_uneven_light(
 
 
 def _found(true: Camera, words: frozenset[str]) -> Finding:
-    recording = recorded(true, 9, rows=48, levels=FEW_LEVELS)
+    recording = recorded(true, 9, rows=48, levels=TWO_LEVELS)
     return find_mismatch(camera(), recording, seed=1, vocabulary=words)
 
 
@@ -241,7 +241,7 @@ def test_without_its_word_nothing_else_is_named() -> None:
 
 
 def test_one_column_at_the_edge_is_no_decay() -> None:
-    stacks = recorded(camera(), 9, columns=64, levels=FEW_LEVELS)
+    stacks = recorded(camera(), 9, columns=64, levels=TWO_LEVELS)
     assert stacks.stacks is not None
     for stack in stacks.stacks.values():
         stack[:, :, 0] += 5

@@ -9,7 +9,7 @@ import pytest
 from analysis.mismatch import find_mismatch
 from analysis.mismatch.candidates import CANDIDATES
 from dsis.effects import registry
-from mismatch_recordings import FEW_LEVELS, camera, recorded
+from mismatch_recordings import TWO_LEVELS, camera, recorded
 
 TIME_S, NOISE_DN = 0.5, 0.3
 GLOW = CANDIDATES["amp_glow"]
@@ -60,7 +60,7 @@ def test_what_is_as_good_as_the_same_everywhere_is_no_glow() -> None:
 def test_brightness_and_extent_of_a_glow_are_told_within_their_errors() -> None:
     glow = {"dn_per_s": 570.0, "place": "left", "extent": 0.27}
     true = camera(registry()["amp_glow"](**glow))
-    found = find_mismatch(camera(), recorded(true, 7, rows=48, levels=FEW_LEVELS), seed=3)
+    found = find_mismatch(camera(), recorded(true, 7, rows=48, levels=TWO_LEVELS), seed=3)
     (omitted,) = found.omitted_physics
     assert omitted.effect == "amp_glow"
     assert omitted.choices == {"place": "left"}

@@ -14,7 +14,7 @@ from analysis.mismatch.diagnose import VOCABULARY
 from dsis.camera import read_camera
 from dsis.effects import registry
 from dsis.recording import read_recording
-from mismatch_recordings import FEW_LEVELS, camera, recorded
+from mismatch_recordings import FEW_LEVELS, TWO_LEVELS, camera, recorded
 
 FALL, DOWN, RIGHT, BOW = 2.8, -2.1, 1.4, 2.1
 NUMBERS = (
@@ -41,7 +41,7 @@ def _shading(**percent: float) -> object:
 def test_uneven_light_is_named_with_its_numbers(percent: dict[str, float]) -> None:
     true = camera(_shading(**percent))  # type: ignore[arg-type] # an effect of the registry
     found = find_mismatch(
-        camera(), recorded(true, 8, rows=64, columns=96, levels=FEW_LEVELS), seed=1
+        camera(), recorded(true, 8, rows=64, columns=96, levels=TWO_LEVELS), seed=1
     )
     (named,) = found.omitted_physics
     assert named.effect == "shading"
@@ -54,9 +54,9 @@ def test_uneven_light_is_named_with_its_numbers(percent: dict[str, float]) -> No
 
 
 def test_two_amplifiers_that_have_no_word_are_no_tilt_of_the_light() -> None:
-    taps = registry()["tap_mismatch"](gain_percent=2.1, regions="left_right")
+    taps = registry()["tap_mismatch"](gain_percent=3.0, regions="left_right")
     words = VOCABULARY - {"tap_mismatch"}
-    recording = recorded(camera(taps), 9, rows=64, columns=96, levels=FEW_LEVELS)
+    recording = recorded(camera(taps), 9, rows=48, columns=64, levels=TWO_LEVELS)
     found = find_mismatch(camera(), recording, seed=1, vocabulary=words)
     assert not found.omitted_physics
     assert found.verdict == "unexplained"
@@ -100,7 +100,7 @@ def test_a_fall_is_told_beside_a_decay_that_the_camera_has() -> None:
     edge = registry()["line_settling"](gain_percent=3.0, length_pixels=6.0, edge="left")
     known = camera(edge)
     true = camera(edge, _shading(falloff_percent=1.5))  # type: ignore[arg-type] # an effect of the registry
-    recording = recorded(true, 5, levels=FEW_LEVELS)
+    recording = recorded(true, 5, levels=TWO_LEVELS)
     found = find_mismatch(known, recording, seed=2, vocabulary=frozenset({"shading"}))
     (named,) = found.omitted_physics
     fall = named.parameters["falloff_percent"]

@@ -2,7 +2,7 @@
 
 from analysis.mismatch import Finding, find_mismatch
 from dsis.camera import Camera
-from mismatch_recordings import FEW_LEVELS, recorded
+from mismatch_recordings import TWO_LEVELS, recorded
 
 WORDS = frozenset(
     {"row_banding", "row_noise", "pink_noise", "line_flicker", "black_level_drift", "crosstalk",
@@ -10,6 +10,14 @@ WORDS = frozenset(
 )  # fmt: skip
 
 
-def diagnosed(true: Camera, base: Camera, seed: int, words: frozenset[str] = WORDS) -> Finding:
-    recording = recorded(true, seed, columns=64, levels=FEW_LEVELS)
+def diagnosed(
+    true: Camera,
+    base: Camera,
+    seed: int,
+    words: frozenset[str] = WORDS,
+    *,
+    columns: int = 48,
+    levels: tuple[float, ...] = TWO_LEVELS,
+) -> Finding:
+    recording = recorded(true, seed, columns=columns, levels=levels)
     return find_mismatch(base, recording, seed=1, vocabulary=words)

@@ -25,7 +25,7 @@ from dsis.effects import OperatingPoint, registry
 from dsis.grid import PixelGrid
 from dsis.measures import Accumulator, Channel
 from exposing import apply, effect, flat
-from mismatch_recordings import camera
+from mismatch_recordings import FEW_LEVELS, camera
 from mismatch_rows import diagnosed
 
 SURE = 5.0  # standard errors
@@ -186,7 +186,8 @@ def _has_numbers(named: OmittedEffect, own: dict[str, float]) -> None:
 
 def test_in_a_mosaic_it_is_named_with_its_numbers() -> None:
     own = {"sigma_dn": 1.13, "length_rows": 3.0}
-    found = diagnosed(camera(effect("row_banding", **own), cfa="RGGB"), camera(cfa="RGGB"), 9)
+    true, base = camera(effect("row_banding", **own), cfa="RGGB"), camera(cfa="RGGB")
+    found = diagnosed(true, base, 9, columns=64, levels=FEW_LEVELS)
     (named,) = found.omitted_physics
     assert named.effect == "row_banding"
     assert not found.unexplained
@@ -195,8 +196,8 @@ def test_in_a_mosaic_it_is_named_with_its_numbers() -> None:
 
 def test_beside_white_rows_both_are_named_with_their_numbers() -> None:
     both = {
-        "row_noise": {"sigma_dn": 1.4},
-        "row_banding": {"sigma_dn": 1.0, "length_rows": 2.5},
+        "row_noise": {"sigma_dn": 1.6},
+        "row_banding": {"sigma_dn": 1.15, "length_rows": 2.5},
     }
     found = diagnosed(camera(*(effect(kind, **own) for kind, own in both.items())), camera(), 9)
     named = {one.effect: one for one in found.omitted_physics}
@@ -209,8 +210,8 @@ def test_beside_white_rows_both_are_named_with_their_numbers() -> None:
 @pytest.mark.parametrize(
     ("kind", "values"),
     [
-        ("pink_noise", {"sigma_dn": 2.1}),
-        ("line_flicker", {"depth_percent": 0.42, "cycles_per_frame": 2.3}),
+        ("pink_noise", {"sigma_dn": 2.4}),
+        ("line_flicker", {"depth_percent": 0.48, "cycles_per_frame": 2.3}),
     ],
 )
 def test_what_resembles_it_is_not_it(kind: str, values: dict[str, float]) -> None:

@@ -13,10 +13,10 @@ ROWS = frozenset({"row_banding", "row_noise", "pink_noise", "black_level_drift"}
 @pytest.mark.parametrize("kind", ["row_noise", "crosstalk", "spatial_filtering", "line_flicker"])
 def test_it_takes_no_place_of_what_has_no_word(kind: str) -> None:
     values: dict[str, dict[str, float]] = {
-        "row_noise": {"sigma_dn": 1.13},
-        "crosstalk": {"fraction": 0.042},
-        "spatial_filtering": {"fraction": 0.042},
-        "line_flicker": {"depth_percent": 0.42, "cycles_per_frame": 2.3},
+        "row_noise": {"sigma_dn": 1.3},
+        "crosstalk": {"fraction": 0.048},
+        "spatial_filtering": {"fraction": 0.048},
+        "line_flicker": {"depth_percent": 0.48, "cycles_per_frame": 2.3},
     }
     found = diagnosed(camera(effect(kind, **values[kind])), camera(), 10, ROWS - {kind})
     assert "row_banding" not in {one.effect for one in found.omitted_physics}
@@ -24,7 +24,7 @@ def test_it_takes_no_place_of_what_has_no_word(kind: str) -> None:
 
 
 def test_without_its_word_its_correlation_stays_unexplained() -> None:
-    true = camera(effect("row_banding", sigma_dn=1.13, length_rows=3.0))
+    true = camera(effect("row_banding", sigma_dn=1.3, length_rows=3.0))
     found = diagnosed(true, camera(), 9, ROWS - {"row_banding"} | {"crosstalk"})
     assert {one.effect for one in found.omitted_physics} <= {"row_noise"}
     assert any(m.statistic in ("row_correlation", "slow_row_variance") for m in found.unexplained)

@@ -7,7 +7,7 @@ from analysis.mismatch import find_mismatch
 from analysis.mismatch.layout import Layout
 from dsis.cfa import Cfa
 from dsis.effects import registry
-from mismatch_recordings import FEW_LEVELS, camera, recorded
+from mismatch_recordings import TWO_LEVELS, camera, recorded
 
 ROWS, COLUMNS = 65, 97
 
@@ -17,7 +17,7 @@ def test_charge_of_the_odd_last_lines_crosses_into_what_is_looked_at() -> None:
     crosstalk = registry()["crosstalk"](fraction=0.04)
     bands = registry()["line_flicker"](depth_percent=1.0, cycles_per_frame=3.3)
     true = camera(crosstalk, bands, cfa="RGGB")
-    recording = recorded(true, 3, rows=ROWS, columns=COLUMNS, levels=FEW_LEVELS)
+    recording = recorded(true, 3, rows=ROWS, columns=COLUMNS, levels=TWO_LEVELS)
     found = find_mismatch(camera(cfa="RGGB"), recording, seed=1)
     assert {own.effect for own in found.omitted_physics} == {"crosstalk", "line_flicker"}
     assert not found.unexplained

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from analysis.mismatch import find_mismatch
 from dsis.cfa import Cfa
-from mismatch_recordings import FEW_LEVELS, camera, recorded
+from mismatch_recordings import TWO_LEVELS, camera, recorded
 
 ROWS, COLUMNS = 48, 64
 VOCABULARY = frozenset({"pink_noise", "column_noise", "row_noise", "black_level_drift"})
@@ -47,7 +47,7 @@ def test_noise_of_columns_is_named_by_how_it_falls(
     moves: Moves, cfa: Cfa, expected: dict[str, str]
 ) -> None:
     bare = camera(cfa=cfa.value)
-    recording = recorded(bare, 6, rows=ROWS, columns=COLUMNS, levels=FEW_LEVELS)
+    recording = recorded(bare, 6, rows=ROWS, columns=COLUMNS, levels=TWO_LEVELS)
     assert recording.stacks is not None
     rng = np.random.default_rng(2)
     for name, frames in recording.stacks.items():

@@ -25,7 +25,7 @@ from dsis.draw import Draw
 from dsis.effects import Effect, Exposure
 from dsis.grid import PixelGrid
 from exposing import effect
-from mismatch_recordings import FEW_LEVELS, camera, recorded
+from mismatch_recordings import TWO_LEVELS, camera, recorded
 
 SURE = 5.0  # standard errors
 WORDS = frozenset(
@@ -213,7 +213,7 @@ def test_a_field_as_long_as_the_sensor_is_uneven_light(length: float, sane: bool
 
 
 def _found(true: Camera, seed: int, words: frozenset[str] = WORDS) -> Finding:
-    recording = recorded(true, seed, rows=64, columns=96, levels=FEW_LEVELS)
+    recording = recorded(true, seed, rows=64, columns=96, levels=TWO_LEVELS)
     return find_mismatch(camera(cfa=true.cfa), recording, seed=1, vocabulary=words)
 
 

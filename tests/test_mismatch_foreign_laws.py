@@ -82,7 +82,7 @@ def test_a_second_path_is_seen_beside_crosstalk_that_was_fitted_without_it() -> 
     crosstalk = registry()["crosstalk"](fraction=0.064)
     true = camera(crosstalk, cfa="GBRG", segments=((0.45, 15.0, 700.0), (0.45, 165.0, None)))
     model = camera(cfa="GBRG", segments=((0.45, 15.0, None),))
-    assert _found(_small(true, 6, (250.0, 500.0, *FEW_LEVELS[1:])), model) == {
+    assert _found(_small(true, 6, (500.0, *FEW_LEVELS[1:])), model) == {
         "crosstalk",
         "dual_gain",
     }

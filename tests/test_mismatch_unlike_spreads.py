@@ -93,9 +93,11 @@ def test_errors_are_those_of_their_own_exposure(
 
 
 def test_a_current_is_named_beside_light_that_flickers() -> None:
-    """A level of 0.05 DN in the dark, beside flats that move by 26 DN from frame to frame."""
+    """A level of 0.3 DN in the dark, beside flats that move by 26 DN from frame to frame."""
     flicker, current = (registry()[kind] for kind in ("flicker", "dark_current"))
-    true = camera(flicker(sigma_percent=1.0), current(dn_per_s=4.0))
+    true = camera(flicker(sigma_percent=1.0), current(dn_per_s=6.0))
     words = frozenset({"flicker", "dark_current", "black_level_drift", "line_flicker"})
-    finding = find_mismatch(camera(), recorded(true, 3), vocabulary=words)
+    finding = find_mismatch(
+        camera(), recorded(true, 3, rows=64, columns=96, levels=FEW_LEVELS), vocabulary=words
+    )
     assert {one.effect for one in finding.omitted_physics} == {"flicker", "dark_current"}

@@ -25,6 +25,7 @@ import numba
 import numpy as np
 from numba.core import event, types
 from numba.core.caching import UserProvidedCacheLocator
+from numba.core.dispatcher import Dispatcher
 from numba.extending import intrinsic
 from numba.misc.appdirs import AppDirs
 from numpy.typing import NDArray
@@ -71,13 +72,14 @@ event.register("numba:compile", _Compiling())  # type: ignore[no-untyped-call] #
 def kernel(function: F) -> F:
     """Compile `function` on its first call; cached on disk, releases the interpreter lock.
 
-    Kernels may call kernels of other files of their folder, and of this file: all are compiled anew
-    when one changes.
+    Kernels may call kernels of other files, and constants of other files of their folder: all that
+    lie in one folder, and all that call them, are compiled anew when one of its files changes.
     """
     settings: Any = numba.config
     with _one_places:
         before = settings.CACHE_DIR, settings.CACHE_LOCATOR_CLASSES
-        place = _cache(Path(function.__code__.co_filename).parent, before[0])
+        home = Path(function.__code__.co_filename).parent
+        place = _cache(home, before[0], _called_elsewhere(function, home))
         settings.CACHE_DIR = str(place or before[0])
         settings.CACHE_LOCATOR_CLASSES = f"{__name__}.{_There.__name__}"
         try:
@@ -101,16 +103,31 @@ class _There(UserProvidedCacheLocator):
         return ""
 
 
+def _called_elsewhere(function: Callable[..., Any], home: Path) -> tuple[Path, ...]:
+    """Return the folders, but its own, of kernels that a kernel calls, or those that it calls."""
+    found, asked = {function}, [function]
+    while asked:
+        one: Any = asked.pop()
+        named = (one.__globals__.get(name) for name in one.__code__.co_names)
+        called = {own.py_func for own in named if isinstance(own, Dispatcher)} - found
+        found |= called
+        asked += called
+    files = {Path(own.__code__.co_filename) for own in found} - {Path(__file__)}  # every stamp's
+    return tuple(sorted({file.parent for file in files} - {home}))
+
+
 @lru_cache(maxsize=64)
-def _cache(package: Path, given: str) -> Path | None:
+def _cache(package: Path, given: str, others: tuple[Path, ...] = ()) -> Path | None:
     """Return where the compiled kernels of a folder lie, None: nowhere; old ones are removed.
 
     The compiler's own cache looks at the file of a kernel only, and would keep what calls another.
     They lie in the user's cache, or in `given` (NUMBA_CACHE_DIR) if not "", by the content of the
-    folder: every installation of the same sources has the same. Else they lie beside the sources.
+    folder, and of `others` whose kernels they call: every installation of the same sources has the
+    same. Else they lie beside the sources.
     """
     stamp = hashlib.blake2b(digest_size=8)
-    for file in (Path(__file__), *sorted(package.glob("*.py"))):
+    sources = (file for folder in (package, *others) for file in sorted(folder.glob("*.py")))
+    for file in (Path(__file__), *sources):
         stamp.update(f"{file.name} {file.stat().st_size}\n".encode())
         stamp.update(file.read_bytes())
     users = given or AppDirs("dsis", appauthor=False).user_cache_dir  # type: ignore[no-untyped-call] # numba has no types

@@ -219,6 +219,32 @@ def test_the_same_sources_elsewhere_are_not_compiled_again(
     assert len(list((users / "dsis" / "kernels").iterdir())) == 3
 
 
+def test_kernels_that_call_those_of_another_folder_are_compiled_anew_with_them(
+    users: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Landscapes call the noise of all scenes, by kernels of their own folder among others."""
+    package, other = tmp_path / "package", tmp_path / "other"
+    other.mkdir()
+    monkeypatch.syspath_prepend(other)
+    package.mkdir()
+    (package / "middle.py").write_text(OUTER)
+    (package / "outer.py").write_text(
+        OUTER.replace("inner import add", "middle import outer as add")
+    )
+    monkeypatch.syspath_prepend(package)
+    said = []
+    for step in (1, 2, 2):
+        (other / "inner.py").write_text(INNER.format(step))
+        importlib.invalidate_caches()
+        _cache.cache_clear()
+        outer = importlib.import_module("outer").outer
+        said.append((outer(1), sum(outer.stats.cache_hits.values())))
+        for name in ("inner", "middle", "outer"):
+            del sys.modules[name]
+    assert said == [(2, 0), (3, 0), (3, 1)]
+    assert list(users.rglob("outer*.nbc"))
+
+
 def test_only_kernels_that_nobody_uses_any_more_are_removed(
     users: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -14,6 +14,7 @@ from analysis.mismatch.bank.key import Key
 from analysis.mismatch.bank.scalars import OF_MEAN_FRAMES
 from analysis.mismatch.contrasts import Contrasts, contrasts
 from analysis.mismatch.fewpairs import widening
+from analysis.mismatch.heavytails import degrees, equivalent
 from analysis.mismatch.layout import Layout
 from analysis.mismatch.vector import Vector
 from analysis.mismatch.wander import by_lines, wandering_dn2
@@ -26,7 +27,7 @@ _OF_PIXELS, _OF_LINES = "fixed_pixel_variance", ("fixed_row_variance", "fixed_co
 _SEVERAL = 5  # numbers of a name that tell whether they are alike
 _RARE = 1e-5  # chance of a departure that counts, among some hundred numbers
 _UNLIKE = 1e-4  # chance of spreads that differ so
-_ODD = 1e-3  # chance of simulations so far off that a score is not normal under the model
+_ODD = 1e-3  # chance of simulations so far off that scores are not normal, or closed forms no help
 _COMB = 0.4  # relative error of the codes' imbalance that a model predicts
 
 
@@ -48,6 +49,8 @@ class Null:
         Of the contrasts, under the model.
     degrees
         Degrees of freedom of the spread: departures are Student's.
+    tails
+        Degrees of freedom of the laws of numbers and contrasts; inf: they are normal.
     """
 
     keys: tuple[Key, ...]
@@ -58,12 +61,16 @@ class Null:
     contrast_mean: Array
     contrast_sd: Array
     degrees: float
+    tails: Array
 
     def departures(self, seen: Vector) -> Array:
-        """Return departures in standard deviations, of numbers and contrasts; 0 where unknown."""
+        """Return departures in standard deviations, of numbers and contrasts; 0 where unknown.
+
+        Those whose law has heavier tails count as a normal one's as rare.
+        """
         single = self._single(seen.values)
         sums = (self.contrasts.matrix @ single - self.contrast_mean) / self.contrast_sd
-        return np.concatenate([single, sums])
+        return equivalent(np.concatenate([single, sums]), self.tails, self.degrees)
 
     def _single(self, values: Array) -> Array:
         usable = self.known & np.isfinite(values)
@@ -83,9 +90,9 @@ def null_of(
 
     The closed-form errors are scaled, name by name, to the spread that the simulations show; each
     number's own spread counts by its degrees of freedom, and alone where spreads of a name differ
-    as chance does not make them. Scores of the highest of many bins are
-    standard normal in white noise: so they are taken, unless the simulations deny it. `unsure`:
-    the square of what else leaves means unsure, if any.
+    as chance does not make them, or a contrast's is not what its parts say. Scores of the highest
+    of many bins are standard normal in white noise: so they are taken, unless the simulations deny
+    it. `unsure`: the square of what else leaves means unsure, if any.
     """
     values = np.stack([one.values for one in simulated])
     errors = np.stack([one.errors for one in simulated])
@@ -118,6 +125,8 @@ def null_of(
     alike += _together(sums, drawn_together(seen.keys, mean, known), seen.keys)
     expected = (1 + alike) / (1 + 1 / count)
     pooled = (_OWN * expected + (count - 1) * spread) / (_OWN + count - 1)
+    alone = spread * (_farther(count - 1) / _farther(_OWN + count - 1)) ** 2
+    pooled = np.where(_denied(spread / expected, count - 1), alone, pooled)
     # The same few recordings leave all numbers unsure, at worst to the same side.
     aside = (np.abs(sums.matrix) @ (np.sqrt(besides) / sd)) ** 2
     return Null(
@@ -129,6 +138,7 @@ def null_of(
         np.zeros(len(sums.keys)),
         np.sqrt(np.maximum(pooled, _LEAST_SCALE**2) * (1 + 1 / count) + aside),
         _POOLED + count - 1,
+        degrees((*seen.keys, *sums.keys), np.hstack([parts, along])),
     )
 
 
@@ -223,7 +233,8 @@ def _by_name(
     The ratio, the degrees of freedom that it is worth beside a number's own `dof`, and by how much
     farther tails of fewer reach. A statistic and scope of which some spread otherwise than others,
     as few strong pixels do where noise is low, says as much as its logarithms scatter less than
-    chance lets them (Smyth 2004, "Linear models and empirical Bayes methods").
+    chance lets them (Smyth 2004, "Linear models and empirical Bayes methods"). Few numbers leave
+    the closed form its say, unless they deny it: then each has its own and that of the others.
     """
     groups: dict[tuple[str, str], list[int]] = {}
     for i, key in enumerate(keys):
@@ -231,20 +242,27 @@ def _by_name(
             groups.setdefault((key.statistic, key.scope), []).append(i)
     scale, worth, tails = np.ones(len(keys)), np.full(len(keys), _OWN), np.ones(len(keys))
     for which in groups.values():
-        # Few numbers leave the closed form its say.
-        scale[which] = (own[which].sum() + 4.0) / (len(which) + 4.0)
+        size, mean = len(which), float(own[which].mean())
+        scale[which] = (own[which].sum() + 4.0) / (size + 4.0)
         if unlike := _unlike(own[which], dof):
             scale[which], worth[which] = unlike
-            tails[which] = _farther(unlike[1] + dof) / _farther(_OWN + dof)
+        elif size < _SEVERAL and _denied(np.array(mean), size * dof):
+            scale[which], worth[which] = mean, (size - 1) * dof
+        tails[which] = _farther(worth[which[0]] + dof) / _farther(_OWN + dof)
     return scale, worth, tails
+
+
+def _denied(ratio: Array, dof: int) -> NDArray[np.bool_]:
+    """Return whether variances are larger than expected by such ratios not by chance."""
+    return np.asarray(scipy.stats.chi2.sf(ratio * dof, dof) < _ODD)
 
 
 def _unlike(own: Array, dof: int) -> tuple[float, float] | None:
     """Return the variance of variances that chance alone does not scatter so, and its worth.
 
-    None: they are as like as chance lets them be.
+    None: they are as like as chance lets them be. Of few it is worth nothing.
     """
-    if len(own) < _SEVERAL:
+    if len(own) < 2:
         return None
     logs = (
         np.log(np.maximum(own, _LEAST_SCALE**2))
@@ -255,6 +273,8 @@ def _unlike(own: Array, dof: int) -> tuple[float, float] | None:
     scatter = float(logs.var(ddof=1))
     if (len(own) - 1) * scatter / by_chance < scipy.stats.chi2.isf(_UNLIKE, len(own) - 1):
         return None
+    if len(own) < _SEVERAL:
+        return 1.0, 0.0
     half = _with_trigamma(scatter - by_chance)
     typical = exp(float(logs.mean()) + float(scipy.special.digamma(half)) - log(half))
     return typical, min(2 * half, _OWN)

@@ -71,6 +71,13 @@ def replicates(simulate: Simulate, count: int, near: Known | None = None) -> Rep
     return Replicates((*first.vectors, *vectors), near[0].fits, few, unsure, near)
 
 
+def more(simulate: Simulate, count: int, made: Replicates) -> Replicates:
+    """Return so many recordings of a model, all its own, of which some are made."""
+    rest = _of(simulate(range(made.own, count)))
+    fits = rest.fits if made.moved_from is not None else (*made.fits, *rest.fits)
+    return Replicates((*made.vectors[: made.own], *rest.vectors), fits, count)
+
+
 def known(own: Replicates, null: Null) -> Known:
     """Return what a model much the same may be made of: recordings that are none of them moved."""
     return (own, null) if own.moved_from is None else own.moved_from

@@ -21,7 +21,7 @@ from analysis.mismatch.null import Null, null_of
 from analysis.mismatch.observe import Observation
 from analysis.mismatch.predict import Predictor, Reference
 from analysis.mismatch.recalibrate import Calibrated, calibrate
-from analysis.mismatch.replicates import Replicates, known, replicates, same_kinds
+from analysis.mismatch.replicates import Replicates, known, more, replicates, same_kinds
 from analysis.mismatch.simulations import Simulations
 from analysis.mismatch.touches import ALL_SUMS
 from analysis.mismatch.untold import untold_order
@@ -30,6 +30,8 @@ from dsis.camera import Camera
 from dsis.effects import Effect
 
 Array = NDArray[np.float64]
+_SUREST = 64
+_FAR = 10.0  # standard deviations that more simulations leave far
 _MEDIUM = 2e6  # samples from which one simulation tells what two of fewer do
 
 
@@ -52,6 +54,9 @@ class Setting:
         Whether the recording, of which this may be a part, is large: simulations take long.
     given
         How many effects the user's camera has: they come first, those taken in after them.
+    surest
+        Simulations for a null by which all that is left departs little; fewer than `nulls`: no more
+        than these.
     asked_again
         Whether all frames will be asked what these leave undecided.
     jumping
@@ -73,6 +78,7 @@ class Setting:
     polishing: int
     large: bool = False
     given: int = 0
+    surest: int = 0
     asked_again: bool = False
     jumping: Jumping | None = None
     noisy_rows: Callable[[], float] = lambda: -inf
@@ -85,7 +91,7 @@ class Setting:
         if layout.large:
             return cls(layout, seen, interpolated, seed, jobs, 8, 4, 1, 1, 2, large=True)
         few = (1, 1, 2) if layout.samples > _MEDIUM else (2, 2, 4)
-        return cls(layout, seen, interpolated, seed, jobs, 16, 8, *few)
+        return cls(layout, seen, interpolated, seed, jobs, 16, 8, *few, surest=_SUREST)
 
     def alike(self, effect: Effect) -> bool:
         """Return whether one sensor tells how numbers move with the parameters of an effect.
@@ -172,11 +178,11 @@ class State:
         kin = known(near.replicates, near.null) if near is not None and alike else None
         of_model = replicates(made, nulls, kin)
         own = vector(layout, seen, calibrated.residual)
-        null = null_of(layout, of_model.vectors, own, of_model.unsure)
-        untold = unknown_combs(calibrated.model.camera, layout, own.keys)
-        untold |= untold_order(calibrated.model.camera, own.keys)
-        null = replace(null, known=null.known & ~untold)
-        z, chances = tested(layout, null, own)
+        camera = calibrated.model.camera
+        found = _beside(setting, camera, of_model, own)
+        if not draft and setting.surest > nulls and found.nearly:
+            of_model = more(made, setting.surest, of_model)
+            found = _beside(setting, camera, of_model, own)
         simulations = Simulations(
             layout,
             calibrated.model,
@@ -186,19 +192,16 @@ class State:
             calibrated.sums,
         )
         its_own = [one.values for one in of_model.vectors[: of_model.own]]
-        simulations.keep(calibrated.model.camera, its_own)
-        found = located(layout, seen, null, z, chances)
-        if setting.jumping is not None:
-            found = setting.jumping.beside(found, camera.effect)
+        simulations.keep(camera, its_own)
         return cls(
             setting,
             calibrated,
             own,
-            null,
+            found.null,
             of_model,
-            z,
-            chances,
-            found,
+            found.departures,
+            found.chances,
+            found.mismatches,
             simulations,
         )
 
@@ -228,6 +231,34 @@ class State:
         reference = Reference(self.camera, self.null, self.vector)
         count = replicates or self.setting.replicates
         return Predictor(self.simulations, reference, replicates=count)
+
+
+@dataclass(frozen=True)
+class _Judged:
+    """What a recording is beside simulated ones; see `State`."""
+
+    null: Null
+    departures: Array
+    chances: Array
+    mismatches: tuple[Mismatch, ...]
+
+    @property
+    def nearly(self) -> bool:
+        """Whether all that departs does so little that a better known scatter may deny it."""
+        return bool(self.mismatches) and all(abs(m.z) < _FAR for m in self.mismatches)
+
+
+def _beside(setting: Setting, camera: Camera, made: Replicates, own: Vector) -> _Judged:
+    """Return what the recorded numbers are beside simulated ones of a camera."""
+    layout = setting.layout
+    null = null_of(layout, made.vectors, own, made.unsure)
+    untold = unknown_combs(camera, layout, own.keys) | untold_order(camera, own.keys)
+    null = replace(null, known=null.known & ~untold)
+    z, chances = tested(layout, null, own)
+    found = located(layout, setting.seen, null, z, chances)
+    if setting.jumping is not None:
+        found = setting.jumping.beside(found, camera.effect)
+    return _Judged(null, z, chances, found)
 
 
 def numbers(layout: Layout, calibrated: Calibrated, seen: Observation) -> Array:

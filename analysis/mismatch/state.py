@@ -30,8 +30,8 @@ from dsis.camera import Camera
 from dsis.effects import Effect
 
 Array = NDArray[np.float64]
-_SUREST = 64
-_FAR = 10.0  # standard deviations that more simulations leave far
+SUREST = 64
+FAR = 10.0  # standard deviations that more simulations leave far
 _MEDIUM = 2e6  # samples from which one simulation tells what two of fewer do
 
 
@@ -91,7 +91,7 @@ class Setting:
         if layout.large:
             return cls(layout, seen, interpolated, seed, jobs, 8, 4, 1, 1, 2, large=True)
         few = (1, 1, 2) if layout.samples > _MEDIUM else (2, 2, 4)
-        return cls(layout, seen, interpolated, seed, jobs, 16, 8, *few, surest=_SUREST)
+        return cls(layout, seen, interpolated, seed, jobs, 16, 8, *few, surest=SUREST)
 
     def alike(self, effect: Effect) -> bool:
         """Return whether one sensor tells how numbers move with the parameters of an effect.
@@ -245,7 +245,7 @@ class _Judged:
     @property
     def nearly(self) -> bool:
         """Whether all that departs does so little that a better known scatter may deny it."""
-        return bool(self.mismatches) and all(abs(m.z) < _FAR for m in self.mismatches)
+        return bool(self.mismatches) and all(abs(m.z) < FAR for m in self.mismatches)
 
 
 def _beside(setting: Setting, camera: Camera, made: Replicates, own: Vector) -> _Judged:

@@ -123,3 +123,15 @@ def test_a_cold_column_is_no_pixel_that_stands_out() -> None:
     state.setting.seen.images["MONO", "offset"] = (image, 1.0)
     state.camera.effect = (HOT,)
     assert jumped(state, HOT) is None
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_strong_hot_pixels_push_none_below(seed: int) -> None:
+    """One of a thousand standard deviations moves its line's mean by more than noise reaches."""
+    rng = np.random.default_rng(seed)
+    image = rng.normal(0, 1, (96, 128))
+    few = rng.choice(image.size, 49, replace=False)
+    image.flat[few] += rng.exponential(600, 49)
+    state = _state((0.05,), 0.0)
+    state.setting.seen.images["MONO", "offset"] = (image, 1.0)
+    assert jumped(state, HOT) is None

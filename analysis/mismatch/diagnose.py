@@ -41,7 +41,7 @@ from analysis.mismatch.settle import would_settle
 from analysis.mismatch.source import Source
 from analysis.mismatch.spikes import Spikes, told_besides, with_spikes, without_spikes
 from analysis.mismatch.split import Split
-from analysis.mismatch.state import Setting, State
+from analysis.mismatch.state import SUREST, Setting, State
 from analysis.mismatch.steadylight import with_steady_light
 from analysis.mismatch.taking import layout_of
 from analysis.mismatch.thinned import stages, with_all_frames
@@ -210,7 +210,7 @@ def _of_all_frames(setting: Setting, trial: Trial) -> Setting:
     Whether anything differs is asked of all; what it is, of those that are not locked.
     """
     layout, seen = trial.numbers.whole
-    return replace(setting, layout=layout, seen=seen, asked_again=False)
+    return replace(setting, layout=layout, seen=seen, asked_again=False, surest=SUREST)
 
 
 def _jumping(camera: Camera, lines: WholeFrames, measuring: WholeFrames) -> Jumping | None:

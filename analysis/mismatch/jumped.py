@@ -1,6 +1,7 @@
 """Pixels that stand out in the dark, and may be some that jump but stay where they are."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.mismatch.bank.parts import parts
 from analysis.mismatch.contradicted import Denial
@@ -11,6 +12,7 @@ from dsis.effects import Effect
 from dsis.effects.hot_pixels import HotPixels
 from dsis.effects.rts import Rts
 
+Array = NDArray[np.float64]
 _CLEAR, _BELOW = 5.0, -4.0  # standard deviations of a map's noise: of all pixels, of few
 _MOST, _FEWEST = 0.5, 3  # of those that stand out
 _SHORT, _SHARE = 0.2, 0.3  # of the longest time; of what a pixel grows by in that
@@ -52,10 +54,19 @@ def _both_ways(state: State) -> bool:
         return False
     above = below = 0
     for own in first_maps(state, ("time", "offset")).values():
-        height = heights(parts(*own).pixels, 1.0)  # beyond lines and smooth surfaces
+        height = heights(_beyond_lines(parts(*own).pixels), 1.0)
         above += int((height > _CLEAR).sum())
         below += int((height < -_CLEAR).sum())
     return below >= max(_MOST * above, _FEWEST)
+
+
+def _beyond_lines(pixels: Array) -> Array:
+    """Return the pixels of a map beyond what is typical of their lines.
+
+    One of 1000 standard deviations makes a line's mean higher, and the others seem lower.
+    """
+    pixels = pixels - np.median(pixels, 1, keepdims=True)
+    return np.asarray(pixels - np.median(pixels, 0))
 
 
 def turned(state: State) -> bool:

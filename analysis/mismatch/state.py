@@ -91,7 +91,7 @@ class Setting:
         if layout.large:
             return cls(layout, seen, interpolated, seed, jobs, 8, 4, 1, 1, 2, large=True)
         few = (1, 1, 2) if layout.samples > _MEDIUM else (2, 2, 4)
-        return cls(layout, seen, interpolated, seed, jobs, 16, 8, *few, surest=SUREST)
+        return cls(layout, seen, interpolated, seed, jobs, 16, 8, *few)
 
     def alike(self, effect: Effect) -> bool:
         """Return whether one sensor tells how numbers move with the parameters of an effect.

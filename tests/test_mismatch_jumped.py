@@ -134,4 +134,5 @@ def test_strong_hot_pixels_push_none_below(seed: int) -> None:
     image.flat[few] += rng.exponential(600, 49)
     state = _state((0.05,), 0.0)
     state.setting.seen.images["MONO", "offset"] = (image, 1.0)
+    state.camera.effect = (HOT,)
     assert jumped(state, HOT) is None

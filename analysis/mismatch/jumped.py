@@ -2,8 +2,8 @@
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import median_filter
 
-from analysis.mismatch.bank.parts import parts
 from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.jumping import NAME
 from analysis.mismatch.standout import first_maps, heights
@@ -15,6 +15,7 @@ from dsis.effects.rts import Rts
 Array = NDArray[np.float64]
 _CLEAR, _BELOW = 5.0, -4.0  # standard deviations of a map's noise: of all pixels, of few
 _MOST, _FEWEST = 0.5, 3  # of those that stand out
+_AROUND = 5  # pixels
 _SHORT, _SHARE = 0.2, 0.3  # of the longest time; of what a pixel grows by in that
 
 
@@ -53,20 +54,22 @@ def _both_ways(state: State) -> bool:
     if any(isinstance(effect, Rts) for effect in state.camera.effect):
         return False
     above = below = 0
-    for own in first_maps(state, ("time", "offset")).values():
-        height = heights(_beyond_lines(parts(*own).pixels), 1.0)
+    for image, noise in first_maps(state, ("time", "offset")).values():
+        height = heights(_single(image), noise)
         above += int((height > _CLEAR).sum())
         below += int((height < -_CLEAR).sum())
     return below >= max(_MOST * above, _FEWEST)
 
 
-def _beyond_lines(pixels: Array) -> Array:
-    """Return the pixels of a map beyond what is typical of their lines.
+def _single(image: Array) -> Array:
+    """Return what pixels of a map have beyond their neighbours, and what lines have in common.
 
-    One of 1000 standard deviations makes a line's mean higher, and the others seem lower.
+    By medians: a pixel of 1000 standard deviations makes the means of its lines, and polynomials
+    about it, higher, and the others seem lower.
     """
-    pixels = pixels - np.median(pixels, 1, keepdims=True)
-    return np.asarray(pixels - np.median(pixels, 0))
+    own = image - median_filter(image, _AROUND, mode="mirror")
+    own -= np.median(own, 1, keepdims=True)
+    return np.asarray(own - np.median(own, 0))
 
 
 def turned(state: State) -> bool:

@@ -114,7 +114,7 @@ def mistaken(task: dict[str, Any]) -> dict[str, Any]:
                 said = differing(layout, sure, other)
             if said:
                 alarms[max(said, key=lambda one: abs(one[1]))[0]] += 1
-    return {"kind": task["kind"], "asked": asked, "alarms": dict(alarms.most_common())}
+    return {"kind": task["kind"], "asked": asked, "alarms": dict(alarms)}
 
 
 def differing(layout: Layout, null: Null, seen: Vector) -> Sequence[tuple[str, float]]:
@@ -140,7 +140,7 @@ def report(entries: Sequence[dict[str, Any]]) -> None:
 
 
 def _most(alarms: dict[str, int]) -> str:
-    return ", ".join(f"{name} {count}" for name, count in list(alarms.items())[:3])
+    return ", ".join(f"{name} {count}" for name, count in Counter(alarms).most_common(3))
 
 
 def main() -> None:

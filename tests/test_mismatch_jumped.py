@@ -136,3 +136,18 @@ def test_strong_hot_pixels_push_none_below(seed: int) -> None:
     state.setting.seen.images["MONO", "offset"] = (image, 1.0)
     state.camera.effect = (HOT,)
     assert jumped(state, HOT) is None
+
+
+@pytest.mark.parametrize("shape", ["ramp", "wave"])
+@pytest.mark.parametrize("seed", range(3))
+def test_steep_maps_push_none_below(shape: str, seed: int) -> None:
+    """What neighbours have in common goes on beyond the edges."""
+    rng = np.random.default_rng(seed)
+    y, x = np.mgrid[:96, :128]
+    surface = y * x / 12.0 if shape == "ramp" else 30 * np.sin(2 * np.pi * (0.05 * y + 0.02 * x))
+    image = rng.normal(0, 1, (96, 128)) + surface
+    image.flat[rng.choice(image.size, 8, replace=False)] += 40.0
+    state = _state((0.05,), 0.0)
+    state.setting.seen.images["MONO", "offset"] = (image, 1.0)
+    state.camera.effect = (HOT,)
+    assert jumped(state, HOT) is None

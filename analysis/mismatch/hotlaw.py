@@ -128,7 +128,7 @@ def hot_laws(
     """
     pixels = [
         _Pixels(
-            Binned.of((image - _around(image))[~left_out[name]], noise),
+            Binned.of((image - around(image))[~left_out[name]], noise),
             noise,
             replace(current, mean=current.mean / noise),
         )
@@ -170,7 +170,7 @@ def hot_laws(
     return laws
 
 
-def _around(image: Array) -> Array:
+def around(image: Array) -> Array:
     """Return the median of the pixels around each; beyond the edges a map goes on as steeply."""
     reach = _AROUND // 2
     padded = np.pad(image, reach, mode="reflect", reflect_type="odd")

@@ -1,10 +1,13 @@
 """Pixels that stand out in the dark, and may be some that jump but stay where they are."""
 
+from collections.abc import Iterable
+
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import median_filter
 
+from analysis.mismatch.bank.parts import parts
 from analysis.mismatch.contradicted import Denial
+from analysis.mismatch.hotlaw import around
 from analysis.mismatch.jumping import NAME
 from analysis.mismatch.standout import first_maps, heights
 from analysis.mismatch.state import State
@@ -15,7 +18,6 @@ from dsis.effects.rts import Rts
 Array = NDArray[np.float64]
 _CLEAR, _BELOW = 5.0, -4.0  # standard deviations of a map's noise: of all pixels, of few
 _MOST, _FEWEST = 0.5, 3  # of those that stand out
-_AROUND = 5  # pixels
 _SHORT, _SHARE = 0.2, 0.3  # of the longest time; of what a pixel grows by in that
 
 
@@ -50,24 +52,31 @@ def _why(state: State, effect: HotPixels) -> str:
 
 
 def _both_ways(state: State) -> bool:
-    """Return whether pixels stand out on both sides of a map that hot ones would stand out of."""
+    """Return whether pixels stand out on both sides of a map that hot ones would stand out of.
+
+    Beyond lines and smooth surfaces, and beyond their neighbours too: a pixel of 1000 standard
+    deviations makes the means of its lines higher, and the others seem lower.
+    """
     if any(isinstance(effect, Rts) for effect in state.camera.effect):
         return False
+    maps = first_maps(state, ("time", "offset")).values()
+    return _in_both(heights(parts(*own).pixels, 1.0) for own in maps) and _in_both(
+        heights(_single(image), noise) for image, noise in maps
+    )
+
+
+def _in_both(maps: Iterable[Array]) -> bool:
+    """Return whether heights are far below in half as many places as above, or in more."""
     above = below = 0
-    for image, noise in first_maps(state, ("time", "offset")).values():
-        height = heights(_single(image), noise)
+    for height in maps:
         above += int((height > _CLEAR).sum())
         below += int((height < -_CLEAR).sum())
     return below >= max(_MOST * above, _FEWEST)
 
 
 def _single(image: Array) -> Array:
-    """Return what pixels of a map have beyond their neighbours, and what lines have in common.
-
-    By medians: a pixel of 1000 standard deviations makes the means of its lines, and polynomials
-    about it, higher, and the others seem lower.
-    """
-    own = image - median_filter(image, _AROUND, mode="mirror")
+    """Return what pixels of a map have beyond their neighbours, and what lines have in common."""
+    own = image - around(image)
     own -= np.median(own, 1, keepdims=True)
     return np.asarray(own - np.median(own, 0))
 

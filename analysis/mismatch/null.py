@@ -14,7 +14,7 @@ from analysis.mismatch.bank.key import Key
 from analysis.mismatch.bank.scalars import OF_MEAN_FRAMES
 from analysis.mismatch.contrasts import Contrasts, contrasts
 from analysis.mismatch.fewpairs import widening
-from analysis.mismatch.heavytails import degrees, equivalent
+from analysis.mismatch.heavytails import chances, degrees
 from analysis.mismatch.layout import Layout
 from analysis.mismatch.vector import Vector
 from analysis.mismatch.wander import by_lines, wandering_dn2
@@ -25,6 +25,7 @@ _POOLED = 160.0  # and for the tails: a scale is shared by all numbers of a name
 _LEAST_SCALE = 0.8
 _OF_PIXELS, _OF_LINES = "fixed_pixel_variance", ("fixed_row_variance", "fixed_column_variance")
 _SEVERAL = 5  # numbers of a name that tell whether they are alike
+_FEWEST = 7  # degrees of freedom of a spread that stands alone
 _RARE = 1e-5  # chance of a departure that counts, among some hundred numbers
 _UNLIKE = 1e-4  # chance of spreads that differ so
 _ODD = 1e-3  # chance of simulations so far off that scores are not normal, or closed forms no help
@@ -50,7 +51,7 @@ class Null:
     degrees
         Degrees of freedom of the spread: departures are Student's.
     tails
-        Degrees of freedom of the laws of numbers and contrasts; inf: they are normal.
+        Those of numbers and contrasts whose own law has heavier tails; inf: it has not.
     """
 
     keys: tuple[Key, ...]
@@ -64,13 +65,10 @@ class Null:
     tails: Array
 
     def departures(self, seen: Vector) -> Array:
-        """Return departures in standard deviations, of numbers and contrasts; 0 where unknown.
-
-        Those whose law has heavier tails count as a normal one's as rare.
-        """
+        """Return departures in standard deviations, of numbers and contrasts; 0 where unknown."""
         single = self._single(seen.values)
         sums = (self.contrasts.matrix @ single - self.contrast_mean) / self.contrast_sd
-        return equivalent(np.concatenate([single, sums]), self.tails, self.degrees)
+        return np.concatenate([single, sums])
 
     def _single(self, values: Array) -> Array:
         usable = self.known & np.isfinite(values)
@@ -80,7 +78,7 @@ class Null:
 
     def chances(self, departures: Array) -> Array:
         """Return the two-sided probability of each departure."""
-        return np.asarray(2 * scipy.stats.t.sf(np.abs(departures), self.degrees))
+        return chances(departures, self.tails, self.degrees)
 
 
 def null_of(
@@ -126,7 +124,7 @@ def null_of(
     expected = (1 + alike) / (1 + 1 / count)
     pooled = (_OWN * expected + (count - 1) * spread) / (_OWN + count - 1)
     alone = spread * (_farther(count - 1) / _farther(_OWN + count - 1)) ** 2
-    pooled = np.where(_denied(spread / expected, count - 1), alone, pooled)
+    pooled = np.where(_denied(along.var(0, ddof=1) / expected, count - 1), alone, pooled)
     # The same few recordings leave all numbers unsure, at worst to the same side.
     aside = (np.abs(sums.matrix) @ (np.sqrt(besides) / sd)) ** 2
     return Null(
@@ -138,7 +136,11 @@ def null_of(
         np.zeros(len(sums.keys)),
         np.sqrt(np.maximum(pooled, _LEAST_SCALE**2) * (1 + 1 / count) + aside),
         _POOLED + count - 1,
-        degrees((*seen.keys, *sums.keys), np.hstack([parts, along])),
+        degrees(
+            (*seen.keys, *sums.keys),
+            np.hstack([parts, along]),
+            np.concatenate([known, np.ones(len(sums.keys), bool)]),
+        ),
     )
 
 
@@ -242,19 +244,23 @@ def _by_name(
             groups.setdefault((key.statistic, key.scope), []).append(i)
     scale, worth, tails = np.ones(len(keys)), np.full(len(keys), _OWN), np.ones(len(keys))
     for which in groups.values():
-        size, mean = len(which), float(own[which].mean())
-        scale[which] = (own[which].sum() + 4.0) / (size + 4.0)
+        size, total = len(which), float(own[which].sum())
+        scale[which] = (total + 4.0) / (size + 4.0)
         if unlike := _unlike(own[which], dof):
             scale[which], worth[which] = unlike
-        elif size < _SEVERAL and _denied(np.array(mean), size * dof):
-            scale[which], worth[which] = mean, (size - 1) * dof
+        elif size < _SEVERAL and _denied(np.array(total / size), size * dof):
+            scale[which] = (total - own[which]) / max(size - 1, 1)
+            worth[which] = (size - 1) * dof
         tails[which] = _farther(worth[which[0]] + dof) / _farther(_OWN + dof)
     return scale, worth, tails
 
 
 def _denied(ratio: Array, dof: int) -> NDArray[np.bool_]:
-    """Return whether variances are larger than expected by such ratios not by chance."""
-    return np.asarray(scipy.stats.chi2.sf(ratio * dof, dof) < _ODD)
+    """Return whether variances are larger than expected by such ratios not by chance.
+
+    By themselves those of next to no simulations say nothing: they are never denied.
+    """
+    return np.asarray((scipy.stats.chi2.sf(ratio * dof, dof) < _ODD) & (dof >= _FEWEST))
 
 
 def _unlike(own: Array, dof: int) -> tuple[float, float] | None:
@@ -262,7 +268,7 @@ def _unlike(own: Array, dof: int) -> tuple[float, float] | None:
 
     None: they are as like as chance lets them be. Of few it is worth nothing.
     """
-    if len(own) < 2:
+    if len(own) < (2 if dof >= _FEWEST else _SEVERAL):
         return None
     logs = (
         np.log(np.maximum(own, _LEAST_SCALE**2))

@@ -1,6 +1,6 @@
 """A recording beside one model of it: calibrated, simulated, judged."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from math import inf
@@ -13,6 +13,7 @@ from analysis.mismatch.clues import Clues
 from analysis.mismatch.combs import unknown_combs
 from analysis.mismatch.finding import Mismatch
 from analysis.mismatch.instance import Frequency
+from analysis.mismatch.jumping import NAME as JUMPING
 from analysis.mismatch.jumping import Jumping
 from analysis.mismatch.layout import Layout
 from analysis.mismatch.locate import located, tested
@@ -55,8 +56,8 @@ class Setting:
     given
         How many effects the user's camera has: they come first, those taken in after them.
     surest
-        Simulations for a null by which all that is left departs little; fewer than `nulls`: no more
-        than these.
+        Simulations for a null by which all that is left departs little, of all frames of a small
+        recording; fewer than `nulls`: no more than these.
     asked_again
         Whether all frames will be asked what these leave undecided.
     jumping
@@ -157,7 +158,8 @@ class State:
     ) -> "State":
         """Return the state of a camera after its base numbers were fitted again.
 
-        `draft`: from fewer simulations. `near` has much the same camera: a start for its numbers.
+        `draft`: from fewer simulations; else from more where little departs. `near` has much the
+        same camera: a start for its numbers.
         """
         nulls = setting.drafts if draft else setting.nulls
         layout, seen = setting.layout, setting.seen
@@ -244,8 +246,16 @@ class _Judged:
 
     @property
     def nearly(self) -> bool:
-        """Whether all that departs does so little that a better known scatter may deny it."""
-        return bool(self.mismatches) and all(abs(m.z) < FAR for m in self.mismatches)
+        """Whether all that departs does so little that a better known scatter may deny it.
+
+        Of what hangs on simulations: pixels that jump are seen in the frames themselves.
+        """
+        return nearly([m.z for m in self.mismatches if m.statistic != JUMPING])
+
+
+def nearly(departures: Sequence[float]) -> bool:
+    """Return whether there are departures, and none is so far that more simulations leave it."""
+    return bool(departures) and all(abs(z) < FAR for z in departures)
 
 
 def _beside(setting: Setting, camera: Camera, made: Replicates, own: Vector) -> _Judged:

@@ -73,7 +73,7 @@ def evidence_of(
             for e in layout.pictures
         },
         tests=int(base.null.known.sum()) + len(base.null.contrasts.keys),
-        simulations=base.setting.nulls,
+        simulations=len(base.replicates.vectors),
         threshold_z=least,
         familywise_level=FAMILY,
         seconds=seconds,

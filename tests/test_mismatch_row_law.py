@@ -13,7 +13,7 @@ from analysis.mismatch.rank import LEAST_GAIN, TOLD_APART, Ranked
 from analysis.mismatch.rowlaw import bands, beside, constant_of, fitted, pink, waves_of
 from analysis.mismatch.rowodds import RowLaw
 from analysis.mismatch.rowpower import SLOW, Powers, Size, powers_of, without_lines
-from analysis.mismatch.rowtold import as_shown, beside_undecided, unlike_frames
+from analysis.mismatch.rowtold import AS_WELL, as_likely, as_shown, beside_undecided, unlike_frames
 from exposing import effect
 
 SURE = 5.0  # standard errors
@@ -319,3 +319,14 @@ def test_a_size_beside_what_is_undecided_may_hold_a_part_of_it() -> None:
     assert beside_undecided(named, [tuple(BOTH)], lambda: None) is named
     assert beside_undecided(named, [(BOTH[0], OTHERS[0])], lambda: 4.6) is named
     assert beside_undecided(named, [], lambda: 4.6) is named
+
+
+@pytest.mark.parametrize("kind", ["pink_noise", "row_banding"])
+def test_what_frames_show_as_well_is_undecided(kind: str) -> None:
+    """Whichever of both was fitted, as long as rows are left that call for one."""
+    other = {"pink_noise": "row_banding", "row_banding": "pink_noise"}[kind]
+    refused = {kind: f"{AS_WELL} the other", "prnu": "it explains nothing that differs for certain"}
+    assert as_likely(refused, {"row_correlation"}) == {kind: other, other: kind}
+    assert as_likely(refused, {"fixed_pixel_variance"}) == {}
+    assert as_likely({kind: "it is something else"}, {"row_correlation"}) == {}
+    assert as_likely({}, {"row_correlation"}) == {}

@@ -35,7 +35,7 @@ from analysis.mismatch.phase import WholeFrames
 from analysis.mismatch.pictures import Album, evidence_of
 from analysis.mismatch.recalibrate import Calibrated
 from analysis.mismatch.remarks import remark_on_sizes, remarks_on
-from analysis.mismatch.rowtold import SINGLE_ROWS, beside_undecided
+from analysis.mismatch.rowtold import EITHER, SINGLE_ROWS, as_likely, beside_undecided
 from analysis.mismatch.segments import as_settled, second_path
 from analysis.mismatch.settle import would_settle
 from analysis.mismatch.source import Source
@@ -332,8 +332,10 @@ def _finding(
         verdict = "unexplained"
     elif errors:
         verdict = "parameters"
-    tied = {one.name: other.kind for pair in search.ties for one, other in (pair, pair[::-1])}
     named = {one.name for one in search.named}
+    left = {m.statistic for m in final.mismatches}
+    tied = as_likely(search.refused, left) if named.isdisjoint(EITHER) else {}
+    tied |= {one.name: other.kind for pair in search.ties for one, other in (pair, pair[::-1])}
     undecided = tuple(
         Alternative(
             kind_of(name),

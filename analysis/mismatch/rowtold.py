@@ -1,11 +1,12 @@
 """Bands of rows and 1/f noise: which of them is claimed, as whole frames tell them apart."""
 
-from collections.abc import Callable, Container, Iterable, Sequence
+from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from math import hypot, isfinite
 
 from analysis.mismatch.burst import TAILS
+from analysis.mismatch.candidates import CANDIDATES
 from analysis.mismatch.contradicted import Denial, rival
 from analysis.mismatch.forms import OTHER_LEVELS
 from analysis.mismatch.instance import LINES
@@ -27,6 +28,7 @@ from dsis.effects.row_noise import RowNoise
 from dsis.effects.rts import Rts
 
 _OTHER = {"pink_noise": "row_banding", "row_banding": "pink_noise"}
+EITHER = frozenset(_OTHER)
 AS_WELL = "whole frames may as well show"
 SINGLE_ROWS = "row_noise"
 _COMES_FIRST = "noise of single rows comes first, which is there with either of bands and 1/f noise"
@@ -85,6 +87,20 @@ def unlike_frames(
         return Denial(1 / 2, _COMES_FIRST)
     other = _OTHER[best.kind]
     return None if _any(others, other) else rival(-odds, f"{AS_WELL} {_WORDS[other]}")
+
+
+def as_likely(refused: Mapping[str, str], left: Container[str]) -> dict[str, str]:
+    """Return bands and 1/f noise, each with the other, where one was refused for frames show both.
+
+    `refused` are effects by name, and why; `left` are statistics that are unexplained: what calls
+    for one of both must be among them.
+    """
+    found: dict[str, str] = {}
+    for kind, other in _OTHER.items():
+        doubted = refused.get(kind, "").startswith(AS_WELL)
+        if doubted and any(statistic in left for statistic in CANDIDATES[kind].calls):
+            found |= {kind: other, other: kind}
+    return found
 
 
 def _noisy_rows(state: State) -> bool:

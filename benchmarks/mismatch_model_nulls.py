@@ -12,7 +12,7 @@ import sys
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
-from tempfile import gettempdir
+from tempfile import TemporaryDirectory, gettempdir
 from typing import Any
 
 import numpy as np
@@ -25,16 +25,14 @@ from analysis.mismatch.layout import Layout
 from analysis.mismatch.locate import FAMILY, tested
 from analysis.mismatch.null import Null, null_of
 from analysis.mismatch.observe import observe
+from analysis.mismatch.source import Source
 from analysis.mismatch.state import SUREST, Setting, State, nearly
 from analysis.mismatch.taking import layout_of
 from analysis.mismatch.vector import Vector
 from dsis.camera import BaseNoise, Camera, Segment
 from dsis.cfa import Cfa
 from dsis.effects import Effect, registry
-from dsis.grid import PixelGrid
-from dsis.recording import ExposurePlan, RecordedExposure, Recording, Sensor
-from dsis.simulate import Shot, dark, flat
-from dsis.simulate.simulator import simulated_frames
+from dsis.simulate import Shot, dark, flat, simulate
 
 FEW, FRAMES, ROWS, COLUMNS = 16, 8, 96, 64
 LEVELS_DN, DARKS_S = (250.0, 900.0, 4900.0), (0.005, 0.05)
@@ -71,29 +69,11 @@ def layout_and_setting(camera: Camera, seed: int, simulations: int) -> tuple[Lay
         flat(f"flat-{i}", level, frames=FRAMES, exposure_time_s=0.01 * (i + 1), light=level)
         for i, level in enumerate(LEVELS_DN)
     ]
-    plans: list[ExposurePlan] = [shot.plan for shot in shots]
-    frames = list(simulated_frames(camera, shots, PixelGrid(ROWS, COLUMNS, camera.cfa), seed=seed))
-    stacks = {
-        plan.name: np.stack(frames[i * FRAMES : (i + 1) * FRAMES]) for i, plan in enumerate(plans)
-    }
-    exposures = tuple(
-        RecordedExposure(p.name, p.kind, p.exposure_time_s, p.light, (Path(p.name),) * FRAMES)
-        for p in plans
-    )
-    sensor = Sensor(
-        name="true",
-        cfa=camera.cfa,
-        black_level=camera.black_level,
-        white_level=camera.white_level,
-        bit_depth=camera.bit_depth,
-    )
-    numbers = {plan.name: tuple(range(FRAMES)) for plan in plans}
-    layout = layout_of(
-        Recording(sensor, exposures, ROWS, COLUMNS, Path()),
-        numbers,
-        lambda name, which: stacks[name][list(which)],
-    )
-    seen = observe(layout, stacks.__getitem__, keep=True)
+    with TemporaryDirectory() as folder:
+        recording = simulate(camera, shots, ROWS, COLUMNS, Path(folder) / "true", seed=seed)
+        source, numbers = Source(recording), {e.name: range(FRAMES) for e in recording.exposures}
+        layout = layout_of(recording, numbers, source.frames)
+        seen = observe(layout, lambda name: source.frames(name, numbers[name]), keep=True)
     return layout, Setting(layout, seen, None, seed, 1, simulations, simulations, 2, 2, 4)
 
 
@@ -103,28 +83,27 @@ def mistaken(task: dict[str, Any]) -> dict[str, Any]:
     camera = model_of(task["kind"], cfa)
     layout, setting = layout_and_setting(camera, task["seed"], task["simulations"])
     made = State.of(setting, camera, lambda: None).replicates.vectors
-    _, alarms, asked = held_against_others(layout, made)
+    alarms, asked = held_against_others(layout, made)
     name = task["kind"] if cfa.value == task["cfa"] else f"{task['kind']} ({cfa.value})"
     return {"kind": name, "asked": asked, "alarms": dict(alarms)}
 
 
-def held_against_others(layout: Layout, made: Sequence[Vector]) -> tuple[int, Counter[str], int]:
-    """Return how many recordings differ from others by few of these, by what, and how many of all.
+def held_against_others(layout: Layout, made: Sequence[Vector]) -> tuple[Counter[str], int]:
+    """Return by what recordings differ from others, how many each, and how many were asked.
 
-    By what: the statistic that differs most, by many where by few nothing is far off.
+    By the statistic that differs most, from many where from few nothing is far off.
     """
-    size, asked, by_few, alarms = len(made), 0, 0, Counter[str]()
+    size, asked, alarms = len(made), 0, Counter[str]()
     for start in range(0, size - FEW + 1, FEW):
         others = [made[(start + i) % size] for i in range(SUREST)]
         few, sure = null_of(layout, others[:FEW], others[0]), null_of(layout, others, others[0])
         for own in (made[(start + i) % size] for i in range(SUREST, size)):
             said, asked = differing(layout, few, own), asked + 1
-            by_few += bool(said)
             if nearly([z for _, z in said]):
                 said = differing(layout, sure, own)
             if said:
                 alarms[max(said, key=lambda one: abs(one[1]))[0]] += 1
-    return by_few, alarms, asked
+    return alarms, asked
 
 
 def differing(layout: Layout, null: Null, seen: Vector) -> Sequence[tuple[str, float]]:

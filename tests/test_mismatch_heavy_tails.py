@@ -147,7 +147,7 @@ def of_bands() -> State:
 def test_a_model_s_own_recordings_do_not_differ(of_bands: State) -> None:
     """With bands of rows: by 16 simulations, and by 64 then, in 2 % of them at most."""
     made = of_bands.replicates.vectors
-    _, alarms, asked = held_against_others(of_bands.setting.layout, made)
+    alarms, asked = held_against_others(of_bands.setting.layout, made)
     assert asked > 1500
     assert alarms.total() <= 0.02 * asked
 

@@ -5,8 +5,11 @@ the same make the same of a frame, whatever comes behind them.
 """
 
 from collections.abc import Callable, Collection, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
+from typing import Any
+
+import numpy as np
 
 from dsis.draw import Draw
 from dsis.effects import Effect, Exposure, Image, ReadOut, Stage
@@ -14,45 +17,52 @@ from dsis.grid import PixelGrid
 
 
 @dataclass(frozen=True)
-class Begun:
-    """What the first links of a chain made of a frame.
-
-    Attributes
-    ----------
-    links
-        How many.
-    image
-        What they made, DN above black.
-    lit
-        Whether some of them are behind the light.
-    expected_dn
-        As `Exposure` has it.
-    """
-
-    links: int
-    image: Image
-    lit: bool
-    expected_dn: Image
-
-
-@dataclass
 class Shared:
-    """What cameras whose chains begin alike have of one frame.
+    """What links made of one frame, for cameras that have links in common.
+
+    Images are numbered from the clean one, 0, on. A link that leaves an image as it is, as one of
+    the light does with a dark, makes no new one: what the next link makes of it is known as well.
 
     Attributes
     ----------
-    start
-        What an earlier camera's first links, the same as this one's, made of the frame; None: it
-        goes through all links.
-    wanted
-        Numbers of first links of which later cameras need what they made.
-    found
-        That, by their number; filled while the frame is made.
+    numbers
+        Of the camera's links: the same number is the same link, with the same fields and read-out;
+        see `link_numbers`.
+    again
+        Which of these other cameras have, that come later.
+    made
+        The image a link made, and its number, by the number of the link, of the image that it had,
+        and of that which light alone makes; filled while the frame is made.
     """
 
-    start: Begun | None = None
-    wanted: Collection[int] = ()
-    found: dict[int, Begun] = field(default_factory=dict)
+    numbers: Sequence[int]
+    again: Collection[int]
+    made: dict[tuple[int, int, int], tuple[int, Image]]
+
+
+def link_numbers(chains: Sequence[Sequence[Effect]], read_outs: Sequence[int]) -> list[list[int]]:
+    """Return a number for each link of some chains: the same where it makes the same of an image.
+
+    `read_outs` are numbers of what each camera's effects know of it. A second link of one kind has
+    fields of its own; one that remembers earlier frames hangs on all links before it.
+    """
+    known: dict[Any, list[tuple[Any, int]]] = {}
+    found = []
+    total = 0
+    for chain, read_out in zip(chains, read_outs, strict=True):
+        seen: dict[str, int] = {}
+        numbers: list[int] = []
+        for link in chain:
+            count = seen[link.kind] = seen.get(link.kind, 0) + 1
+            before = tuple(numbers) if link.looks_back else ()
+            same = known.setdefault((link.kind, count, read_out, before), [])
+            number = next((own for other, own in same if other == link), None)
+            if number is None:
+                number = total = total + 1
+                same.append((link, number))
+            numbers.append(number)
+        found.append(numbers)
+    return found
 
 
 @dataclass(frozen=True)
@@ -91,41 +101,55 @@ class Shutter:
 
     def through(self, drawn: Drawn, shared: Shared | None = None) -> Image:
         """Return what links make of the frame; `shared` where other cameras make it too."""
-        steps, read_out = drawn.steps, drawn.read_out
-        first = shared or Shared()
+        if shared is None:
+            return self._after(drawn, len(drawn.steps), 0)
+        image, lit, expected = self.clean, False, self.clean
+        number, of_light, common = 0, 0, True
+        for place, link_number in enumerate(shared.numbers):
+            link = drawn.steps[place][0]
+            if not lit and link.stage > Stage.LIGHT:
+                lit, expected, of_light = True, image, number
+            asked = link_number, number, of_light
+            known = shared.made.get(asked) if common else None
+            if known is None:
+                made = link.apply(image, self._exposure(drawn, place, 0, expected))
+                if _same(made, image):
+                    known = number, image
+                else:  # what no other camera has behind it is kept no longer
+                    common &= link_number in shared.again
+                    known = len(shared.made) + 1, made
+                if common:
+                    shared.made[asked] = known
+            number, image = known
+        return image
 
-        def after(links: int, back: int) -> Image:
-            """Return what the first `links` links make of the frame `back` frames earlier."""
-            light = self.earlier_clean(back) if back and self.earlier_clean else self.clean
-            own = first if links == len(steps) and not back else Shared()
-            begun = own.start or Begun(0, light, lit=False, expected_dn=light)
-            image, lit, expected = begun.image, begun.lit, begun.expected_dn
-            # Before the first frame the counter runs backwards: it has 32 bits.
-            number = (self.frame - back) % 2**32
-            for place in range(begun.links, links):
-                link, temporal, sensor = steps[place]
-                if not lit and link.stage > Stage.LIGHT:
-                    lit, expected = True, image
-                exposure = Exposure(
-                    self.grid,
-                    number,
-                    temporal,
-                    sensor,
-                    expected,
-                    read_out,
-                    partial(before, place, back),
-                    self.exposure_time_s,
-                    self.threads,
-                )
-                image = link.apply(image, exposure)
-                if place + 1 in own.wanted:
-                    own.found[place + 1] = Begun(place + 1, image, lit, expected)
-            return image
+    def _after(self, drawn: Drawn, links: int, back: int) -> Image:
+        """Return what the first `links` links make of the frame `back` frames earlier."""
+        image = self.earlier_clean(back) if back and self.earlier_clean else self.clean
+        lit, expected = False, image
+        for place in range(links):
+            link = drawn.steps[place][0]
+            if not lit and link.stage > Stage.LIGHT:
+                lit, expected = True, image
+            image = link.apply(image, self._exposure(drawn, place, back, expected))
+        return image
 
-        def before(links: int, back: int, k: int) -> Image:
-            return after(links, back + k)
+    def _exposure(self, drawn: Drawn, place: int, back: int, expected: Image) -> Exposure:
+        """Return what the link at a place may know of the frame `back` frames earlier."""
+        _, temporal, sensor = drawn.steps[place]
+        # Before the first frame the counter runs backwards: it has 32 bits.
+        number = (self.frame - back) % 2**32
+        earlier = partial(self._before, drawn, place, back)
+        known = (expected, drawn.read_out, earlier, self.exposure_time_s, self.threads)
+        return Exposure(self.grid, number, temporal, sensor, *known)
 
-        return after(len(steps), 0)
+    def _before(self, drawn: Drawn, links: int, back: int, k: int) -> Image:
+        return self._after(drawn, links, back + k)
+
+
+def _same(made: Image, image: Image) -> bool:
+    """Return whether a link left an image as it is; most differ in their first row."""
+    return np.array_equal(made[0], image[0]) and np.array_equal(made, image)
 
 
 def _drawn(

@@ -1,5 +1,7 @@
 """Recordings that are simulated side by side are those that are simulated one by one."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -8,19 +10,20 @@ from analysis.mismatch.model import Model, simulate, simulated
 from analysis.mismatch.observe import Observation
 from analysis.mismatch.simulations import _groups
 from analysis.mismatch.state import State
+from analysis.mismatch.summed import Looked, SensorSums
 from analysis.mismatch.together import most_together, shared_links, simulated_together
 from analysis.mismatch.touches import ALL_SUMS, RECORDED, SPECTRA
 from analysis.mismatch.vector import vector
 from dsis.camera import Camera
 from dsis.draw import Draw
-from dsis.effects import Effect
+from dsis.effects import Effect, Exposure
 from dsis.effects.adc_dnl import AdcDnl
 from dsis.effects.flicker import Flicker
 from dsis.effects.image_lag import ImageLag
 from dsis.effects.periodic_noise import PeriodicNoise
 from dsis.effects.row_noise import RowNoise
 from dsis.effects.saturation import Saturation
-from dsis.exposing import Shared
+from dsis.exposing import Shared, link_numbers
 from dsis.grid import PixelGrid
 from effect_examples import KINDS, camera_with, example_of
 from mismatch_recordings import camera, recorded, state_of
@@ -94,34 +97,72 @@ def test_of_other_light_nothing_is_shared(state: State) -> None:
 def test_chains_begin_alike_up_to_what_differs() -> None:
     cameras = [camera(*effects) for effects in SOME]
     chains = [own.chain() for own in cameras]
-    for place, (earlier, links) in enumerate(shared_links(cameras)):
-        assert chains[place][:links] == chains[earlier][:links]
-        assert earlier < place or not links
-    assert [links for _, links in shared_links(cameras)][:2] == [0, len(chains[0]) - 2]
+    for own, chain in zip(cameras, chains, strict=True):
+        links = shared_links(cameras[0], own)
+        assert chain[:links] == chains[0][:links]
+    assert shared_links(cameras[0], cameras[1]) == len(chains[0]) - 2
     other = camera(*SOME[0], segments=((0.6, 20.0, None),))
-    assert shared_links([cameras[0], other]) == [(0, 0), (0, 0)]
+    assert shared_links(cameras[0], other) == 0
 
 
+def test_links_have_a_number_for_what_they_make() -> None:
+    """The same link, its place among those of its kind, the read-out; of a lag all before it."""
+    lag, row = ImageLag(fraction=0.1), RowNoise(sigma_dn=1.0)
+    chains = [(LIGHT, lag, ROWS), (LIGHT, lag, ROWS), (lag, row, ROWS), (LIGHT, ROWS)]
+    first, again, other, darker = link_numbers(chains, [0, 0, 0, 1])
+    assert first == again
+    assert not set(first).intersection(other)  # the lag has no light before it, ROWS are second
+    assert not set(first).intersection(darker)
+
+
+@pytest.mark.parametrize("signal", [0.0, 700.0])
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_frame_goes_on_from_any_link_as_it_would_have(kind: str) -> None:
+def test_a_frame_is_the_same_beside_other_cameras(kind: str, signal: float) -> None:
     """Effects that remember earlier frames, or redraw noise, among them."""
     made = camera_with(example_of(KINDS[kind]))
     if kind != "image_lag":
         made = made.model_copy(update={"effect": (*made.effect, ImageLag(fraction=0.02))})
+    bare = made.model_copy(update={"effect": made.effect[1:]})
     grid = PixelGrid(12, 16, made.cfa)
-    clean = np.full(grid.shape, 700.0, np.float32)
-    links = len(made.chain())
+    clean = np.full(grid.shape, signal, np.float32)
+    cameras = [made, bare, made, bare]
+    links = link_numbers([own.chain() for own in cameras], [0] * len(cameras))
+    kept: dict[tuple[int, int, int], tuple[int, np.ndarray]] = {}
+    for place, own in enumerate(cameras):
+        again = {number for later in links[place + 1 :] for number in later}
+        frames = [
+            Camera.expose(
+                own, clean, Draw(1), Draw(2), 4, grid, exposure_time_s=0.01, shared=shared
+            )
+            for shared in (None, Shared(links[place], again, kept))
+        ]
+        np.testing.assert_array_equal(*frames, strict=True)
 
-    def frame(shared: Shared | None) -> np.ndarray:
-        return Camera.expose(
-            made, clean, Draw(1), Draw(2), 4, grid, exposure_time_s=0.01, shared=shared
-        )
 
-    whole, kept = frame(None), Shared(None, range(1, links + 1))
-    np.testing.assert_array_equal(frame(kept), whole)
-    assert sorted(kept.found) == list(range(1, links + 1))
-    for begun in kept.found.values():
-        np.testing.assert_array_equal(frame(Shared(begun)), whole)
+def test_what_light_does_to_a_dark_is_made_and_looked_at_once(
+    state: State, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    layout, model = state.setting.layout, state.calibrated.model
+    effects = [(own, ROWS) for own in (Flicker(sigma_percent=1.0), Flicker(sigma_percent=2.0))]
+    models = [model.with_camera(model.camera.model_copy(update={"effect": own})) for own in effects]
+    looked, rows = [], []
+    whole, apply = SensorSums.looked, RowNoise.apply
+
+    def counted(self: SensorSums, name: str, *rest: Any) -> Looked:
+        looked.append(name)
+        return whole(self, name, *rest)
+
+    def made(self: RowNoise, image: np.ndarray, exposure: Exposure) -> np.ndarray:
+        rows.append(exposure.temporal.scope)
+        return apply(self, image, exposure)
+
+    monkeypatch.setattr(SensorSums, "looked", counted)
+    monkeypatch.setattr(RowNoise, "apply", made)
+    simulated_together(layout, 5, itself, ([(own, ALL_SUMS) for own in models], 1))
+    for e in layout.uniform:
+        times = 1 if e.kind == "dark" else 2
+        assert looked.count(e.name) == times
+        assert sum(e.name in scope for scope in rows) == times * len(e.numbers)
 
 
 def test_groups_hold_each_once_and_are_enough_for_all_jobs() -> None:

@@ -11,7 +11,8 @@ Few pixels that jump are as rarely seen: most stay where they are in two frames.
 from analysis.mismatch.instance import LINES, same_place
 from analysis.mismatch.name import Search
 from analysis.mismatch.named import Named
-from analysis.mismatch.rank import SURE_GAIN, replicates_for
+from analysis.mismatch.proposed import replicates_for
+from analysis.mismatch.rank import SURE_GAIN
 from analysis.mismatch.resolved import gained
 from analysis.mismatch.state import State
 from analysis.mismatch.trial import Trial

@@ -22,6 +22,7 @@ from analysis.mismatch.memory import Memory
 from analysis.mismatch.named import Named
 from analysis.mismatch.phase import ABSENT, Measured, WholeFrames
 from analysis.mismatch.polish import with_effects
+from analysis.mismatch.proposed import replicates_for
 from analysis.mismatch.rank import (
     LEAST_GAIN,
     SURE_CHANCE,
@@ -30,7 +31,6 @@ from analysis.mismatch.rank import (
     Ranked,
     behind,
     ranked,
-    replicates_for,
 )
 from analysis.mismatch.rowtold import AS_WELL, as_shown, unlike_frames
 from analysis.mismatch.segments import Path, spiky

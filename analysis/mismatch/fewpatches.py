@@ -19,6 +19,7 @@ _MOST_PIXELS = 512  # a side: of a larger sensor its middle
 _PIXELS, _ROUNDS, _NEAR = 4096, 8, 0.3  # of a surface; of the median deviation: no nearer one
 _DRAWS, _CLEAR = 64, 4.0  # fields of chance; standard deviations among them
 _MOST = 0.5  # of the field's variance, that few patches may make
+_FEW_DRAWS, _SURELY = 8, 0.65  # fields by which it may be clear that it is more than that
 _NORMAL = 0.75  # of it, from which no drawn field need be asked: theirs is near 1
 _SIDE = 0.15865525393145707  # of normal values lie beyond one standard deviation, on a side
 
@@ -66,9 +67,12 @@ def unlike_drawn(
     share = share_of(image, field)
     if share > _NORMAL:
         return None
-    rng, chance = np.random.default_rng(0), []
+    rng = np.random.default_rng(0)
+    chance: list[float] = []
     root = np.sqrt(field + white_of(image))
-    for _ in range(_DRAWS):
+    for draw in range(_DRAWS):
+        if draw == _FEW_DRAWS and share > _SURELY * float(np.mean(chance)):
+            return None  # the others would not make fields show that much more
         drawn = fft.rfft2(rng.standard_normal(image.shape)) * root
         seen = parts(fft.irfft2(drawn, image.shape), 1.0).pixels  # as the map's are
         chance.append(share_of(seen, field))

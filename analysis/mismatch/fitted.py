@@ -16,7 +16,8 @@ from analysis.mismatch.named import Named, camera_without, renewed
 from analysis.mismatch.own import Own, called, explained, refitted, resized, sizes, without_own
 from analysis.mismatch.polish import polish, with_effects
 from analysis.mismatch.predict import Predictor
-from analysis.mismatch.rank import LEAST_GAIN, Ranked, replicates_for
+from analysis.mismatch.proposed import replicates_for
+from analysis.mismatch.rank import LEAST_GAIN, Ranked
 from analysis.mismatch.resolved import FAR_OFF, calls_alone, explains
 from analysis.mismatch.segments import Path, second_path
 from analysis.mismatch.state import Setting, State

@@ -5,7 +5,8 @@ from dataclasses import replace
 
 from analysis.mismatch.basenumbers import HOLD, WRONG, beside, chance
 from analysis.mismatch.credited import joined
-from analysis.mismatch.rank import TOLD_APART, Ranked, replicates_for
+from analysis.mismatch.proposed import replicates_for
+from analysis.mismatch.rank import TOLD_APART, Ranked
 from analysis.mismatch.state import State
 from dsis.camera import BaseNoise, Camera
 from dsis.effects.readout_memory import ReadoutMemory

@@ -5,6 +5,7 @@ are smooth, so that what neighbours have in common does not tell them apart; the
 """
 
 from collections.abc import Iterator
+from functools import lru_cache
 from math import log
 
 import numpy as np
@@ -83,8 +84,7 @@ def patches_of(image: Array) -> Iterator[tuple[float, Array]]:
     size have, and for its depth.
     """
     white, rest = white_of(image), image - image.mean()
-    shapes = [_patch(image.shape, radius) for radius in _RADII]
-    waves = [np.conj(fft.rfft2(one)) for one in shapes]
+    shapes, waves = _patches(image.shape)
     prices = [log(2 * len(_RADII) * max(image.size / r**2, 1.0)) + _LEAST for r in _RADII]
     for _ in range(_MOST):
         seen = fft.rfft2(rest)
@@ -131,6 +131,13 @@ def _plane(state: State) -> tuple[Array, int] | None:
     order = np.arange(len(found))[:, np.newaxis] + np.arange(len(found))
     step = 1 if len(images) == 1 else 2
     return plane - smooth.surface(np.where(order <= _LIGHT, found, 0.0)), step * side
+
+
+@lru_cache(maxsize=1)  # maps of one recording are all asked
+def _patches(shape: tuple[int, ...]) -> tuple[list[Array], list[NDArray[np.complex128]]]:
+    """Return a round patch of each radius about the first pixel, and what lifts it out of noise."""
+    shapes = [_patch(shape, radius) for radius in _RADII]
+    return shapes, [np.conj(fft.rfft2(one)) for one in shapes]
 
 
 def _patch(shape: tuple[int, ...], radius: float) -> Array:

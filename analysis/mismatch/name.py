@@ -15,7 +15,7 @@ from analysis.mismatch.judge import INSTEAD, LITTLE, NEEDLESS, NOTHING, Judge
 from analysis.mismatch.memory import Memory
 from analysis.mismatch.named import Named
 from analysis.mismatch.phase import ABSENT
-from analysis.mismatch.rank import replicates_for
+from analysis.mismatch.proposed import replicates_for
 from analysis.mismatch.resolved import differ, gained, opened
 from analysis.mismatch.state import State
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from math import nan
 from typing import TypeVar
 
@@ -33,6 +34,8 @@ Array = NDArray[np.float64]
 Frames = Callable[[str], Iterable[NDArray[np.generic]]]
 Observing = Generator[None, None, "Observation"]
 Watcher = Callable[[str, Measured], None]
+Shown = tuple[Looked, Bulk | None]
+"""What an exposure's frames show, and its noise without spikes where that is asked for."""
 _Told = TypeVar("_Told")
 
 
@@ -145,12 +148,15 @@ class Kept:
         Whether to look where spectra are largest: of simulations only numbers are asked for.
     made
         Those of `RECORDED` that are made: without one its numbers are unknown, all others the same.
+    looked
+        Looks at an exposure as it is told, or knows what that would show; None: looks.
     """
 
     images: bool = False
     samples: bool = True
     places: bool = True
     made: frozenset[str] = RECORDED
+    looked: Callable[[Callable[[], Shown]], Shown] | None = None
 
 
 def observe(
@@ -194,7 +200,11 @@ def finished(running: Observing) -> Observation:
 
 
 def observing(
-    layout: Layout, frames_of: Frames, watch: Watcher | None, kept: Kept, threads: int = 1
+    layout: Layout,
+    frames_of: Frames,
+    watch: Watcher | None,
+    kept: Kept,
+    threads: int = 1,
 ) -> Observing:
     """Observe as `observe` does, and pause whenever an exposure of uniform light was looked at."""
     levels: dict[Place, Level] = {}
@@ -207,11 +217,9 @@ def observing(
     lines: dict[tuple[str, Axis], LineMeans] = {}
     surfaces: dict[Place, Leaning] = {}
 
-    def look(exposure: Taken) -> tuple[Looked, Bulk | None]:
-        many = Bulk.of(layout, exposure.name) if SPIKES in kept.made else None
-        frames = frames_of(exposure.name)
-        seen = frames if many is None else many.watching(frames)
-        return whole.looked(exposure.name, len(exposure.numbers), seen), many
+    def look(exposure: Taken) -> Shown:
+        anew = partial(_shown, whole, exposure, frames_of)
+        return anew() if kept.looked is None else kept.looked(anew)
 
     # What exposures show is summed in their order, whoever was first to look.
     for one, many in in_order(look, layout.uniform, threads if threads > 1 else 0):
@@ -264,6 +272,14 @@ def observing(
         middles,
         gaps,
     )
+
+
+def _shown(whole: SensorSums, exposure: Taken, frames_of: Frames) -> Shown:
+    """Return what an exposure's frames show."""
+    many = Bulk.of(whole.layout, exposure.name) if SPIKES in whole.made else None
+    frames = frames_of(exposure.name)
+    seen = frames if many is None else many.watching(frames)
+    return whole.looked(exposure.name, len(exposure.numbers), seen), many
 
 
 def _of_codes(

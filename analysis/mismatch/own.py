@@ -14,7 +14,8 @@ from analysis.mismatch.finding import Mismatch, ParameterError
 from analysis.mismatch.named import SHAPES
 from analysis.mismatch.polish import polish, with_effects
 from analysis.mismatch.predict import Predictor
-from analysis.mismatch.rank import LEAST_GAIN, replicates_for
+from analysis.mismatch.proposed import replicates_for
+from analysis.mismatch.rank import LEAST_GAIN
 from analysis.mismatch.state import State
 from dsis.camera import Camera
 from dsis.effects import Effect

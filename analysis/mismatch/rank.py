@@ -8,7 +8,6 @@ from math import log
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.mismatch.apart import as_far_apart, known_at_once
 from analysis.mismatch.candidates import CANDIDATES, Proposal
 from analysis.mismatch.credited import joined, together
 from analysis.mismatch.instance import (
@@ -18,9 +17,9 @@ from analysis.mismatch.instance import (
     same_place,
 )
 from analysis.mismatch.memory import Memory, words
-from analysis.mismatch.model import side_by_side
-from analysis.mismatch.polish import Polished, needed, polish, stepped, with_effects
-from analysis.mismatch.state import Setting, State
+from analysis.mismatch.polish import Polished, needed, stepped
+from analysis.mismatch.proposed import STRONG, WORTH_IT, all_fitted, means_of, replicates_for
+from analysis.mismatch.state import State
 from dsis.effects import Effect
 from dsis.effects.adc_memory import AdcMemory
 
@@ -37,39 +36,12 @@ _TOLD_RIVALS = 3
 _MOST = 4  # kinds that are fitted, after all were tried as proposed
 _FAR = 15.0  # of log-likelihood behind the best as proposed: fitting does not make up for it
 _SHARE = 0.03  # or that share of what the best gains
-_ROUNDS = 2  # of a fit, where each simulation takes long
 TOLD_APART = 3.0  # of log-likelihood: odds below 20 do not tell two effects apart
 _COSINE = 0.5  # of what two predictions change, from which they change the same
-_SPARSE = 4  # times as many simulations
-_BY_FRAME = frozenset({"frame_variance"})
 _BY_JUMPS = frozenset({"rts"})
 # Codes in step with powers of two; residues, whose levels a step that is not fitted misses.
 _BY_FRAMES = _BY_JUMPS | LINES | {"adc_dnl", "adc_memory"}
-# A sign: half of the pairs of frames show nothing, half show it twice. A band: one bin's phase.
-# Pink noise and bands of rows: most of it in a frame's mean and in the first few bins. Gains that
-# neighbours share: in few patches. Hot pixels: the few brightest ones.
-_BY_DRAW = frozenset(
-    {"bistable_pattern", "hot_pixels", "line_flicker", "pink_noise", "row_banding", "smooth_prnu"}
-)
-_BY_BIN = frozenset({"periodic_noise"})  # of few frames: the noise of one bin comes on top
 _FAR_OFF, _LITTLE = 8.0, 0.3  # departures, and the share of one that is little
-_STRONG = 30.0  # gain of log-likelihood beside which what gained little before needs no new trial
-_WORTH_IT = 0.3  # share of it
-
-
-def replicates_for(setting: Setting, effects: Iterable[Effect]) -> int:
-    """Return how many simulations tell what effects change.
-
-    Of one number or sign a frame, few frames of few simulations may hold next to nothing.
-    """
-    if any(_sparse(setting, effect) for effect in effects):
-        return min(_SPARSE * setting.replicates, setting.drafts)
-    return setting.replicates
-
-
-def _sparse(setting: Setting, effect: Effect) -> bool:
-    few = not setting.large and effect.kind in _BY_BIN
-    return few or effect.changes == _BY_FRAME or effect.kind in _BY_DRAW
 
 
 @dataclass(frozen=True)
@@ -132,14 +104,14 @@ def ranked(
             asked.ready(stepped(asked, *fit) for fit in fits)
     found: list[Fit] = []
     strange: set[str] = set()
-    made = side_by_side(partial(_fitted, state), likely, state.setting.jobs)
+    made = all_fitted(state, likely, far)
     at_hand = {id(start): polished for start, polished in zip(likely, made, strict=True)}
     for value, kind, proposal in tried:
         kinds_so_far = {one[0] for one in found}
         if value < best - far or (len(kinds_so_far) >= _MOST and kind not in kinds_so_far):
             continue
         known = id(proposal) in at_hand
-        polished = at_hand[id(proposal)] if known else _fitted(state, proposal)
+        polished = at_hand[id(proposal)] if known else all_fitted(state, [proposal], far)[0]
         step()
         if polished is None or not CANDIDATES[kind].sane(state.setting.layout, polished.effects[0]):
             strange.add(kind)
@@ -162,19 +134,6 @@ def _unsure(state: State, fitted: Sequence[Ranked]) -> bool:
         one.kind != best.kind and best.gain - one.gain < _FAR and alike(state, best.mean, one.mean)
         for one in others
     )
-
-
-def _fitted(state: State, proposal: Proposal) -> Polished | None:
-    """Return an effect fitted beside the camera's; None: it is no camera."""
-    own = state.predictor(replicates_for(state.setting, [proposal.effect]))
-    rounds = 0 if known_at_once(proposal.effect) else 1 + len(proposal.free)
-    if state.setting.large:  # of a large recording steps are long and sure
-        rounds = min(rounds, _ROUNDS)
-    fitted = polish(own, *together(state.camera, proposal, state.setting.given), rounds=rounds)
-    if fitted is None:
-        return None
-    first, *others = fitted.effects
-    return replace(fitted, effects=(as_far_apart(proposal.effect, first), *others))
 
 
 def _in_order(state: State, found: Sequence[Fit], shown: Callable[[Effect], float]) -> list[Ranked]:
@@ -279,7 +238,7 @@ def _tried(
     best = max((memory.gained(kind, 0.0) for kind in left), default=0.0)
     found: list[tuple[float, str, Proposal, Array]] = []
     while True:
-        worth = _WORTH_IT * best if best > _STRONG else -np.inf
+        worth = WORTH_IT * best if best > STRONG else -np.inf
         chosen = sorted(kind for kind in left if memory.gained(kind, np.inf) >= worth)
         if not chosen:
             break
@@ -290,7 +249,7 @@ def _tried(
             for proposal in CANDIDATES[kind].propose(clues)
             if possible(proposal.effect)
         ]
-        means = _means(state, [proposal for _, proposal in proposed], memory, step)
+        means = means_of(state, [proposal for _, proposal in proposed], memory, step, best)
         gains: dict[tuple[str, tuple[str, ...]], float] = {}
         for (kind, proposal), mean in zip(proposed, means, strict=True):
             if mean is None:
@@ -309,41 +268,6 @@ def _tried(
         if not any(one[1] == other[1] and alike(state, one[3], other[3]) for other in kept):
             kept.append(one)
     return [(value, kind, proposal) for value, kind, proposal, _ in kept]
-
-
-def _means(
-    state: State, some: Sequence[Proposal], memory: Memory, step: Callable[[], None]
-) -> list[Array | None]:
-    """Return the numbers with each effect added, remembered or simulated; None: it is no camera."""
-    effects = [proposal.effect for proposal in some]
-    predictor = state.predictor(state.setting.screening)
-    by_frame = state.predictor(replicates_for(state.setting, effects))
-    fits = [together(state.camera, proposal, state.setting.given) for proposal in some]
-    alone = [len(starts) == 1 for _, starts in fits]  # else the change is another's too
-    found = [
-        memory.recalled(effect, state) if own else None
-        for effect, own in zip(effects, alone, strict=True)
-    ]
-    fresh = [
-        (
-            i,
-            effect,
-            with_effects(fits[i][0], [start.effect for start in fits[i][1]]),
-            by_frame if _sparse(state.setting, effect) else predictor,
-        )
-        for i, effect in enumerate(effects)
-        if found[i] is None
-    ]
-    for asked in (predictor, by_frame):
-        asked.ready(camera for _, _, camera, own in fresh if own is asked)
-    for i, effect, camera, asked in fresh:
-        step()
-        if camera is not None:
-            mean = asked.mean(camera)
-            if alone[i]:
-                memory.keep(effect, state, mean)
-            found[i] = mean
-    return found
 
 
 def alike(state: State, one: Array, other: Array) -> bool:

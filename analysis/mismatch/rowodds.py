@@ -2,12 +2,14 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import combinations
 from math import log
 
 import numpy as np
 from scipy.special import logsumexp
 
+from analysis.mismatch.model import apart
 from analysis.mismatch.rowlaw import Cause, Fit, bands, beside, fitted, pink
 from analysis.mismatch.rowpower import Powers, Size
 
@@ -103,7 +105,8 @@ class RowLaw:
         there besides.
         """
         if kind not in self._found:
-            self._found[kind] = [self._fitted(own) for own in self._causes(kind)]
+            beside_all = partial(_fitted, self.powers, self.size)
+            self._found[kind] = apart(beside_all, self._causes(kind))
         some = [[one for one in own if judged(one[0])] for own in self._found[kind]]
         each = [self._best(own, known) for own in some]
         loglik = float(logsumexp([one for one, _ in each])) - log(len(each))
@@ -115,15 +118,6 @@ class RowLaw:
             return [pink(self.size)]
         lengths = np.geomspace(_SHORTEST, _LONGEST * self.size.rows, _LENGTHS)
         return [bands(self.size, float(length)) for length in lengths]
-
-    def _fitted(self, own: Cause) -> list["_Beside"]:
-        """Return the fits of a cause beside whatever else may be there."""
-        causes, found = beside(self.size), []
-        for count in range(len(causes) + 1):
-            for kinds in combinations(causes, count):
-                fit = fitted(self.powers, self.size, [own, *(causes[kind] for kind in kinds)])
-                found += [] if fit is None else [(kinds, fit)]
-        return found
 
     def _best(self, fits: list["_Beside"], known: frozenset[str]) -> tuple[float, float]:
         each = [(fit.loglik - self._cost(kinds, known), fit.off) for kinds, fit in fits]
@@ -138,3 +132,13 @@ class RowLaw:
 
 _Beside = tuple[tuple[str, ...], Fit]
 """What else is there beside a cause, and the fit of all."""
+
+
+def _fitted(powers: Sequence[Powers], size: Size, own: Cause) -> list[_Beside]:
+    """Return the fits of a cause beside whatever else may be there."""
+    causes, found = beside(size), []
+    for count in range(len(causes) + 1):
+        for kinds in combinations(causes, count):
+            fit = fitted(powers, size, [own, *(causes[kind] for kind in kinds)])
+            found += [] if fit is None else [(kinds, fit)]
+    return found

@@ -17,7 +17,8 @@ from analysis.mismatch.nofield import no_field
 from analysis.mismatch.paired import STEADY
 from analysis.mismatch.phase import WholeFrames
 from analysis.mismatch.polish import with_effects
-from analysis.mismatch.rank import LEAST_GAIN, TOLD_APART, Ranked, alike, replicates_for
+from analysis.mismatch.proposed import replicates_for
+from analysis.mismatch.rank import LEAST_GAIN, TOLD_APART, Ranked, alike
 from analysis.mismatch.repeated import OFFSETS
 from analysis.mismatch.segments import Path
 from analysis.mismatch.sidedneighbours import SHARED

@@ -64,7 +64,7 @@ class Simulations:
             return
 
         own = self.model.camera
-        parting = {key: shared_links([own, one])[1][1] for key, one in wanted.items()}
+        parting = {key: shared_links(own, one) for key, one in wanted.items()}
         groups = _groups(missing, parting, most_together(self.layout), self.jobs)
         work: list[Work] = [
             ([(self._model(wanted[key]), self._made(wanted[key])) for key in keys], number)

@@ -2,10 +2,12 @@
 
 Cameras that are compared differ by an effect or a parameter, and have the same draws: up to the
 first link that is another, a frame of one is a frame of the other. So frames of one exposure are
-made camera by camera, each from where it parts from an earlier one, and then looked at.
+made camera by camera, each from where it parts from an earlier one, and then looked at; a dark, of
+which effects of the light make nothing, once for all.
 """
 
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from itertools import takewhile
 from typing import TypeVar
 
@@ -14,12 +16,13 @@ from numpy.typing import NDArray
 
 from analysis.mismatch.layout import Layout, Taken
 from analysis.mismatch.model import Model, simulated
-from analysis.mismatch.observe import Kept, Observation, finished, observing
+from analysis.mismatch.observe import Kept, Observation, Shown, finished, observing
 from dsis.camera import Camera
-from dsis.exposing import Begun, Shared
+from dsis.effects import Image
+from dsis.exposing import Shared, link_numbers
 
 R = TypeVar("R")
-_MOST_BYTES = 256 << 20  # in each process, of all cameras that are looked at together
+_MOST_BYTES = 512 << 20  # in each process, of all cameras that are looked at together
 _PIXEL_BYTES = 128  # sums over frames and exposures that a camera takes for each pixel
 _LARGEST_CODE = 65535
 Work = tuple[Sequence[tuple[Model, frozenset[str]]], int]
@@ -38,38 +41,78 @@ def simulated_together(
 ) -> list[R]:
     """Return what one simulated recording of each of some models tells; see `simulate`."""
     some, replicate = which
-    models = [model for model, _ in some]
-    if len(models) < 2 or not _alike(models):
-        return [tell(simulated(layout, seed, (model, replicate, made))) for model, made in some]
-    frames = _Frames(models, layout, replicate, seed)
+    found: dict[int, R] = {}
+    for places in _alike([model for model, _ in some]):
+        own = [some[place] for place in places]
+        if len(own) > 1:
+            seen = _side_by_side(layout, seed, own, replicate)
+        else:
+            seen = iter([simulated(layout, seed, (own[0][0], replicate, own[0][1]))])
+        found.update(zip(places, map(tell, seen), strict=True))
+    return [found[place] for place in range(len(some))]
+
+
+def _side_by_side(
+    layout: Layout, seed: int, some: Sequence[tuple[Model, frozenset[str]]], replicate: int
+) -> Iterator[Observation]:
+    """Return the observations of models of one light."""
+    frames = _Frames([model for model, _ in some], layout, replicate, seed)
+    # What is asked for as well is looked at once where frames are the same.
+    seen: dict[tuple[int, frozenset[str]], Shown] = {}
+    alike = list(range(len(some)))
+
+    def looked(place: int, made: frozenset[str], look: Callable[[], Shown]) -> Shown:
+        which = alike[place], made
+        if which not in seen:
+            seen[which] = look()
+        frames.kept[place].clear()
+        return seen[which]
+
     running = [
-        observing(layout, own, None, Kept(places=False, made=made))
-        for own, (_, made) in zip(frames.of, some, strict=True)
+        observing(layout, own, None, Kept(places=False, made=made, looked=partial(looked, i, made)))
+        for i, (own, (_, made)) in enumerate(zip(frames.of, some, strict=True))
     ]
     for exposure in layout.uniform:
-        frames.take(exposure)
+        alike[:] = frames.take(exposure)
+        seen.clear()
         for one in running:
             next(one)
-    return [tell(finished(one)) for one in running]
+    return map(finished, running)
 
 
-def _alike(models: Sequence[Model]) -> bool:
-    """Return whether models have one light, and codes that frames can be kept as."""
-    first, *others = models
-    lights = (
-        own.signals.keys() == first.signals.keys()
-        and all(np.array_equal(own.signals[name], light) for name, light in first.signals.items())
-        for own in others
+def _alike(models: Sequence[Model]) -> list[list[int]]:
+    """Return places of models of one light each, and of codes that frames can be kept as."""
+    found: list[list[int]] = []
+    for place, own in enumerate(models):
+        kept = own.camera.white_level <= _LARGEST_CODE
+        same = (some for some in found if kept and _of_one_light(models[some[0]], own))
+        group = next(same, None)
+        if group is None:
+            found.append([place])
+        else:
+            group.append(place)
+    return found
+
+
+def _of_one_light(one: Model, other: Model) -> bool:
+    lights = one.signals, other.signals
+    return lights[0].keys() == lights[1].keys() and all(
+        np.array_equal(lights[0][name], own) for name, own in lights[1].items()
     )
-    return all(lights) and all(own.camera.white_level <= _LARGEST_CODE for own in models)
 
 
 class _Frames:
     """Codes of one exposure's frames, of each model; scenes are made when they are asked for."""
 
     def __init__(self, models: Sequence[Model], layout: Layout, replicate: int, seed: int) -> None:
+        cameras = [model.camera for model in models]
         self.shots = [model.shots(layout, replicate, seed) for model in models]
-        self.starts = shared_links([model.camera for model in models])
+        first = [_read_out_alike(one, cameras) for one in cameras]
+        self.links = link_numbers([camera.chain() for camera in cameras], first)
+        self.again = [
+            frozenset(number for own in self.links[place + 1 :] for number in own)
+            for place in range(len(models))
+        ]
         self.kept: list[list[NDArray[np.uint16]]] = [[] for _ in models]
         alone = [model.frames(layout, replicate, seed) for model in models]
         scenes = layout.scenes
@@ -82,47 +125,34 @@ class _Frames:
 
         self.of = [lambda name, place=place: of(place, name) for place in range(len(models))]
 
-    def take(self, exposure: Taken) -> None:
-        """Make the frames of an exposure."""
-        wanted = [
-            {links for earlier, links in self.starts if earlier == place}
-            for place in range(len(self.shots))
-        ]
+    def take(self, exposure: Taken) -> list[int]:
+        """Make the frames of an exposure; return for each model the first that has the same."""
         for number in exposure.numbers:
-            made: list[dict[int, Begun]] = []
-            for place, (shot, (earlier, links)) in enumerate(
-                zip(self.shots, self.starts, strict=True)
+            made: dict[tuple[int, int, int], tuple[int, Image]] = {}
+            for kept, shot, own, again in zip(
+                self.kept, self.shots, self.links, self.again, strict=True
             ):
-                start = made[earlier][links] if links else None
-                shared = Shared(start, wanted[place])
-                codes = shot(exposure.name, number, shared)
-                made.append(shared.found)
-                self.kept[place].append(codes.astype(np.uint16))
+                codes = shot(exposure.name, number, Shared(own, again, made))
+                kept.append(codes.astype(np.uint16))
+        return [next(i for i, own in enumerate(self.kept) if _alike_frames(own, kept))
+                for kept in self.kept]  # fmt: skip
 
 
-def shared_links(cameras: Sequence[Camera]) -> list[tuple[int, int]]:
-    """Return for each camera the earlier one that begins most alike, and with how many links.
-
-    No links: it begins like none. The last link is each camera's own.
-    """
-    chains = [camera.chain() for camera in cameras]
-    found = []
-    for place, (camera, chain) in enumerate(zip(cameras, chains, strict=True)):
-        alike = [
-            sum(
-                1
-                for _ in takewhile(lambda pair: pair[0] == pair[1], zip(chain, other, strict=False))
-            )
-            if _read_out_alike(camera, cameras[i])
-            else 0
-            for i, other in enumerate(chains[:place])
-        ]
-        most = max(alike, default=0)
-        found.append((alike.index(most) if most else 0, min(most, len(chain) - 1)))
-    return found
+def _alike_frames(one: Sequence[NDArray[np.uint16]], other: Sequence[NDArray[np.uint16]]) -> bool:
+    return one is other or all(map(np.array_equal, one, other))
 
 
-def _read_out_alike(one: Camera, other: Camera) -> bool:
-    """Return whether effects know the same of two cameras: see `ReadOut`."""
+def shared_links(one: Camera, other: Camera) -> int:
+    """Return with how many of the same links two cameras begin; the last is each camera's own."""
+    if _read_out_alike(other, [one]):
+        return 0
+    chains = one.chain(), other.chain()
+    alike = takewhile(lambda pair: pair[0] == pair[1], zip(*chains, strict=False))
+    return min(sum(1 for _ in alike), len(chains[1]) - 1)
+
+
+def _read_out_alike(camera: Camera, cameras: Sequence[Camera]) -> int:
+    """Return the first camera of which effects know the same, see `ReadOut`; none: their number."""
     known = ("cfa", "noise", "black_level", "white_level")
-    return all(getattr(one, name) == getattr(other, name) for name in known)
+    same = (all(getattr(own, name) == getattr(camera, name) for name in known) for own in cameras)
+    return next((i for i, one in enumerate(same) if one), len(cameras))

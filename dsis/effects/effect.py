@@ -233,6 +233,8 @@ class Effect(Model, ABC):
         Whether it needs the exposure time.
     draws
         Whether it draws, or redraws, anything at random; what does not is the same on every sensor.
+    looks_back
+        Whether it asks for earlier frames.
     """
 
     kind: str
@@ -244,6 +246,7 @@ class Effect(Model, ABC):
     reshapes: ClassVar[str] = ""
     grows_with_time: ClassVar[bool] = False
     draws: ClassVar[bool] = True
+    looks_back: ClassVar[bool] = False
 
     @abstractmethod
     def apply(self, image: Image, exposure: Exposure) -> Image:

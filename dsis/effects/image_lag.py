@@ -22,6 +22,7 @@ class ImageLag(Effect):
     stage: ClassVar[Stage] = Stage.CHARGE
     rank: ClassVar[int] = 20
     draws: ClassVar[bool] = False
+    looks_back: ClassVar[bool] = True
     reference: ClassVar[str] = (
         "Fossum & Hondongwa, A review of the pinned photodiode for CCD and CMOS image sensors, "
         "IEEE J. Electron Devices Society 2, 2014"

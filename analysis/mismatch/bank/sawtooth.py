@@ -134,13 +134,17 @@ def profile(samples: Sequence[Samples], period: int, parts: int) -> tuple[Array,
     normal, score = np.zeros((parts, parts)), np.zeros(parts)
     for own in samples:
         one, other = (code % period * parts // period for code in (own.one, own.other))
-        apart = np.zeros((one.size, parts))
-        np.add.at(apart, (np.arange(one.size), one), 1.0)
-        np.add.at(apart, (np.arange(one.size), other), -1.0)
-        along = own.before @ apart / own.square_dn2
-        apart -= own.before[:, np.newaxis] * along
-        normal += apart.T @ apart / own.variance_dn2
-        score += apart.T @ own.moved / sqrt(own.variance_dn2)
+        both = np.bincount(one * parts + other, minlength=parts * parts).reshape(parts, parts)
+        # Of a design of 1 where the first frame's code lies and -1 where the second one's does.
+        square = np.diag(both.sum(0) + both.sum(1)) - both - both.T
+        before, moved = (
+            np.bincount(one, what, parts) - np.bincount(other, what, parts)
+            for what in (own.before, own.moved)
+        )
+        # What goes in proportion to the change before is taken off the design.
+        along = before / own.square_dn2
+        normal += (square - np.outer(before, along)) / own.variance_dn2
+        score += (moved - float(own.before @ own.moved) * along) / sqrt(own.variance_dn2)
     inverse = np.linalg.pinv(normal, rcond=1e-6, hermitian=True)
     errors = np.sqrt(np.maximum(np.diag(inverse), 0.0))
     met = np.diag(normal) > 0

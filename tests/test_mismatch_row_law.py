@@ -13,7 +13,14 @@ from analysis.mismatch.rank import LEAST_GAIN, TOLD_APART, Ranked
 from analysis.mismatch.rowlaw import bands, beside, constant_of, fitted, pink, waves_of
 from analysis.mismatch.rowodds import RowLaw
 from analysis.mismatch.rowpower import SLOW, Powers, Size, powers_of, without_lines
-from analysis.mismatch.rowtold import AS_WELL, as_likely, as_shown, beside_undecided, unlike_frames
+from analysis.mismatch.rowtold import (
+    AS_WELL,
+    LIKELIER,
+    as_likely,
+    as_shown,
+    beside_undecided,
+    unlike_frames,
+)
 from exposing import effect
 
 SURE = 5.0  # standard errors
@@ -278,7 +285,11 @@ def test_the_likelier_of_both_comes_first_and_of_two_as_likely_neither() -> None
     assert order(-5.0) == kept
     assert order(6.0) == [("pink_noise", 40.0), ("row_noise", 35.0), ("row_banding", 34.0)]
     assert order(90.0)[-1] == ("row_banding", LEAST_GAIN)
-    assert order(1.0) == [("row_banding", 40.0), ("pink_noise", 40.0), ("row_noise", 35.0)]
+    # Odds of 9 tell them, and then they do not tie.
+    told = [("pink_noise", 40.0), ("row_banding", 40.0 - TOLD_APART), ("row_noise", 35.0)]
+    assert order(1.05 * LIKELIER) == told
+    for odds in (1.0, 0.95 * LIKELIER):
+        assert order(odds) == [("row_banding", 40.0), ("pink_noise", 40.0), ("row_noise", 35.0)]
     assert order(90.0, "pink_noise") == kept  # beside it nothing is asked
     nobody = as_shown(_state(), None, BOTH)
     assert [one.kind for one in nobody] == ["row_banding", "pink_noise"]
@@ -292,6 +303,8 @@ def test_what_another_is_as_likely_as_that_was_not_fitted_is_denied() -> None:
     assert "1/f noise" in denial.why
     assert unlike_frames(state, _frames(0.0), best, [*OTHERS, other]) is None
     assert unlike_frames(state, _frames(-4.0), best, OTHERS) is None
+    assert unlike_frames(state, _frames(-1.05 * LIKELIER), best, OTHERS) is None
+    assert unlike_frames(state, _frames(-0.95 * LIKELIER), best, OTHERS) is not None
     assert unlike_frames(_state("pink_noise"), _frames(9.0), best, OTHERS) is None
     assert unlike_frames(state, _frames(9.0), OTHERS[0], []) is None
 

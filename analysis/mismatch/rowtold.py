@@ -3,7 +3,7 @@
 from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from math import hypot, isfinite
+from math import hypot, isfinite, log
 
 from analysis.mismatch.burst import TAILS
 from analysis.mismatch.candidates import CANDIDATES
@@ -30,6 +30,9 @@ from dsis.effects.rts import Rts
 
 _OTHER = {"pink_noise": "row_banding", "row_banding": "pink_noise"}
 EITHER = frozenset(_OTHER)
+# Nats: odds of 9. Their likelihoods are exact, and of bands and 1/f noise that were told at between
+# 9 and 20 seven in a hundred were told wrong: see benchmarks/mismatch_row_odds.py.
+LIKELIER = log(9)
 AS_WELL = "whole frames may as well show"
 SINGLE_ROWS = "row_noise"
 _COMES_FIRST = "noise of single rows comes first, which is there with either of bands and 1/f noise"
@@ -40,7 +43,7 @@ def as_shown(state: State, frames: WholeFrames | None, fitted: Sequence[Ranked])
     """Return ranked effects, the best first, where maps of the gain and whole frames had their say.
 
     Frames are asked where the best is one of both and the other was fitted as well. The numbers of
-    both are much alike, and simulated: what frames say decides, at odds of 20; below that both tie.
+    both are much alike, and simulated: what frames say decides, at odds of 9; below that both tie.
     """
     fitted = as_pixels_show(frames, as_maps_show(state, fitted))
     odds = None if not fitted else _odds(state, frames, fitted[0])
@@ -51,13 +54,13 @@ def as_shown(state: State, frames: WholeFrames | None, fitted: Sequence[Ranked])
     if second is None:
         return list(fitted)
     first = best
-    if abs(odds) <= TOLD_APART:
+    if abs(odds) <= LIKELIER:
         tie = alike(state, best.polished.mean, second.polished.mean)
         second = replace(second, gain=best.gain if tie else second.gain)
     else:
         if odds < 0:
             first, second = replace(second, gain=best.gain), best
-        behind = min(second.gain, best.gain - abs(odds))
+        behind = min(second.gain, best.gain - max(abs(odds), TOLD_APART))
         second = replace(second, gain=max(behind, LEAST_GAIN))
     rest = [one for one in fitted if _of_rows(one) is None]
     return sorted([first, second, *rest], key=lambda one: -one.gain)
@@ -82,9 +85,9 @@ def unlike_frames(
     if (denial := no_field(state, best.polished.effects[0])) is not None:
         return denial
     odds = _odds(state, frames, best)
-    if odds is None or odds > TOLD_APART:
+    if odds is None or odds > LIKELIER:
         return None
-    if odds > -TOLD_APART and SINGLE_ROWS in left and _noisy_rows(state):
+    if odds > -LIKELIER and SINGLE_ROWS in left and _noisy_rows(state):
         return Denial(1 / 2, _COMES_FIRST)
     other = _OTHER[best.kind]
     return None if _any(others, other) else rival(-odds, f"{AS_WELL} {_WORDS[other]}")

@@ -5,7 +5,7 @@ the same make the same of a frame, whatever comes behind them.
 """
 
 from collections.abc import Callable, Collection, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
@@ -33,11 +33,14 @@ class Shared:
     made
         The image a link made, and its number, by the number of the link, of the image that it had,
         and of that which light alone makes; filled while the frame is made.
+    ended
+        The number of the last image, alone; -1 of one that no other camera has.
     """
 
     numbers: Sequence[int]
     again: Collection[int]
     made: dict[tuple[int, int, int], tuple[int, Image]]
+    ended: list[int] = field(default_factory=list)
 
 
 def link_numbers(chains: Sequence[Sequence[Effect]], read_outs: Sequence[int]) -> list[list[int]]:
@@ -121,6 +124,7 @@ class Shutter:
                 if common:
                     shared.made[asked] = known
             number, image = known
+        shared.ended.append(number if common else -1)
         return image
 
     def _after(self, drawn: Drawn, links: int, back: int) -> Image:

@@ -61,6 +61,20 @@ class TestLaws:
         alike = all(np.array_equal(made(one), made(other)) for other in others)
         assert (alike and not effect.reshapes) == (not effect.draws)
 
+    @pytest.mark.parametrize("cfa", [Cfa.RGGB, Cfa.MONO])
+    def test_who_asks_for_earlier_frames_says_so(self, name: str, cfa: Cfa) -> None:
+        effect, grid = example_of(KINDS[name]), PixelGrid(40, 50, cfa)
+        image = np.random.default_rng(0).uniform(0, 3000, grid.shape).astype(np.float32)
+        asked: list[int] = []
+
+        def earlier(k: int) -> np.ndarray:
+            asked.append(k)
+            return image
+
+        exposure = replace(self.exposure(grid, 4, image), earlier=earlier)
+        effect.reshape(effect.apply(image, exposure), exposure)
+        assert bool(asked) == effect.looks_back
+
     def test_a_mosaic_is_the_sampled_planes(self, name: str) -> None:
         effect = example_of(KINDS[name])
         if effect.reach_pixels():

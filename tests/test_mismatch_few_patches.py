@@ -8,7 +8,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from analysis.mismatch.fewpatches import of_few_patches
+from analysis.mismatch.fewpatches import of_few_patches, unlike_drawn
 from analysis.mismatch.wholelines import of_parts
 from dsis.cfa import Cfa
 from dsis.effects import registry
@@ -180,3 +180,14 @@ def test_columns_that_one_map_shows_whole_are_believed() -> None:
         image, noise = state.setting.seen.images["MONO", "offset alone"]
         state.setting.seen.images["MONO", "offset alone"] = (image + _trails(seed), noise)
         assert of_parts(state, "column_fpn") is None
+
+
+@pytest.mark.parametrize(
+    ("shown", "draws", "denied"), [(0.9, 0, False), (0.7, 8, False), (0.3, 64, True)]
+)
+def test_fields_are_drawn_until_it_is_clear(shown: float, draws: int, denied: bool) -> None:
+    image = np.random.default_rng(0).normal(size=(24, 32))
+    shares = iter([shown, *np.random.default_rng(1).normal(1.0, 0.05, draws)])
+    denial = unlike_drawn(image, FIELD, lambda *_: float(next(shares)), "few")
+    assert (denial is not None) is denied
+    assert next(shares, None) is None  # as many as that were asked for

@@ -11,7 +11,7 @@ from analysis.mismatch.observe import Observation
 from analysis.mismatch.simulations import _groups
 from analysis.mismatch.state import State
 from analysis.mismatch.summed import Looked, SensorSums
-from analysis.mismatch.together import most_together, shared_links, simulated_together
+from analysis.mismatch.together import _alike, most_together, shared_links, simulated_together
 from analysis.mismatch.touches import ALL_SUMS, RECORDED, SPECTRA
 from analysis.mismatch.vector import vector
 from dsis.camera import Camera
@@ -91,6 +91,18 @@ def test_of_other_light_nothing_is_shared(state: State) -> None:
     brighter = Model(model.camera, {name: 1.5 * own for name, own in model.signals.items()})
     one, two = simulated_together(layout, 5, itself, ([(model, ALL_SUMS), (brighter, ALL_SUMS)], 0))
     for seen, own in ((one, model), (two, brighter)):
+        assert seen.levels == simulated(layout, 5, (own, 0, ALL_SUMS)).levels
+
+
+def test_models_of_each_light_are_made_side_by_side(state: State) -> None:
+    layout, model = state.setting.layout, state.calibrated.model
+    brighter = Model(model.camera, {name: 1.5 * own for name, own in model.signals.items()})
+    rows = model.camera.model_copy(update={"effect": (ROWS,)})
+    wide = model.with_camera(model.camera.model_copy(update={"white_level": 2.0**20 - 1}))
+    some = [wide, model, brighter, model.with_camera(rows), wide, brighter.with_camera(rows)]
+    assert _alike(some) == [[0], [1, 3], [2, 5], [4]]
+    made = simulated_together(layout, 5, itself, ([(own, ALL_SUMS) for own in some], 0))
+    for seen, own in zip(made, some, strict=True):
         assert seen.levels == simulated(layout, 5, (own, 0, ALL_SUMS)).levels
 
 

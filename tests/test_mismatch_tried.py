@@ -55,7 +55,7 @@ def test_what_halves_gained_is_remembered_though_even_rows_were_tried_since(
     monkeypatch.setattr(rank, "CANDIDATES", candidates)
     monkeypatch.setattr(
         rank,
-        "_means",
+        "means_of",
         lambda _s, some, *_: [
             np.array([gains[getattr(one.effect, "regions", "shading")]]) for one in some
         ],
@@ -82,7 +82,7 @@ def test_beside_what_gains_much_only_what_gained_enough_is_tried_anew(
 
     monkeypatch.setattr(rank, "CANDIDATES", {kind: propose(kind) for kind in gains})
     monkeypatch.setattr(
-        rank, "_means", lambda _s, some, *_: [np.array([p.effect.sigma_dn]) for p in some]
+        rank, "means_of", lambda _s, some, *_: [np.array([p.effect.sigma_dn]) for p in some]
     )
     memory = Memory()
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.apart import as_far_apart, known_at_once
-from analysis.mismatch.candidates import Proposal
+from analysis.mismatch.candidates import CANDIDATES, Proposal
 from analysis.mismatch.credited import together
 from analysis.mismatch.memory import Memory
 from analysis.mismatch.model import side_by_side
@@ -114,18 +114,28 @@ def all_fitted(state: State, some: Sequence[Proposal], far: float) -> list[Polis
     """Return effects fitted beside the camera's, each by itself; None: it is no camera.
 
     Of a large recording, where steps are long and sure and each simulation takes long, those that
-    are `far` behind the best after a first step go no further.
+    are `far` behind the best of them after a first step go no further, nor what that did not move.
     """
     setting = state.setting
     made = side_by_side(partial(_fitted, state), [(own, None) for own in some], setting.jobs)
     if not setting.large:
         return made
-    least = max((own.loglik for own in made if own is not None), default=0.0) - far
-    near = [i for i, own in enumerate(made) if own is not None and own.loglik >= least]
-    work = [(some[i], made[i]) for i in near]
-    for i, own in zip(near, side_by_side(partial(_fitted, state), work, setting.jobs), strict=True):
-        made[i] = own
-    return made
+    sane = [
+        own.loglik
+        for own in made
+        if own is not None and CANDIDATES[own.effects[0].kind].sane(setting.layout, own.effects[0])
+    ]
+    least = max(sane, default=np.inf) - far
+    work = [
+        (start, own)
+        for start, own in zip(some, made, strict=True)
+        if own is not None and own.loglik >= least and own.effects[0] != start.effect
+    ]
+    further = iter(side_by_side(partial(_fitted, state), work, setting.jobs))
+    near = {id(start) for start, _ in work}
+    return [
+        next(further) if id(start) in near else own for start, own in zip(some, made, strict=True)
+    ]
 
 
 def _fitted(state: State, which: tuple[Proposal, Polished | None]) -> Polished | None:

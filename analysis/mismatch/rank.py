@@ -46,12 +46,16 @@ _FAR_OFF, _LITTLE = 8.0, 0.3  # departures, and the share of one that is little
 
 @dataclass(frozen=True)
 class Ranked:
-    """An effect with fitted parameters, and its gain of log-likelihood less its free parameters."""
+    """An effect with fitted parameters, and its gain of log-likelihood less its free parameters.
+
+    `told_from` is a kind that whole frames tell it from, whatever numbers say.
+    """
 
     gain: float
     kind: str
     proposal: Proposal
     polished: Polished
+    told_from: str = ""
 
     @property
     def name(self) -> str:
@@ -237,6 +241,7 @@ def _tried(
     left = {kind for kind, own in known.items() if off & {*own.calls, *own.hints}}
     best = max((memory.gained(kind, 0.0) for kind in left), default=0.0)
     found: list[tuple[float, str, Proposal, Array]] = []
+    most = -np.inf  # that any gains in this state
     while True:
         worth = WORTH_IT * best if best > STRONG else -np.inf
         chosen = sorted(kind for kind in left if memory.gained(kind, np.inf) >= worth)
@@ -249,7 +254,7 @@ def _tried(
             for proposal in CANDIDATES[kind].propose(clues)
             if possible(proposal.effect)
         ]
-        means = means_of(state, [proposal for _, proposal in proposed], memory, step, best)
+        means = means_of(state, [proposal for _, proposal in proposed], memory, step, most)
         gains: dict[tuple[str, tuple[str, ...]], float] = {}
         for (kind, proposal), mean in zip(proposed, means, strict=True):
             if mean is None:
@@ -261,7 +266,8 @@ def _tried(
                 found.append((value, kind, proposal, mean))
         for (kind, which_of), gain in gains.items():
             memory.gains.setdefault(kind, {})[which_of] = gain
-        best = max((value - before for value, *_ in found), default=0.0)
+        most = max((value - before for value, *_ in found), default=-np.inf)
+        best = max(most, 0.0)
     # Of one kind, each that changes other numbers: memory of one lag says nothing of another's.
     kept: list[tuple[float, str, Proposal, Array]] = []
     for one in sorted(found, key=lambda one: -one[0]):

@@ -60,8 +60,9 @@ def as_shown(state: State, frames: WholeFrames | None, fitted: Sequence[Ranked])
     else:
         if odds < 0:
             first, second = replace(second, gain=best.gain), best
-        behind = min(second.gain, best.gain - max(abs(odds), TOLD_APART))
+        behind = min(second.gain, best.gain - abs(odds))
         second = replace(second, gain=max(behind, LEAST_GAIN))
+        first = replace(first, told_from=second.kind)
     rest = [one for one in fitted if _of_rows(one) is None]
     return sorted([first, second, *rest], key=lambda one: -one.gain)
 

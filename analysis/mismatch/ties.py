@@ -65,7 +65,7 @@ def ties(state: State, best: Ranked, other: Ranked) -> bool:
     of codes, which are told by those that never occur. Which of many lags it is costs nothing
     beside a twin that the same lag would be.
     """
-    if best.kind == _BY_CODES:
+    if best.kind == _BY_CODES or other.kind == best.told_from:
         return False
     gains = best.gain, other.gain
     if other.kind in _TWINS.get(best.kind, ()):

@@ -1,9 +1,9 @@
 """Simulated recordings of several cameras side by side: what their chains begin with is made once.
 
-Cameras that are compared differ by an effect or a parameter, and have the same draws: up to the
-first link that is another, a frame of one is a frame of the other. So frames of one exposure are
-made camera by camera, each from where it parts from an earlier one, and then looked at; a dark, of
-which effects of the light make nothing, once for all.
+Cameras that are compared differ by an effect or a parameter, and have the same draws: the same link
+makes the same of the same image. So frames of one exposure are made camera by camera, of what
+earlier ones had in common, and then looked at: a dark, of which effects of the light make nothing,
+once for all.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -22,8 +22,8 @@ from dsis.effects import Image
 from dsis.exposing import Shared, link_numbers
 
 R = TypeVar("R")
-_MOST_BYTES = 512 << 20  # in each process, of all cameras that are looked at together
-_PIXEL_BYTES = 128  # sums over frames and exposures that a camera takes for each pixel
+_MOST_BYTES = 640 << 20  # in each process, of all cameras that are looked at together
+_PIXEL_BYTES = 192  # a pixel: sums over frames and exposures, images that links made
 _LARGEST_CODE = 65535
 Work = tuple[Sequence[tuple[Model, frozenset[str]]], int]
 """Models, what of each is made (see `observe`), and the number of the replicate."""
@@ -84,8 +84,7 @@ def _alike(models: Sequence[Model]) -> list[list[int]]:
     """Return places of models of one light each, and of codes that frames can be kept as."""
     found: list[list[int]] = []
     for place, own in enumerate(models):
-        kept = own.camera.white_level <= _LARGEST_CODE
-        same = (some for some in found if kept and _of_one_light(models[some[0]], own))
+        same = (some for some in found if _may_share(models[some[0]], own))
         group = next(same, None)
         if group is None:
             found.append([place])
@@ -94,10 +93,12 @@ def _alike(models: Sequence[Model]) -> list[list[int]]:
     return found
 
 
-def _of_one_light(one: Model, other: Model) -> bool:
+def _may_share(one: Model, other: Model) -> bool:
     lights = one.signals, other.signals
-    return lights[0].keys() == lights[1].keys() and all(
-        np.array_equal(lights[0][name], own) for name, own in lights[1].items()
+    return (
+        max(one.camera.white_level, other.camera.white_level) <= _LARGEST_CODE
+        and lights[0].keys() == lights[1].keys()
+        and all(np.array_equal(lights[0][name], own) for name, own in lights[1].items())
     )
 
 
@@ -107,8 +108,11 @@ class _Frames:
     def __init__(self, models: Sequence[Model], layout: Layout, replicate: int, seed: int) -> None:
         cameras = [model.camera for model in models]
         self.shots = [model.shots(layout, replicate, seed) for model in models]
-        first = [_read_out_alike(one, cameras) for one in cameras]
-        self.links = link_numbers([camera.chain() for camera in cameras], first)
+        read_outs = [
+            next(i for i, other in enumerate(cameras) if _read_out_alike(other, camera))
+            for camera in cameras
+        ]
+        self.links = link_numbers([camera.chain() for camera in cameras], read_outs)
         self.again = [
             frozenset(number for own in self.links[place + 1 :] for number in own)
             for place in range(len(models))
@@ -127,32 +131,28 @@ class _Frames:
 
     def take(self, exposure: Taken) -> list[int]:
         """Make the frames of an exposure; return for each model the first that has the same."""
+        ends: list[tuple[int, ...]] = [() for _ in self.shots]
         for number in exposure.numbers:
             made: dict[tuple[int, int, int], tuple[int, Image]] = {}
-            for kept, shot, own, again in zip(
-                self.kept, self.shots, self.links, self.again, strict=True
-            ):
-                codes = shot(exposure.name, number, Shared(own, again, made))
-                kept.append(codes.astype(np.uint16))
-        return [next(i for i, own in enumerate(self.kept) if _alike_frames(own, kept))
-                for kept in self.kept]  # fmt: skip
-
-
-def _alike_frames(one: Sequence[NDArray[np.uint16]], other: Sequence[NDArray[np.uint16]]) -> bool:
-    return one is other or all(map(np.array_equal, one, other))
+            for place, shot in enumerate(self.shots):
+                shared = Shared(self.links[place], self.again[place], made)
+                codes = shot(exposure.name, number, shared)
+                self.kept[place].append(codes.astype(np.uint16))
+                (end,) = shared.ended
+                ends[place] += (end if end >= 0 else -1 - place,)
+        return [ends.index(own) for own in ends]
 
 
 def shared_links(one: Camera, other: Camera) -> int:
     """Return with how many of the same links two cameras begin; the last is each camera's own."""
-    if _read_out_alike(other, [one]):
+    if not _read_out_alike(one, other):
         return 0
     chains = one.chain(), other.chain()
     alike = takewhile(lambda pair: pair[0] == pair[1], zip(*chains, strict=False))
     return min(sum(1 for _ in alike), len(chains[1]) - 1)
 
 
-def _read_out_alike(camera: Camera, cameras: Sequence[Camera]) -> int:
-    """Return the first camera of which effects know the same, see `ReadOut`; none: their number."""
+def _read_out_alike(one: Camera, other: Camera) -> bool:
+    """Return whether effects know the same of two cameras: see `ReadOut`."""
     known = ("cfa", "noise", "black_level", "white_level")
-    same = (all(getattr(own, name) == getattr(camera, name) for name in known) for own in cameras)
-    return next((i for i, one in enumerate(same) if one), len(cameras))
+    return all(getattr(one, name) == getattr(other, name) for name in known)

@@ -234,7 +234,7 @@ class Effect(Model, ABC):
     draws
         Whether it draws, or redraws, anything at random; what does not is the same on every sensor.
     looks_back
-        Whether it asks for earlier frames.
+        Whether it asks for earlier frames: cameras share what others make of the same image.
     """
 
     kind: str

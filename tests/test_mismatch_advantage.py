@@ -40,6 +40,7 @@ def _ranked(own: Any, copies: int) -> Any:
         proposal=SimpleNamespace(effect=own, best_of=1),
         polished=SimpleNamespace(mean=mean),
         mean=mean,
+        told_from="",
     )
 
 

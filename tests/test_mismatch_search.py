@@ -46,6 +46,7 @@ def _ranked(kind: str, gain: float, *changed: int) -> Any:
         name=kind,
         gain=gain,
         polished=SimpleNamespace(mean=mean, effects=(None,)),
+        told_from="",
         mean=mean,
         proposal=SimpleNamespace(effect=None, best_of=1),
     )

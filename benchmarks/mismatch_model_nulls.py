@@ -60,15 +60,20 @@ def example(kind: str) -> Effect:
     return of(**{name: f.examples[0] for name, f in of.model_fields.items() if f.examples})
 
 
+def plan(darks_s: Sequence[float], levels_dn: Sequence[float]) -> list[Shot]:
+    """Return darks of some exposure times, s, and flats of some levels, DN, of known light."""
+    shots: list[Shot] = [
+        dark(f"dark-{i}", frames=FRAMES, exposure_time_s=time) for i, time in enumerate(darks_s)
+    ]
+    return shots + [
+        flat(f"flat-{i}", level, frames=FRAMES, exposure_time_s=0.01 * (i + 1), light=level)
+        for i, level in enumerate(levels_dn)
+    ]
+
+
 def layout_and_setting(camera: Camera, seed: int, simulations: int) -> tuple[Layout, Setting]:
     """Return the layout of a small recording of a camera, and what was observed of it."""
-    shots: list[Shot] = [
-        dark(f"dark-{i}", frames=FRAMES, exposure_time_s=time) for i, time in enumerate(DARKS_S)
-    ]
-    shots += [
-        flat(f"flat-{i}", level, frames=FRAMES, exposure_time_s=0.01 * (i + 1), light=level)
-        for i, level in enumerate(LEVELS_DN)
-    ]
+    shots = plan(DARKS_S, LEVELS_DN)
     with TemporaryDirectory() as folder:
         recording = simulate(camera, shots, ROWS, COLUMNS, Path(folder) / "true", seed=seed)
         source, numbers = Source(recording), {e.name: range(FRAMES) for e in recording.exposures}

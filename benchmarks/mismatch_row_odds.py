@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))  # processes that are started afresh need it too
+from mismatch_model_nulls import FRAMES, plan
 from planter.ledger import versions, work_through
 from planter.tables import share, table
 
@@ -31,9 +32,9 @@ from dsis.cfa import Cfa
 from dsis.effects import Effect
 from dsis.effects.pink_noise import PinkNoise
 from dsis.effects.row_banding import RowBanding
-from dsis.simulate import Shot, dark, flat, simulate
+from dsis.simulate import simulate
 
-ROWS, COLUMNS, FRAMES = 96, 128, 8
+ROWS, COLUMNS = 96, 128
 LEVELS_DN, DARKS_S = (50.0, 150.0, 400.0, 1000.0, 3000.0), (0.005, 0.05)
 READ_DN = 4.0
 SIZES = {"pink_noise": (0.05, 0.13), "row_banding": (0.035, 0.09)}  # of read noise
@@ -64,13 +65,7 @@ def law_of(effect: Effect, seed: int) -> RowLaw:
         noise=BaseNoise(segment=(Segment(slope=0.5, intercept=READ_DN**2),)),
         effect=(effect,),
     )
-    shots: list[Shot] = [
-        dark(f"dark-{i}", frames=FRAMES, exposure_time_s=time) for i, time in enumerate(DARKS_S)
-    ]
-    shots += [
-        flat(f"flat-{i}", level, frames=FRAMES, exposure_time_s=0.01 * (i + 1), light=level)
-        for i, level in enumerate(LEVELS_DN)
-    ]
+    shots = plan(DARKS_S, LEVELS_DN)
     with TemporaryDirectory() as folder:
         recording = simulate(camera, shots, ROWS, COLUMNS, Path(folder) / "true", seed=seed)
         source, numbers = Source(recording), range(FRAMES)

@@ -200,11 +200,7 @@ def finished(running: Observing) -> Observation:
 
 
 def observing(
-    layout: Layout,
-    frames_of: Frames,
-    watch: Watcher | None,
-    kept: Kept,
-    threads: int = 1,
+    layout: Layout, frames_of: Frames, watch: Watcher | None, kept: Kept, threads: int = 1
 ) -> Observing:
     """Observe as `observe` does, and pause whenever an exposure of uniform light was looked at."""
     levels: dict[Place, Level] = {}

@@ -126,16 +126,15 @@ def all_fitted(state: State, some: Sequence[Proposal], far: float) -> list[Polis
         if own is not None and CANDIDATES[own.effects[0].kind].sane(setting.layout, own.effects[0])
     ]
     least = max(sane, default=np.inf) - far
-    work = [
-        (start, own)
-        for start, own in zip(some, made, strict=True)
-        if own is not None and own.loglik >= least and own.effects[0] != start.effect
+    near = [
+        i
+        for i, own in enumerate(made)
+        if own is not None and own.loglik >= least and own.effects[0] != some[i].effect
     ]
-    further = iter(side_by_side(partial(_fitted, state), work, setting.jobs))
-    near = {id(start) for start, _ in work}
-    return [
-        next(further) if id(start) in near else own for start, own in zip(some, made, strict=True)
-    ]
+    work = [(some[i], made[i]) for i in near]
+    for i, own in zip(near, side_by_side(partial(_fitted, state), work, setting.jobs), strict=True):
+        made[i] = own
+    return made
 
 
 def _fitted(state: State, which: tuple[Proposal, Polished | None]) -> Polished | None:

@@ -1,11 +1,15 @@
 """Surfaces and lines that a decay from an edge feigns: the read-out has not settled there."""
 
+from collections.abc import Iterator, Sequence
+
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import chi2
 
 from analysis.mismatch.bank.edges import decays, line_square, line_square_beside
 from analysis.mismatch.bank.seams import SMOOTH_DEGREE, Rest, beyond_smooth, centred
 from analysis.mismatch.contradicted import Denial
+from analysis.mismatch.locate import FAMILY
 from analysis.mismatch.rank import TOLD_APART
 from analysis.mismatch.state import State
 from dsis.effects import Effect
@@ -26,31 +30,56 @@ def edged(state: State, kind: str) -> Denial | None:
     The few bright lines of an edge lean and bend the whole map, and part its halves. Where a decay
     is left unexplained, and tilts, bows and halves beside decays explain not half of what they
     explain alone, there may be none; there are where they alone explain nearly all of what both do,
-    and decays from one end do not: long decays from both make a bow.
+    and decays from one end do not: long decays from both make a bow. Along an axis where only the
+    first and the last line differ there are no decays, only these lines.
     """
     if kind not in _MAPS or all(m.statistic != STATISTIC for m in state.mismatches):
         return None
     alone, beside, both, one_end = 0.0, 0.0, 0.0, 0.0
-    images = state.setting.seen.images
-    for (channel, name), (image, noise) in images.items():
-        if name not in {one if (channel, f"{one} alone") not in images else f"{one} alone"
-                        for one in _MAPS[kind]}:  # fmt: skip
-            continue
-        for axis in (0, 1):
-            means = image.mean(1 - axis) / noise * image.shape[1 - axis] ** 0.5
-            smooth, edge = _designs(means.size)
+    for axis in (0, 1):
+        of_lines = list(_means(state, kind, axis))
+        decaying = _decaying(of_lines)
+        for means, _ in of_lines:
+            smooth, ends, edge = _designs(means.size)
             level = np.ones((means.size, 1))
-            flat, edge = _left(means, level), np.hstack([level, edge])
+            flat, edge = _left(means, level), np.hstack([level, ends, *([edge] if decaying else ())])
             rest = _left(means, np.hstack([edge, smooth]))
             alone += flat - _left(means, np.hstack([level, smooth]))
             beside += _left(means, edge) - rest
             both += flat - rest
-            ends = np.split(decays(means.size).T, 2, axis=1)
-            one_end += min(_left(means, np.hstack([level, own])) for own in ends) - rest
+            sides = np.split(decays(means.size).T, 2, axis=1)
+            one_end += min(_left(means, np.hstack([level, own])) for own in sides) - rest
     bowed = alone >= _NEARLY_ALL * both and one_end >= _MOST * alone
     if alone <= 0 or beside >= _MOST * alone or bowed:
         return None
     return Denial(beside / alone, "lines that decay from an edge make most of what it explains")
+
+
+def _means(state: State, kind: str, axis: int) -> Iterator[tuple[Array, float]]:
+    """Yield means of lines of each map where a kind is seen, in the noise of its pixels.
+
+    And the mean square of what lines scatter by, in the same.
+    """
+    images = state.setting.seen.images
+    for (channel, name), (image, noise) in images.items():
+        if name in {one if (channel, f"{one} alone") not in images else f"{one} alone"
+                    for one in _MAPS[kind]}:  # fmt: skip
+            means = image.mean(1 - axis) / noise * image.shape[1 - axis] ** 0.5
+            yield means, line_square(beyond_smooth(means), 1.0, 1)
+
+
+def _decaying(of_lines: Sequence[tuple[Array, float]]) -> bool:
+    """Return whether lines beyond the first and the last show decays beside surfaces and halves.
+
+    What makes only these two differ, as charge that has a neighbour on one side only, is no decay.
+    """
+    shown = 0.0
+    for means, square in of_lines:
+        smooth, ends, edge = _designs(means.size)
+        less = np.hstack([np.ones((means.size, 1)), ends, smooth])
+        shown += (_left(means, less) - _left(means, np.hstack([less, edge]))) / square
+    freedom = 4 * len(of_lines)
+    return bool(shown > chi2.isf(FAMILY, max(freedom, 1)))
 
 
 def single(state: State, effect: Effect) -> Denial | None:
@@ -182,14 +211,11 @@ def _shown(state: State, effect: LineSettling, rest: Rest, *, seen: bool) -> flo
     return max(top / bottom, 0.0) if bottom > 0 else 0.0
 
 
-def _designs(size: int) -> tuple[Array, Array]:
-    """Return tilt, bow and halves, and what lies at the ends: (line, shape) each.
-
-    At each end are decays, and a line of its own.
-    """
+def _designs(size: int) -> tuple[Array, Array, Array]:
+    """Return tilt, bow and halves, the lines at the ends, and decays from these: (line, shape)."""
     line = np.linspace(-1, 1, size)
     smooth = np.stack([line, line**2, np.where(line < 0, -1.0, 1.0)], 1)
-    return smooth, np.vstack([decays(size), np.eye(size)[[0, -1]]]).T
+    return smooth, np.eye(size)[:, [0, -1]], decays(size).T
 
 
 def _left(values: Array, design: Array) -> float:

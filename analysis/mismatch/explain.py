@@ -70,7 +70,8 @@ def of_frames(mismatch: Mismatch, named: Iterable[str], final: State) -> tuple[s
     left = [m.z for m in final.mismatches if m.statistic == mismatch.statistic]
     if left:
         return None, left[0]
-    callers = (own for own in named if mismatch.statistic in CANDIDATES[kind_of(own)].calls)
+    kinds = [(own, CANDIDATES.get(kind_of(own))) for own in named]  # a second path has none
+    callers = (own for own, kind in kinds if kind and mismatch.statistic in kind.calls)
     return next(callers, None), nan
 
 

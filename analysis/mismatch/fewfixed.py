@@ -58,7 +58,8 @@ def _of_lines(state: State, kind: str) -> Denial | None:
         dof += lines.size - 1 - SMOOTH_DEGREE - far.sum()
     if not what or dof <= 0:
         return None
-    # Pixels that differ make lines differ by chance: what is left is judged by their scatter.
+    # Pixels that differ make lines differ by chance: what is left is judged by their scatter, which
+    # is less than the noise expected where few that are hit make most of that.
     scale = _scatter(state, name)
     left, everything = rest / scale - dof, whole / scale - dof
     if everything <= 0:
@@ -98,7 +99,7 @@ def _scatter(state: State, name: str) -> float:
         plain, _ = _without_pixels(image)
         own = plain - plain.mean(0) - plain.mean(1, keepdims=True) + plain.mean()
         squares.append(float((own**2).mean()) / noise**2)
-    return max(float(np.mean(squares)), 1.0)
+    return float(np.mean(squares))
 
 
 def _of_parity(state: State, regions: str) -> Denial | None:

@@ -7,6 +7,7 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.mismatch.bank.robust import typical_square
 from analysis.mismatch.basefit import CLIPPED_SHARE
 from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.layout import Layout
@@ -22,6 +23,7 @@ _EVEN = 1.2  # ratio of variances of thirds, up to which noise is the same all o
 _LEAST_LINES = 24
 _APART = 1.0  # of what neighbours share in the mean, by which one side has more than the other
 _SURE = 6.0  # standard errors
+_FAR_OUT = 5.0  # standard deviations of the many
 
 
 @dataclass(frozen=True)
@@ -92,6 +94,9 @@ def _alike(
         plane = rest[:, y::step, x::step]  # a view: lines, and spreads, are those of a colour
         plane -= plane.mean(1, keepdims=True)
         plane -= plane.mean(2, keepdims=True)
+        # Few that are hit, or blink, say nothing of what all neighbours share.
+        plane /= max(typical_square(plane[0].astype(np.float64)) ** 0.5, 1e-9)
+        np.clip(plane, -_FAR_OUT, _FAR_OUT, out=plane)
         plane /= max(float(np.sqrt((plane**2).mean())), 1e-9)
     squares = (rest**2).mean(0, dtype=np.float64)
     for along in (1, 2):

@@ -55,6 +55,10 @@ class FramesAsked:
             return 0.0
         return seen.spread if seen.spread > sure else -seen.jumping
 
+    def jump_rather(self) -> bool:
+        """Return whether frames tell pixels that jump, few or many, from all other noise."""
+        return self.telegraph is not None and self.telegraph.jumping > TOLD_APART
+
     def no_jumps(self, sure: float) -> bool:
         """Return whether frames are `sure` that noisy pixels do not jump, nats."""
         return self.telegraph is not None and self.telegraph.jumping < -sure

@@ -59,6 +59,16 @@ def test_pixels_of_some_rows_are_no_gains_of_rows() -> None:
     assert denial.why.startswith("few pixels")
 
 
+@pytest.mark.parametrize(("gains", "denied"), [(1.0, False), (0.0, True)])
+def test_hits_that_make_most_of_the_noise_hide_no_gains_of_rows(gains: float, denied: bool) -> None:
+    """Two pixels of a hundred were hit; the others have a third of the noise that is expected."""
+    rng = np.random.default_rng(6)
+    image = 0.3 * (_noise(7) + gains / COLUMNS**0.5 * 4 * rng.standard_normal((ROWS, 1)))
+    image[rng.random(image.shape) < 0.02] += 7.0
+    denial = of_few_that_stand_out(_state({("MONO", "gain"): image}), ROW_PRNU)
+    assert (denial is not None) == denied
+
+
 @pytest.mark.parametrize("effect", [GREENS, ODD_ROWS])
 @pytest.mark.parametrize("lines", [True, False])
 def test_few_that_stand_out_make_the_greens_differ(effect: Any, *, lines: bool) -> None:

@@ -80,7 +80,13 @@ def test_frames_show_jumps_where_they_are_likelier_than_all_else(
 
 @pytest.mark.parametrize(
     ("left", "named", "expected"),
-    [((), ("row_noise", "rts"), "rts"), ((), ("row_noise",), None), ((NAME,), ("rts",), None)],
+    [
+        ((), ("row_noise", "rts"), "rts"),
+        ((), ("dual_gain", "rts"), "rts"),  # a second read-out path is no candidate of maps
+        ((), ("dual_gain",), None),
+        ((), ("row_noise",), None),
+        ((NAME,), ("rts",), None),
+    ],
 )
 def test_what_only_frames_show_is_explained_by_what_it_calls_for(
     left: tuple[str, ...], named: tuple[str, ...], expected: str | None

@@ -110,6 +110,10 @@ def test_what_calls_for_an_effect_alone(kind: str, others: tuple[str, ...], alon
     assert alone in calls_alone(kind, others)
 
 
+def test_a_second_path_is_called_for_by_nothing_that_is_its_alone() -> None:
+    assert calls_alone("dual_gain", ("rts",)) == frozenset()
+
+
 @pytest.mark.parametrize(
     ("kind", "other", "shared"),
     [

@@ -125,3 +125,16 @@ def test_light_that_falls_to_both_ends_is_no_decay_from_them(length: float) -> N
     assert (edged(state, "shading") is not None) == denied
     state.mismatches = []
     assert edged(state, "shading") is None
+
+
+@pytest.mark.parametrize("kind", ["shading", "tap_mismatch"])
+@pytest.mark.parametrize("lines", [1, 6])
+def test_an_edge_of_one_line_denies_no_halves_and_no_fall(kind: str, lines: int) -> None:
+    """Charge of the last line has a neighbour on one side only; lines that settle are several."""
+    rng, u = np.random.default_rng(4), np.linspace(-1, 1, SHAPE[0])
+    means = np.where(u < 0, -1.0, 1.0) if kind == "tap_mismatch" else -(u**2) / 3
+    settles = np.exp(-np.arange(SHAPE[0]) / lines) if lines > 1 else np.arange(SHAPE[0]) == 0
+    several = lines > 1
+    state = _state((0.2 if several else 1.0) * means + (6.0 if several else 3.0) * settles, rng)
+    state.mismatches = [Stub(statistic="fixed_edge")]
+    assert (edged(state, kind) is not None) == several

@@ -88,3 +88,19 @@ def test_crosstalk_under_uneven_light_is_not_denied(tilt: float, seed: int) -> N
     stacks = _stacks(np.full(ROWS, 0.03), seed)
     stacks["flat"] = np.rint(BLACK + mixed + rng.normal(0, 3.0, light.shape))
     assert _found(stacks).denial("crosstalk") is None
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_hits_say_nothing_of_what_neighbours_share(seed: int) -> None:
+    """As many in all thirds of the rows, in the first of them two side by side by chance."""
+    rng, stacks = np.random.default_rng(seed), _stacks(np.full(ROWS, 0.04), seed)
+    third = ROWS // 3
+    for own in stacks.values():
+        for frame in own:
+            y, x = rng.integers(0, third, 12), rng.integers(0, COLUMNS - 1, 12)
+            frame[y, x] += 600.0
+            frame[y, x + 1] += 600.0
+            for rows in (1, 2):
+                there = rng.integers(0, third, 24) + rows * third
+                frame[there, rng.integers(0, COLUMNS, 24)] += 600.0
+    assert _found(stacks).denial("crosstalk") is None

@@ -40,10 +40,10 @@ def edged(state: State, kind: str) -> Denial | None:
         of_lines = list(_means(state, kind, axis))
         decaying = _decaying(of_lines)
         for means, _ in of_lines:
-            smooth, ends, edge = _designs(means.size)
+            smooth, ends, decay = _designs(means.size)
             level = np.ones((means.size, 1))
-            flat, edge = _left(means, level), np.hstack([level, ends, *([edge] if decaying else ())])
-            rest = _left(means, np.hstack([edge, smooth]))
+            edge = np.hstack([level, ends, *([decay] if decaying else [])])
+            flat, rest = _left(means, level), _left(means, np.hstack([edge, smooth]))
             alone += flat - _left(means, np.hstack([level, smooth]))
             beside += _left(means, edge) - rest
             both += flat - rest
@@ -75,9 +75,9 @@ def _decaying(of_lines: Sequence[tuple[Array, float]]) -> bool:
     """
     shown = 0.0
     for means, square in of_lines:
-        smooth, ends, edge = _designs(means.size)
+        smooth, ends, decay = _designs(means.size)
         less = np.hstack([np.ones((means.size, 1)), ends, smooth])
-        shown += (_left(means, less) - _left(means, np.hstack([less, edge]))) / square
+        shown += (_left(means, less) - _left(means, np.hstack([less, decay]))) / square
     freedom = 4 * len(of_lines)
     return bool(shown > chi2.isf(FAMILY, max(freedom, 1)))
 

@@ -94,9 +94,9 @@ def _alike(
         plane = rest[:, y::step, x::step]  # a view: lines, and spreads, are those of a colour
         plane -= plane.mean(1, keepdims=True)
         plane -= plane.mean(2, keepdims=True)
-        # Few that are hit, or blink, say nothing of what all neighbours share.
+        # Few that are hit once, or blink, say nothing of what all neighbours share.
         plane /= max(typical_square(plane[0].astype(np.float64)) ** 0.5, 1e-9)
-        plane[np.abs(plane) > _FAR_OUT] = 0.0
+        plane[:, (np.abs(plane) > _FAR_OUT).any(0)] = 0.0
         plane /= max(float(np.sqrt((plane**2).mean())), 1e-9)
     squares = (rest**2).mean(0, dtype=np.float64)
     for along in (1, 2):

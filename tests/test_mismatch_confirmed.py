@@ -3,7 +3,7 @@
 from collections.abc import Collection
 from dataclasses import dataclass
 from types import SimpleNamespace as Stub
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import pytest
@@ -316,27 +316,6 @@ def test_what_no_frames_show_has_a_size_beyond_its_error(
     assert why == (
         "no size of it exceeds its standard error (rms lsb 0.0058 ± 0.024)" if refused else ""
     )
-
-
-@pytest.mark.parametrize("told", [True, False])
-def test_jumps_that_frames_tell_need_no_size_by_itself(
-    told: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Many small ones have the same sums as few large ones."""
-    own = effect("rts", pixel_fraction=0.135, amplitude_dn=3.4, switch_probability=0.35)
-    errors = {"pixel_fraction": 7.4, "amplitude_dn": 8.0}
-    named: Any = Stub(
-        kind=own.kind,
-        effect=own,
-        measured=False,
-        errors=errors,
-        proposal=Stub(free=tuple(errors), effect=own, errors={}),
-    )
-    monkeypatch.setattr(confirmed, "_calls_left", lambda *_: False)
-    search, state = Stub(jumping=told), Stub(mismatches=())
-    open_ = Gained(Gain(0.5, (-0.5, 1.4)), certain=True)
-    why = confirmed.small(cast("Any", search), cast("Any", state), named, open_)
-    assert (why == "") == told
 
 
 @pytest.mark.parametrize(

@@ -111,7 +111,10 @@ def test_no_current_is_negative(below: int, denied: bool, seed: int) -> None:
     state.camera.effect = (HOT,)
     assert (jumped(state, HOT) is not None) == denied
     state.camera.effect = (HOT, Rts(pixel_fraction=1e-5, amplitude_dn=15.0))
-    assert jumped(state, HOT) is None  # which says what is below
+    assert (jumped(state, HOT) is not None) == denied  # as many above jump as do below
+    times = _state((0.05, 0.5), 0.0)
+    times.setting.seen, times.camera = state.setting.seen, state.camera
+    assert jumped(times, HOT) is None  # time tells them
 
 
 def test_a_cold_column_is_no_pixel_that_stands_out() -> None:

@@ -22,7 +22,7 @@ from analysis.mismatch.jumping import LEAST, NAME, Jumping
 from analysis.mismatch.locate import FAMILY
 from analysis.mismatch.name import Search
 from analysis.mismatch.pixelframes import chosen
-from analysis.mismatch.rank import SURE_GAIN
+from analysis.mismatch.rank import SURE_GAIN, TOLD_APART
 from dsis.effects import registry
 from mismatch_recordings import camera, recorded
 
@@ -151,7 +151,7 @@ def test_sizes_of_jumps_are_those_of_the_frames_that_are_fitted(there: str | Non
     seen = (
         None if there is None else SimpleNamespace(values={**values, "heights": there}, errors={})
     )
-    search: Any = SimpleNamespace(measuring=SimpleNamespace(telegraph=seen))
+    search: Any = SimpleNamespace(measuring=SimpleNamespace(telegraph=seen), lines=None)
     state: Any = SimpleNamespace(setting=SimpleNamespace(jumping=Jumping.of(20.0, [])))
     told = Choice._jumps(search, state, JUMPS)
     assert (told is None) is (there is None)
@@ -162,3 +162,10 @@ def test_sizes_of_jumps_are_those_of_the_frames_that_are_fitted(there: str | Non
     none: Any = SimpleNamespace(setting=SimpleNamespace(jumping=None))
     assert Choice._jumps(search, none, JUMPS) is None
     assert Choice._jumps(search, state, registry()["row_noise"](sigma_dn=1.0)) is None
+    # Of many nothing is located; frames may tell that they jump all the same.
+    layout: Any = SimpleNamespace(large=False)
+    search.lines = FramesAsked(layout, lambda _: ())
+    for odds in (2.9, 3.1):
+        search.lines.__dict__["telegraph"] = SimpleNamespace(jumping=odds)
+        rather = Choice._jumps(search, none, JUMPS)
+        assert rather == (None if there is None or odds < TOLD_APART else told)

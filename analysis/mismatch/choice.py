@@ -145,11 +145,14 @@ class Choice(Fitted):
         return min(self._least(self.base, "rts"), SURE_GAIN)
 
     def _jumps(self, state: State, effect: Effect) -> Measured | None:
-        """Return what frames say of pixels that jump, where all show them; else None.
+        """Return what frames say of pixels that jump, where all tell them; else None.
 
-        Numbers, which are sums over pixels, say less of few.
+        Numbers, which are sums over pixels, say less of few, and little of how often they jump.
         """
-        if not isinstance(effect, Rts) or state.setting.jumping is None or self.measuring is None:
+        if not isinstance(effect, Rts) or self.measuring is None:
+            return None
+        rather = self.lines is not None and self.lines.jump_rather()
+        if state.setting.jumping is None and not rather:
             return None
         seen = self.measuring.telegraph
         return None if seen is None else (seen.values, seen.errors)

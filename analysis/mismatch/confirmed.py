@@ -198,14 +198,12 @@ def small(search: Search, state: State, named: Named, told: Gained | None) -> st
 
     What draws at random is known by what frames gain, whatever its size, unless a statistic that
     calls for it is left: then something else is there, by which frames would gain as well. Where
-    locked frames leave it open, one of its sizes must exceed its error: not of jumps that frames
-    tell from all other noise, of which how many and how high are known together only.
+    locked frames leave it open, one of its sizes must exceed its error.
     """
     if named.effect is not None and named.effect.draws:
         if _calls_left(search, state, named):
             return unclear(named, at_random=True)
         plain = named.kind in LINES or named.measured or _borne_out(told)
-        plain = plain or (named.kind == "rts" and search.jumping)
         return "" if plain else vague(named)
     return "" if _borne_out(told) else unclear(named)
 

@@ -30,7 +30,8 @@ def jumped(state: State, effect: Effect) -> Denial | None:
     there may be no hot ones. Nor where frames show that pixels jump, which nothing explains, and
     hot ones leave pixels that stand out; nor where most of those that grow with time are as far
     below the others at none: these changed their state from one exposure to the next; nor where
-    half as many stand out below as above, and none is said to jump: no current is negative.
+    half as many stand out below as above: no current is negative. Of pixels that are said to jump
+    some stand out on both sides; beside them hot ones are told by time alone.
     """
     why = _why(state, effect) if isinstance(effect, HotPixels) else ""
     return Denial(0.0, why) if why else None
@@ -42,9 +43,10 @@ def _why(state: State, effect: HotPixels) -> str:
         return "frames show pixels that jump, and others than hot ones stand out"
     if turned(state):
         return "pixels that grow with exposure time stand out below at none: they jump"
-    if _both_ways(state):
-        return "pixels stand out below the others as well as above"
     times = {exposure.exposure_time_s for exposure in state.setting.layout.uniform}
+    said = any(isinstance(one, Rts) for one in state.camera.effect)
+    if not (said and len(times) > 1) and _both_ways(state):
+        return "pixels stand out below the others as well as above"
     jumping = sum(e.pixel_fraction for e in state.camera.effect if isinstance(e, Rts))
     if len(times) > 1 or jumping < effect.pixel_fraction:
         return ""
@@ -57,8 +59,6 @@ def _both_ways(state: State) -> bool:
     Beyond lines and smooth surfaces, and beyond their neighbours too: a pixel of 1000 standard
     deviations makes the means of its lines higher, and the others seem lower.
     """
-    if any(isinstance(effect, Rts) for effect in state.camera.effect):
-        return False
     maps = first_maps(state, ("time", "offset")).values()
     return _in_both(heights(parts(*own).pixels, 1.0) for own in maps) and _in_both(
         heights(_single(image), noise) for image, noise in maps

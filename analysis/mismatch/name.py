@@ -229,10 +229,5 @@ class Search(Choice):
         """Whether whole frames show pixels that jump."""
         return self.lines is not None and self.lines.jumping(self.least_odds)
 
-    @property
-    def jumping(self) -> bool:
-        """Whether whole frames tell pixels that jump from all other noise, few or many."""
-        return self.lines is not None and self.lines.jump_rather()
-
     def _judge(self, state: State) -> Judge:
         return Judge(state, lambda named: self.without(state, named), self.setting.nulls)

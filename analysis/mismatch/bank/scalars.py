@@ -189,8 +189,10 @@ def _largest(channel: Channel, frames: int) -> Number:
 
     Unknown where half of the pixels have one code in all frames: that is no such noise.
     """
+    if frames < 3:
+        return UNKNOWN
     middle = median(channel.variance_map)
-    if frames < 3 or not middle > 0:
+    if not middle > 0:
         return UNKNOWN
     dof = frames - 1
     largest = float(channel.variance_map.max()) / middle * 2 * middle_of_gamma(dof / 2)

@@ -69,6 +69,13 @@ def test_hits_that_make_most_of_the_noise_hide_no_gains_of_rows(gains: float, de
     assert (denial is not None) == denied
 
 
+def test_a_map_without_noise_denies_nothing() -> None:
+    """Codes that never change: rows differ by whole steps, and few pixels stand out."""
+    image = np.repeat(np.arange(ROWS) % 3.0, COLUMNS).reshape(ROWS, COLUMNS)
+    image[5, ::16] += 30.0
+    assert of_few_that_stand_out(_state({("MONO", "gain"): image}), ROW_PRNU) is None
+
+
 @pytest.mark.parametrize("effect", [GREENS, ODD_ROWS])
 @pytest.mark.parametrize("lines", [True, False])
 def test_few_that_stand_out_make_the_greens_differ(effect: Any, *, lines: bool) -> None:

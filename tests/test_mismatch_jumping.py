@@ -1,6 +1,7 @@
 """Pixels that jump are looked for in the frames themselves: no number of the bank need call."""
 
 import json
+from functools import partial
 from math import exp, isnan, log
 from types import SimpleNamespace
 from typing import Any, cast
@@ -22,7 +23,7 @@ from analysis.mismatch.jumping import LEAST, NAME, Jumping
 from analysis.mismatch.locate import FAMILY
 from analysis.mismatch.name import Search
 from analysis.mismatch.pixelframes import chosen
-from analysis.mismatch.rank import SURE_GAIN, TOLD_APART
+from analysis.mismatch.rank import SURE_GAIN
 from dsis.effects import registry
 from mismatch_recordings import camera, recorded
 
@@ -159,13 +160,28 @@ def test_sizes_of_jumps_are_those_of_the_frames_that_are_fitted(there: str | Non
         other = RTS(**values, heights="equal" if there == "exponential" else "exponential")
         own = measured(Proposal(other, ("pixel_fraction",)), *told)
         assert own.effect == RTS(**values, heights=there)
+    search._jump_rather = lambda _: False
     none: Any = SimpleNamespace(setting=SimpleNamespace(jumping=None))
     assert Choice._jumps(search, none, JUMPS) is None
     assert Choice._jumps(search, state, registry()["row_noise"](sigma_dn=1.0)) is None
-    # Of many nothing is located; frames may tell that they jump all the same.
+    # Of what may be many nothing is located; frames may tell that they jump all the same.
     layout: Any = SimpleNamespace(large=False)
     search.lines = FramesAsked(layout, lambda _: ())
-    for odds in (2.9, 3.1):
-        search.lines.__dict__["telegraph"] = SimpleNamespace(jumping=odds)
-        rather = Choice._jumps(search, none, JUMPS)
-        assert rather == (None if there is None or odds < TOLD_APART else told)
+    search._jump_rather = partial(Choice._jump_rather, search)
+    for odds, few, off, own in (
+        (SURE_GAIN + 0.1, True, (), ()),
+        (SURE_GAIN - 0.1, True, (), ()),
+        (SURE_GAIN + 0.1, False, (), ()),
+        (SURE_GAIN + 0.1, True, ("frame_correlation",), ()),
+        (SURE_GAIN + 0.1, True, (), (JUMPS,)),
+    ):
+        search.lines.__dict__["telegraph"] = SimpleNamespace(jumping=odds, few=few)
+        beside: Any = SimpleNamespace(
+            setting=none.setting,
+            camera=SimpleNamespace(effect=own),
+            mismatches=[SimpleNamespace(statistic=name) for name in off],
+        )
+        sure = odds > SURE_GAIN and few and not off and not own
+        assert Choice._jumps(search, beside, JUMPS) == (told if sure else None)
+    search.lines.__dict__["telegraph"] = None
+    assert not search.lines.jump_rather(0.0)

@@ -90,17 +90,50 @@ def test_crosstalk_under_uneven_light_is_not_denied(tilt: float, seed: int) -> N
     assert _found(stacks).denial("crosstalk") is None
 
 
+def _hit(stacks: dict[str, Array], seed: int, hits: int, dn: float, parts: int = 3) -> None:
+    """Add hits to each third of the rows, or only to the first ones."""
+    rng, third = np.random.default_rng(seed), ROWS // 3
+    for frame in (frame for own in stacks.values() for frame in own):
+        for part in range(parts):
+            rows = rng.integers(0, third, hits) + part * third
+            frame[rows, rng.integers(0, COLUMNS, hits)] += dn
+
+
 @pytest.mark.parametrize("seed", range(2))
-def test_hits_say_nothing_of_what_neighbours_share(seed: int) -> None:
-    """As many in all thirds of the rows, in the first of them two side by side by chance."""
-    rng, stacks = np.random.default_rng(seed), _stacks(np.full(ROWS, 0.04), seed)
-    third = ROWS // 3
-    for own in stacks.values():
-        for frame in own:
-            y, x = rng.integers(0, third, 12), rng.integers(0, COLUMNS - 1, 12)
-            frame[y, x] += 600.0
-            frame[y, x + 1] += 600.0
-            for rows in (1, 2):
-                there = rng.integers(0, third, 24) + rows * third
-                frame[there, rng.integers(0, COLUMNS, 24)] += 600.0
+@pytest.mark.parametrize(("hits", "dn"), [(8, 2000.0), (32, 600.0)])
+@pytest.mark.parametrize("parts", [1, 3])
+def test_hits_say_nothing_of_what_neighbours_share(
+    hits: int, dn: float, parts: int, seed: int
+) -> None:
+    stacks = _stacks(np.full(ROWS, 0.04), seed)
+    _hit(stacks, seed, hits, dn, parts)
     assert _found(stacks).denial("crosstalk") is None
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_hits_side_by_side_on_one_side_say_nothing_either(seed: int) -> None:
+    rng, stacks = np.random.default_rng(seed), _stacks(np.full(ROWS, 0.04), seed)
+    for frame in (frame for own in stacks.values() for frame in own):
+        y, x = rng.integers(0, ROWS // 3, 12), rng.integers(0, COLUMNS - 1, 12)
+        frame[y, x] += 600.0
+        frame[y, x + 1] += 600.0
+    assert _found(stacks).denial("crosstalk") is None
+
+
+@pytest.mark.parametrize("quiet", [False, True])
+@pytest.mark.parametrize("dn", [0.0, 600.0, 2500.0])
+def test_charge_left_behind_is_seen_beside_hits_and_a_quiet_frame(dn: float, quiet: bool) -> None:
+    stacks = _stacks(np.linspace(0.0, 0.12, ROWS), 1)
+    _hit(stacks, 1, 8, dn)
+    if quiet:
+        for own in stacks.values():
+            own[0] = np.rint(own.mean(0) + 0.3 * (own[0] - own.mean(0)))
+    found = _found(stacks)
+    assert found.denial("crosstalk") is not None
+    assert found.apart == pytest.approx(4 / 3, abs=4 * found.error + 0.15)
+
+
+def test_where_many_are_far_out_nothing_is_asked() -> None:
+    stacks = _stacks(np.full(ROWS, 0.04), 1)
+    _hit(stacks, 1, 160, 600.0)
+    assert _found(stacks) == Sided()

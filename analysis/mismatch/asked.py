@@ -55,9 +55,13 @@ class FramesAsked:
             return 0.0
         return seen.spread if seen.spread > sure else -seen.jumping
 
-    def jump_rather(self) -> bool:
-        """Return whether frames tell pixels that jump, few or many, from all other noise."""
-        return self.telegraph is not None and self.telegraph.jumping > TOLD_APART
+    def jump_rather(self, sure: float) -> bool:
+        """Return whether frames are `sure` that pixels jump rather than are noisy otherwise, nats.
+
+        And that they may be few: jumps of more are told by sums.
+        """
+        seen = self.telegraph
+        return seen is not None and seen.jumping > sure and seen.few
 
     def no_jumps(self, sure: float) -> bool:
         """Return whether frames are `sure` that noisy pixels do not jump, nats."""

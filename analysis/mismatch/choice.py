@@ -42,6 +42,7 @@ from dsis.effects.adc_dnl import AdcDnl
 from dsis.effects.rts import Rts
 
 Array = NDArray[np.float64]
+_FRAMES_ALIKE = "frame_correlation"
 _MOST_LINES = 5  # further ones stay unexplained, located
 
 
@@ -145,17 +146,24 @@ class Choice(Fitted):
         return min(self._least(self.base, "rts"), SURE_GAIN)
 
     def _jumps(self, state: State, effect: Effect) -> Measured | None:
-        """Return what frames say of pixels that jump, where all tell them; else None.
+        """Return what frames say of pixels that jump, where all show them; else None.
 
         Numbers, which are sums over pixels, say less of few, and little of how often they jump.
+        Where some of what frames share is unexplained, or the camera has such pixels already,
+        frames show them anyway.
         """
         if not isinstance(effect, Rts) or self.measuring is None:
             return None
-        rather = self.lines is not None and self.lines.jump_rather()
-        if state.setting.jumping is None and not rather:
+        if state.setting.jumping is None and not self._jump_rather(state):
             return None
         seen = self.measuring.telegraph
         return None if seen is None else (seen.values, seen.errors)
+
+    def _jump_rather(self, state: State) -> bool:
+        """Return whether all frames tell pixels that jump from all other noise, where many may."""
+        others = any(isinstance(own, Rts) for own in state.camera.effect)
+        others |= any(m.statistic == _FRAMES_ALIKE for m in state.mismatches)
+        return not others and self.lines is not None and self.lines.jump_rather(SURE_GAIN)
 
     def _least(self, state: State, kind: str) -> float:
         """Return the gain from which an effect is taken in: at odds of 20 against none.

@@ -4,9 +4,9 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.stats import f
 
-from analysis.mismatch.bank.edges import decays, line_square, line_square_beside
+from analysis.mismatch.bank.edges import LEAST_LINES, decays, line_square, line_square_beside
 from analysis.mismatch.bank.seams import SMOOTH_DEGREE, Rest, beyond_smooth, centred
 from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.locate import FAMILY
@@ -22,6 +22,7 @@ _MAPS = {"shading": ("gain",), "tap_mismatch": ("gain",), "amp_glow": ("time", "
 _MOST = 0.5  # of what the surfaces explain, that decays may feign
 _NEARLY_ALL = 0.8  # of what surfaces and decays explain together
 _SURE, _SEEN = 2.0, 3.0  # standard errors
+_OF_MEDIAN = 0.37  # efficiency of a normal variate's scale by the median of its squares
 
 
 def edged(state: State, kind: str) -> Denial | None:
@@ -30,16 +31,16 @@ def edged(state: State, kind: str) -> Denial | None:
     The few bright lines of an edge lean and bend the whole map, and part its halves. Where a decay
     is left unexplained, and tilts, bows and halves beside decays explain not half of what they
     explain alone, there may be none; there are where they alone explain nearly all of what both do,
-    and decays from one end do not: long decays from both make a bow. Along an axis where only the
-    first and the last line differ there are no decays, only these lines.
+    and decays from one end do not: long decays from both make a bow. Along an axis where all maps
+    together show no decay beyond the first and the last line only these may differ.
     """
     if kind not in _MAPS or all(m.statistic != STATISTIC for m in state.mismatches):
         return None
     alone, beside, both, one_end = 0.0, 0.0, 0.0, 0.0
     for axis in (0, 1):
-        of_lines = list(_means(state, kind, axis))
-        decaying = _decaying(of_lines)
-        for means, _ in of_lines:
+        maps = list(_means(state, kind, axis))
+        decaying = _decaying(maps)
+        for means in maps:
             smooth, ends, decay = _designs(means.size)
             level = np.ones((means.size, 1))
             edge = np.hstack([level, ends, *([decay] if decaying else [])])
@@ -50,36 +51,37 @@ def edged(state: State, kind: str) -> Denial | None:
             sides = np.split(decays(means.size).T, 2, axis=1)
             one_end += min(_left(means, np.hstack([level, own])) for own in sides) - rest
     bowed = alone >= _NEARLY_ALL * both and one_end >= _MOST * alone
-    if alone <= 0 or beside >= _MOST * alone or bowed:
+    if not alone > 0 or beside >= _MOST * alone or bowed:
         return None
     return Denial(beside / alone, "lines that decay from an edge make most of what it explains")
 
 
-def _means(state: State, kind: str, axis: int) -> Iterator[tuple[Array, float]]:
-    """Yield means of lines of each map where a kind is seen, in the noise of its pixels.
-
-    And the mean square of what lines scatter by, in the same.
-    """
+def _means(state: State, kind: str, axis: int) -> Iterator[Array]:
+    """Yield means of lines of each map where a kind is seen, in the noise of its pixels."""
     images = state.setting.seen.images
     for (channel, name), (image, noise) in images.items():
         if name in {one if (channel, f"{one} alone") not in images else f"{one} alone"
                     for one in _MAPS[kind]}:  # fmt: skip
-            means = image.mean(1 - axis) / noise * image.shape[1 - axis] ** 0.5
-            yield means, line_square(beyond_smooth(means), 1.0, 1)
+            yield image.mean(1 - axis) / noise * image.shape[1 - axis] ** 0.5
 
 
-def _decaying(of_lines: Sequence[tuple[Array, float]]) -> bool:
+def _decaying(maps: Sequence[Array]) -> bool:
     """Return whether lines beyond the first and the last show decays beside surfaces and halves.
 
     What makes only these two differ, as charge that has a neighbour on one side only, is no decay.
+    Asked are all maps together, in units of what lines scatter by, which is known by medians.
     """
-    shown = 0.0
-    for means, square in of_lines:
+    shown, freedom, spare = 0.0, 0, 0.0
+    for means in maps:
+        if means.size < LEAST_LINES:
+            continue
         smooth, ends, decay = _designs(means.size)
-        less = np.hstack([np.ones((means.size, 1)), ends, smooth])
+        less = np.hstack([np.ones((means.size, 1)), smooth, ends])
+        square = line_square(beyond_smooth(means), 1.0, 1)
         shown += (_left(means, less) - _left(means, np.hstack([less, decay]))) / square
-    freedom = 4 * len(of_lines)
-    return bool(shown > chi2.isf(FAMILY, max(freedom, 1)))
+        freedom += decay.shape[1]
+        spare += _OF_MEDIAN * (means.size - less.shape[1])
+    return freedom > 0 and bool(shown / freedom > f.isf(FAMILY, freedom, spare))
 
 
 def single(state: State, effect: Effect) -> Denial | None:

@@ -46,22 +46,23 @@ def _of_lines(state: State, kind: str) -> Denial | None:
     name, axis = _LINES[kind]
     whole = rest = dof = 0.0
     what = ""
-    for _, image, noise in _maps(state, name):
+    for _, image, _ in _maps(state, name):
         pixels, stand = _without_pixels(image)
         means = pixels.mean(axis)
         far = _far(beyond_smooth(means))
         lines = beyond_smooth(np.where(far, np.median(means), means))
         what = what or ("pixels" if stand else "lines" if far.any() else "")
-        square = noise**2 / image.shape[axis]
+        # Pixels that differ make lines differ by chance: what is left is judged by their scatter,
+        # which is less than the noise expected where few that are hit make most of that.
+        square = _scatter(pixels) / image.shape[axis]
+        if not square > 0:
+            continue
         whole += float((beyond_smooth(image.mean(axis)) ** 2).sum()) / square
         rest += float((lines[~far] ** 2).sum()) / square
         dof += lines.size - 1 - SMOOTH_DEGREE - far.sum()
     if not what or dof <= 0:
         return None
-    # Pixels that differ make lines differ by chance: what is left is judged by their scatter, which
-    # is less than the noise expected where few that are hit make most of that.
-    scale = _scatter(state, name)
-    left, everything = rest / scale - dof, whole / scale - dof
+    left, everything = rest - dof, whole - dof
     if everything <= 0:
         return None
     if left > _MOST * everything or left > _CLEAR * (2 * dof) ** 0.5:
@@ -92,14 +93,12 @@ def _without_pixels(image: Array) -> tuple[Array, bool]:
     return np.where(far, expected, image), bool(far.any())
 
 
-def _scatter(state: State, name: str) -> float:
-    """Return the mean square of single pixels of the maps, beyond their lines, over their noise."""
-    squares = []
-    for _, image, noise in _maps(state, name):
-        plain, _ = _without_pixels(image)
-        own = plain - plain.mean(0) - plain.mean(1, keepdims=True) + plain.mean()
-        squares.append(float((own**2).mean()) / noise**2)
-    return float(np.mean(squares))
+def _scatter(image: Array) -> float:
+    """Return the mean square of single pixels of a map (row, column), beyond their lines."""
+    own = image - image.mean(0) - image.mean(1, keepdims=True) + image.mean()
+    rows, columns = image.shape
+    square: float = (own**2).sum() / ((rows - 1) * (columns - 1))
+    return square
 
 
 def _of_parity(state: State, regions: str) -> Denial | None:

@@ -103,8 +103,8 @@ def calls_alone(kind: str, others: Iterable[str]) -> frozenset[str]:
     """Return the statistics that call for a kind of effect, if only as a hint, and for no other."""
     if kind not in CANDIDATES:  # a second read-out path, which variances show with others
         return frozenset()
-    own = CANDIDATES[kind]
-    beside = {call for other in others for call in CANDIDATES[other].calls}
+    own, named = CANDIDATES[kind], (CANDIDATES.get(other) for other in others)
+    beside = {call for other in named if other for call in other.calls}
     return frozenset({*own.calls, *own.hints} - beside)
 
 

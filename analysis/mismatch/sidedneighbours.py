@@ -23,7 +23,7 @@ _EVEN = 1.2  # ratio of variances of thirds, up to which noise is the same all o
 _LEAST_LINES = 24
 _APART = 1.0  # of what neighbours share in the mean, by which one side has more than the other
 _SURE = 6.0  # standard errors
-_FAR_OUT = 5.0  # standard deviations of the many
+_FAR_OUT, _FEW = 5.0, 0.1  # standard deviations of the many, and share of pixels that are few
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,8 @@ def _alike(
     """Yield by axes what neighbours share in the first third, in the mean and in the last one.
 
     The axis along which they are neighbours, and the one that is parted; last, how many samples
-    tell it. Nothing of frames (frame, row, column) of which samples are clipped.
+    tell it. Nothing of frames (frame, row, column) of which samples are clipped, or of which many
+    pixels are far out: few that are hit once, or blink, are left out.
     """
     if ((stack <= 0) | (stack >= layout.white_dn)).mean() > CLIPPED_SHARE:
         return
@@ -94,10 +95,8 @@ def _alike(
         plane = rest[:, y::step, x::step]  # a view: lines, and spreads, are those of a colour
         plane -= plane.mean(1, keepdims=True)
         plane -= plane.mean(2, keepdims=True)
-        # Few that are hit once, or blink, say nothing of what all neighbours share.
-        plane /= max(typical_square(plane[0].astype(np.float64)) ** 0.5, 1e-9)
-        plane[:, (np.abs(plane) > _FAR_OUT).any(0)] = 0.0
-        plane /= max(float(np.sqrt((plane**2).mean())), 1e-9)
+        if not _only_the_many(plane):
+            return
     squares = (rest**2).mean(0, dtype=np.float64)
     for along in (1, 2):
         size = rest.shape[along]
@@ -112,3 +111,21 @@ def _alike(
                 continue
             shares = float(lines[:third].mean()), float(lines.mean()), float(lines[-third:].mean())
             yield (along, parted), (*shares, rest[1:].size)
+
+
+def _only_the_many(plane: NDArray[np.float32]) -> bool:
+    """Make pixels that are far out once 0, and the mean square 1; return whether these are few.
+
+    Means of lines (frame, row, column) are those of the pixels that are left.
+    """
+    plane /= max(typical_square(plane.astype(np.float64)) ** 0.5, 1e-9)
+    kept = ~(np.abs(plane) > _FAR_OUT).any(0)
+    if kept.mean() < 1 - _FEW:
+        return False
+    plane *= kept
+    for axis in (1, 2):
+        count = np.expand_dims(np.maximum(kept.sum(axis - 1), 1), (0, axis))
+        plane -= plane.sum(axis, keepdims=True) / count.astype(np.float32)
+        plane *= kept
+    plane /= max(float(np.sqrt((plane**2).mean())), 1e-9)
+    return True

@@ -83,6 +83,11 @@ class Telegraph:
         return self.share_error < self.share and self.amplitude_error_dn < self.amplitude_dn
 
     @property
+    def few(self) -> bool:
+        """Whether the pixels that jump are few in the mean, so that their sizes are known."""
+        return self.share <= _MANY
+
+    @property
     def values(self) -> Mapping[str, object]:
         """Parameters of the effect."""
         return {

@@ -17,7 +17,6 @@ from dsis.grid import PixelGrid
 
 BLOCK_CODES = 64
 _TOGETHER = 4096  # samples whose codes stay in the cache
-_CELLS = 8  # of a code's width
 
 
 class AdcDnl(Effect):
@@ -82,26 +81,17 @@ def code_edges(sensor: Draw, white_code: int, rms_lsb: float) -> NDArray[np.floa
 
 
 @lru_cache(maxsize=8)
-def _reached(
-    sensor: Draw, white_code: int, rms_lsb: float
-) -> tuple[NDArray[np.float32], NDArray[np.int32], int]:
-    """Return the least single-precision values that are not below the edges, the last one infinite.
+def _reached(sensor: Draw, white_code: int, rms_lsb: float) -> tuple[NDArray[np.float32], int]:
+    """Return the least single-precision values that are not below the edges.
 
-    Then of each cell of a signal, an eighth of a code wide, a code that is not above its own; and
-    how many edges lie between that and the end of the cell at most.
+    And from how many codes on no edge is away from its place.
     """
     edges = code_edges(sensor, white_code, rms_lsb)
     nearest = edges.astype(np.float32)
     above = np.nextafter(nearest, np.float32(np.inf))
     reached = np.where(nearest < edges, above, nearest)
-    # Rounding of a signal's place moves it by less than half a cell.
-    ends = (np.arange((white_code + 1) * _CELLS + 1) - 0.5) / _CELLS - 0.5
-    last = edges.size - 2
-    before = np.clip(np.searchsorted(edges, ends, side="right") - 1, 0, last).astype(np.int32)
-    steps = int((before[2:] - before[:-2]).max()) if before.size > 2 else last
-    reached[-1] = np.inf
     reached.flags.writeable = False
-    return reached, before[:-1].copy(), steps
+    return reached, int(np.abs(edges - (np.arange(edges.size) - 0.5)).max()) + 1
 
 
 @kernel
@@ -109,22 +99,22 @@ def _convert(
     signal: NDArray[np.float32],
     black: np.float32,
     edges: NDArray[np.float32],
-    cells: NDArray[np.int32],
     steps: int,
     out: NDArray[np.float32],
 ) -> None:
-    """Write codes less black; so many edges, `steps`, lie at most behind the code of a cell."""
-    last, per_code, half = np.float32(cells.size - 1), np.float32(_CELLS), np.float32(0.5)
+    """Write codes less black; no edge is so many codes, `steps`, or more away from its place."""
+    last = np.int32(edges.size - 2)
     codes = np.empty(_TOGETHER, np.int32)
     for start in range(0, signal.size, _TOGETHER):
         line, into = signal[start : start + _TOGETHER], out[start : start + _TOGETHER]
         for i in range(line.size):
-            place = min(max((line[i] + black + half) * per_code, np.float32(0)), last)
-            codes[i] = cells[np.uintp(np.int32(place))]
-        # Step by step from there, without a branch: vector instructions.
+            nearest = np.rint(line[i] + black)
+            codes[i] = np.int32(min(max(nearest, np.float32(0)), np.float32(last)))
+        # Step by step from the nearest code, without a branch: vector instructions.
         for _ in range(steps):
             for i in range(line.size):
-                code = codes[i]
-                codes[i] = code + np.int32(line[i] + black >= edges[np.uintp(code) + np.uintp(1)])
+                v, place = line[i] + black, np.uintp(codes[i])
+                step = np.int32(v >= edges[place + np.uintp(1)]) - np.int32(v < edges[place])
+                codes[i] = min(max(codes[i] + step, np.int32(0)), last)
         for i in range(line.size):
             into[i] = np.float32(codes[i]) - black

@@ -14,7 +14,7 @@ from analysis.mismatch.bank.seams import beyond_smooth
 Array = NDArray[np.float64]
 ENDS = ("first", "last")
 REACHES = {"near": 2.5, "far": 10.0}  # pixels of the plane after which 1 / e is left
-_LEAST_LINES = 24  # fewer are a smooth surface
+LEAST_LINES = 24  # fewer are a smooth surface
 
 
 def edges(by_row: Array, by_column: Array, squares: tuple[float, float]) -> dict[str, Number]:
@@ -28,7 +28,7 @@ def edges(by_row: Array, by_column: Array, squares: tuple[float, float]) -> dict
         ("columns", by_column, squares[1], by_row.size),
     ):
         sd = sqrt(square / across)
-        clear = means.size >= _LEAST_LINES and sd > 0
+        clear = means.size >= LEAST_LINES and sd > 0
         for name, shape in _shapes(axis, means.size):
             found[name] = (float(shape.dot(means)) / sd, 1.0) if clear else UNKNOWN
     return found

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from analysis.mismatch.jumptold import as_pixels_show, unlike_pixels
+from analysis.mismatch.jumptold import as_pixels_show, standing_still, unlike_pixels
 from analysis.mismatch.phase import WholeFrames
 from analysis.mismatch.rank import Ranked
 from analysis.mismatch.telegraph import _PARTS, _SWITCHING, _told
@@ -139,6 +139,26 @@ def test_pixels_deny_nothing_beside_the_other() -> None:
     assert still is not None
     assert still.why.endswith("do not jump")
     assert unlike_pixels(there, _frames(-80.0, 80.0), spread, [], _nothing) is None
+
+
+@pytest.mark.parametrize(
+    ("kind", "off", "jumping", "denied"),
+    [
+        ("rts", ("outlying_pixels",), -1.9, True),
+        ("rts", ("outlying_pixels", "level"), -1.9, True),
+        ("rts", ("outlying_pixels",), 1.2, False),
+        ("rts", ("outlying_pixels", "variance_spread"), -1.9, False),
+        ("rts", ("outlying_pixels", "jumping_pixels"), -1.9, False),
+        ("hot_pixels", ("outlying_pixels",), -1.9, False),
+    ],
+)
+def test_what_only_maps_show_does_not_jump(
+    kind: str, off: tuple[str, ...], jumping: float, denied: bool
+) -> None:
+    (best,) = _ranked(**{kind: 9.6})
+    denial = standing_still(_frames(jumping, -1.0), best, frozenset(off))
+    assert (denial is not None) == denied
+    assert standing_still(None, best, frozenset(off)) is None
 
 
 def test_sizes_at_the_end_of_what_was_tried_are_no_larger() -> None:

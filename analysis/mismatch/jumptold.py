@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
+from analysis.mismatch.candidates import CANDIDATES
 from analysis.mismatch.contradicted import Denial, rival
 from analysis.mismatch.phase import WholeFrames
 from analysis.mismatch.rank import LEAST_GAIN, SURE_GAIN, TOLD_APART, Ranked
@@ -13,6 +14,7 @@ _OTHER = {"read_noise_spread": "rts", "rts": "read_noise_spread"}
 _HOT = "hot_pixels"  # what jumps seldom stays where it is in few frames
 _RIVALS = {**_OTHER, _HOT: "rts", "heavy_tailed_read_noise": "rts"}
 PIXELS = frozenset(_RIVALS)
+_OF_MAPS = "outlying_pixels"
 _WORDS = {"read_noise_spread": "pixels whose read noise differs", "rts": "pixels that jump"}
 
 
@@ -40,6 +42,19 @@ def as_pixels_show(frames: WholeFrames | None, fitted: Sequence[Ranked]) -> list
         if one is not top
     ]
     return sorted([replace(top, gain=first.gain), *placed], key=lambda one: -one.gain)
+
+
+def standing_still(frames: WholeFrames | None, best: Ranked, off: frozenset[str]) -> Denial | None:
+    """Return how jumps that only maps call for are denied by frames that show none; None: not.
+
+    `off` are statistics that differ. What stands out of a map and stays there is a defect or a hot
+    pixel: one that jumps between two levels makes frames differ as well.
+    """
+    if best.kind != "rts" or frames is None or frames.telegraph is None:
+        return None
+    if off.intersection(CANDIDATES[best.kind].calls) - {_OF_MAPS} or frames.telegraph.jumping > 0:
+        return None
+    return Denial(0.0, "pixels stand out of maps, and nothing is seen of any that jumps")
 
 
 def unlike_pixels(

@@ -10,7 +10,7 @@ from analysis.mismatch.candidates import CANDIDATES
 from analysis.mismatch.contradicted import Denial, rival
 from analysis.mismatch.forms import OTHER_LEVELS
 from analysis.mismatch.instance import LINES
-from analysis.mismatch.jumptold import PIXELS, as_pixels_show, unlike_pixels
+from analysis.mismatch.jumptold import PIXELS, as_pixels_show, standing_still, unlike_pixels
 from analysis.mismatch.mapped import as_maps_show
 from analysis.mismatch.named import Named
 from analysis.mismatch.nofield import no_field
@@ -82,7 +82,10 @@ def unlike_frames(
     if frames is not None and (denial := _of_frames(state, frames, best)) is not None:
         return denial
     if best.kind in PIXELS:
-        return unlike_pixels(state.camera, frames, best, others, partial(_explained, state))
+        off = frozenset(m.statistic for m in state.mismatches)
+        return standing_still(frames, best, off) or unlike_pixels(
+            state.camera, frames, best, others, partial(_explained, state)
+        )
     if (denial := no_field(state, best.polished.effects[0])) is not None:
         return denial
     odds = _odds(state, frames, best)

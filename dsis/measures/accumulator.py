@@ -150,8 +150,8 @@ class Accumulator:
 
     def _begin(self, codes: NDArray[np.float32]) -> None:
         self.first = codes.copy()
-        self.before, self.difference = np.zeros_like(codes), np.empty_like(codes)
-        self.centred, self.centred_before = np.empty_like(codes), np.empty_like(codes)
+        self.before, self.difference = np.zeros_like(codes), np.zeros_like(codes)
+        self.centred, self.centred_before = np.zeros_like(codes), np.zeros_like(codes)
 
     def _take_lines(self, found: Passed) -> None:
         """Keep the sums of lines; take their means off, and add up what is left."""

@@ -1,6 +1,8 @@
 """What draws one number a frame is shown by all frames together, where it is, and only there."""
 
 from dataclasses import replace
+from types import SimpleNamespace as Stub
+from typing import Any
 
 import pytest
 
@@ -95,6 +97,28 @@ def test_what_is_another_is_not_shown() -> None:
 def test_jumps_that_the_camera_has_already_are_not_shown_again() -> None:
     few = registry()["rts"](pixel_fraction=0.001, amplitude_dn=14.0)
     assert not shown(JUMPS, few, ("pixel_fraction", "amplitude_dn"), own=(JUMPS,))
+
+
+def test_tails_are_no_jumps() -> None:
+    tails = registry()["heavy_tailed_read_noise"](tail_df=4.0)
+    assert not shown(tails, JUMPS, ("pixel_fraction", "amplitude_dn"))
+
+
+@pytest.mark.parametrize("located", [True, False])
+@pytest.mark.parametrize("rather", [True, False])
+@pytest.mark.parametrize("known", [True, False])
+def test_jumps_are_shown_where_frames_locate_or_tell_them(
+    located: bool, rather: bool, known: bool
+) -> None:
+    """Of what may be many pixels none is located; how they move may tell them all the same."""
+    lines = Stub(jumping=lambda _: located, jump_rather=lambda _: rather)
+    search: Any = Stub(whole=Stub(), least_odds=3.0)
+    none: Any = None
+    trial: Any = Stub(lines=lines)
+    without: Any = Stub(effect=(JUMPS,) if known else ())
+    named = Named("rts", Proposal(JUMPS, ("pixel_fraction",)), {}, 10.0, ())
+    told = shown_by_all(search, none, named, without, trial)
+    assert told == ((located or rather) and not known)
 
 
 def test_of_large_recordings_locked_frames_tell_enough() -> None:

@@ -34,7 +34,8 @@ def shown_by_all(search: Search, final: State, named: Named, without: Camera, tr
         return False
     if own.effect.kind == _JUMPS:
         known = any(one.kind == _JUMPS for one in without.effect)
-        return trial.lines.jumping(search.least_odds) and not known
+        lines = trial.lines
+        return not known and (lines.jumping(search.least_odds) or lines.jump_rather(SURE_GAIN))
     if not once_a_frame(own.effect):
         return False
     alone = not any(same_place(own.effect, one, search.whole.layout) for one in without.effect)

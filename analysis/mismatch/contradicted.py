@@ -7,7 +7,7 @@ from math import exp
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.mismatch.candidates import CANDIDATES
+from analysis.mismatch.candidates import CANDIDATES, calls_of
 from analysis.mismatch.credited import joined
 from analysis.mismatch.layout import Place
 from analysis.mismatch.masked import with_path
@@ -128,7 +128,7 @@ def _of_codes(state: State, kind: str, mean: Array) -> Denial | None:
     known = state.null.known & np.isfinite(mean)
     moved = np.where(known, np.nan_to_num(mean) - state.null.mean, 0.0)
     change = (moved / state.null.sd) ** 2
-    calls = CANDIDATES[kind].calls if kind in CANDIDATES else ()
+    calls = calls_of(kind)
     own = np.array([key.statistic in calls for key in state.vector.keys])
     theirs = np.array(
         [

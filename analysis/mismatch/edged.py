@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from scipy.stats import f
 
 from analysis.mismatch.bank.edges import LEAST_LINES, decays, line_square, line_square_beside
+from analysis.mismatch.bank.robust import EFFICIENCY
 from analysis.mismatch.bank.seams import SMOOTH_DEGREE, Rest, beyond_smooth, centred
 from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.locate import FAMILY
@@ -22,7 +23,6 @@ _MAPS = {"shading": ("gain",), "tap_mismatch": ("gain",), "amp_glow": ("time", "
 _MOST = 0.5  # of what the surfaces explain, that decays may feign
 _NEARLY_ALL = 0.8  # of what surfaces and decays explain together
 _SURE, _SEEN = 2.0, 3.0  # standard errors
-_OF_MEDIAN = 0.37  # efficiency of a normal variate's scale by the median of its squares
 
 
 def edged(state: State, kind: str) -> Denial | None:
@@ -48,7 +48,7 @@ def edged(state: State, kind: str) -> Denial | None:
             alone += flat - _left(means, np.hstack([level, smooth]))
             beside += _left(means, edge) - rest
             both += flat - rest
-            sides = np.split(decays(means.size).T, 2, axis=1)
+            sides = np.split(decay, 2, axis=1)
             one_end += min(_left(means, np.hstack([level, own])) for own in sides) - rest
     bowed = alone >= _NEARLY_ALL * both and one_end >= _MOST * alone
     if not alone > 0 or beside >= _MOST * alone or bowed:
@@ -80,7 +80,7 @@ def _decaying(maps: Sequence[Array]) -> bool:
         square = line_square(beyond_smooth(means), 1.0, 1)
         shown += (_left(means, less) - _left(means, np.hstack([less, decay]))) / square
         freedom += decay.shape[1]
-        spare += _OF_MEDIAN * (means.size - less.shape[1])
+        spare += EFFICIENCY * (means.size - less.shape[1])
     return freedom > 0 and bool(shown / freedom > f.isf(FAMILY, freedom, spare))
 
 

@@ -6,7 +6,7 @@ from math import nan
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.mismatch.candidates import CANDIDATES
+from analysis.mismatch.candidates import calls_of
 from analysis.mismatch.finding import Mismatch
 from analysis.mismatch.instance import kind_of
 from analysis.mismatch.jumping import NAME as JUMPING
@@ -70,8 +70,7 @@ def of_frames(mismatch: Mismatch, named: Iterable[str], final: State) -> tuple[s
     left = [m.z for m in final.mismatches if m.statistic == mismatch.statistic]
     if left:
         return None, left[0]
-    kinds = [(own, CANDIDATES.get(kind_of(own))) for own in named]  # a second path has none
-    callers = (own for own, kind in kinds if kind and mismatch.statistic in kind.calls)
+    callers = (own for own in named if mismatch.statistic in calls_of(kind_of(own)))
     return next(callers, None), nan
 
 

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from analysis.mismatch.bank.edges import edge_shapes
 from analysis.mismatch.bank.parts import parts
 from analysis.mismatch.bank.peaks import white_level
+from analysis.mismatch.bank.robust import EFFICIENCY
 from analysis.mismatch.bank.sawtooth import PLACES, sawteeth
 from analysis.mismatch.bank.seams import SMOOTH_DEGREE, beyond_smooth, seam_shapes
 from analysis.mismatch.bank.standing import NAME as FIXED_WAVE
@@ -57,7 +58,6 @@ _ALIKE_ROWS = frozenset({"row_correlation", "slow_row_variance"})
 _SHAPED = frozenset({"half_seam", "parity", STATISTIC})
 _NEIGHBOURS = frozenset({"fixed_correlation_0_1", "fixed_correlation_1_0", "fixed_patch_variance"})
 _MOST = 0.5  # of a pattern's variance, or of tails, that something else may feign
-_OF_QUARTILES = 0.37  # efficiency of a normal variate's scale by its quartiles
 _LONGEST = 1 / 8  # of a frame's rows, over which bands are taken to last
 
 
@@ -313,7 +313,7 @@ def _of_many(state: State, name: str) -> tuple[float, float, float]:
         low, high = np.percentile(image, [25, 75])
         plain += float(image.var()) / noise**2 - 1
         most += variance_of_quartiles(float(low), float(high)) / noise**2 - 1
-        square += 2 / (_OF_QUARTILES * image.size)
+        square += 2 / (EFFICIENCY * image.size)
     return plain, most, square**0.5
 
 

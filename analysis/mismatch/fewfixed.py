@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.mismatch.bank.robust import typical_square
+from analysis.mismatch.bank.robust import FAR_OUT, FEW, typical_square
 from analysis.mismatch.bank.seams import SMOOTH_DEGREE, beyond_smooth
 from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.state import State
@@ -20,10 +20,8 @@ _LINES: Mapping[str, tuple[str, int]] = {  # the map, and the axis along which l
     "row_prnu": ("gain", 1),
     "column_prnu": ("gain", 0),
 }
-_FAR_OUT = 5.0  # standard deviations of the many
 _MOST = 0.5  # of what is explained, that few may make
 _CLEAR = 4.0  # standard deviations of a mean square
-_FEW = 0.1  # share of pixels, or lines, that are few
 
 
 def of_few_that_stand_out(state: State, effect: Effect) -> Denial | None:
@@ -80,8 +78,8 @@ def _maps(state: State, name: str) -> Iterator[tuple[str, Array, float]]:
 def _far(values: Array) -> NDArray[np.bool_]:
     """Return which of many values stand far out of the others, where they are few."""
     apart = values - np.median(values)
-    far = np.abs(apart) > _FAR_OUT * typical_square(apart) ** 0.5
-    return far if far.mean() <= _FEW else np.zeros_like(far)
+    far = np.abs(apart) > FAR_OUT * typical_square(apart) ** 0.5
+    return far if far.mean() <= FEW else np.zeros_like(far)
 
 
 def _without_pixels(image: Array) -> tuple[Array, bool]:

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.mismatch.candidates import CANDIDATES
+from analysis.mismatch.candidates import CANDIDATES, calls_of
 from analysis.mismatch.finding import Mismatch
 from analysis.mismatch.locate import FAMILY, tested
 from analysis.mismatch.predict import Predictor
@@ -103,8 +103,8 @@ def calls_alone(kind: str, others: Iterable[str]) -> frozenset[str]:
     """Return the statistics that call for a kind of effect, if only as a hint, and for no other."""
     if kind not in CANDIDATES:  # a second read-out path, which variances show with others
         return frozenset()
-    own, named = CANDIDATES[kind], (CANDIDATES.get(other) for other in others)
-    beside = {call for other in named if other for call in other.calls}
+    own = CANDIDATES[kind]
+    beside = {call for other in others for call in calls_of(other)}
     return frozenset({*own.calls, *own.hints} - beside)
 
 

@@ -7,7 +7,7 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.mismatch.bank.robust import typical_square
+from analysis.mismatch.bank.robust import FAR_OUT, FEW, typical_square
 from analysis.mismatch.basefit import CLIPPED_SHARE
 from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.layout import Layout
@@ -23,7 +23,6 @@ _EVEN = 1.2  # ratio of variances of thirds, up to which noise is the same all o
 _LEAST_LINES = 24
 _APART = 1.0  # of what neighbours share in the mean, by which one side has more than the other
 _SURE = 6.0  # standard errors
-_FAR_OUT, _FEW = 5.0, 0.1  # standard deviations of the many, and share of pixels that are few
 
 
 @dataclass(frozen=True)
@@ -119,8 +118,8 @@ def _only_the_many(plane: NDArray[np.float32]) -> bool:
     Means of lines (frame, row, column) are those of the pixels that are left.
     """
     plane /= max(typical_square(plane.astype(np.float64)) ** 0.5, 1e-9)
-    kept = ~(np.abs(plane) > _FAR_OUT).any(0)
-    if kept.mean() < 1 - _FEW:
+    kept = ~(np.abs(plane) > FAR_OUT).any(0)
+    if kept.mean() < 1 - FEW:
         return False
     plane *= kept
     for axis in (1, 2):

@@ -8,7 +8,9 @@ from dsis.measures.median import median
 
 Array = NDArray[np.float64]
 _MEDIAN = 0.455  # of chi-squared of one degree of freedom
-_FAR_OUT = 5.0  # standard deviations, beyond which values count as so far out
+FAR_OUT = 5.0  # standard deviations of the many, beyond which values are far out
+FEW = 0.1  # share of values that are few
+EFFICIENCY = 0.37  # of a normal variate's scale by its quartiles, or the median of its squares
 
 
 def typical_square(values: Array) -> float:
@@ -16,7 +18,7 @@ def typical_square(values: Array) -> float:
     return median(values**2) / _MEDIAN
 
 
-def drawn_in(values: Array, farthest: float = _FAR_OUT) -> Array:
+def drawn_in(values: Array, farthest: float = FAR_OUT) -> Array:
     """Return values about their mean; those far out count as so far out as the many ever are.
 
     So many standard deviations of the many are the `farthest`.

@@ -19,4 +19,10 @@ CANDIDATES: dict[str, Candidate] = {
     for candidate in module.CANDIDATES
 }
 
-__all__ = ["CANDIDATES", "Candidate", "Proposal", "measured"]
+
+def calls_of(kind: str) -> tuple[str, ...]:
+    """Return the statistics that call for a kind of effect; none for a second read-out path."""
+    return CANDIDATES[kind].calls if kind in CANDIDATES else ()
+
+
+__all__ = ["CANDIDATES", "Candidate", "Proposal", "calls_of", "measured"]

@@ -7,7 +7,6 @@ from math import exp, log, sqrt
 import numpy as np
 import scipy.optimize
 import scipy.special
-import scipy.stats
 from numpy.typing import NDArray
 
 from analysis.mismatch.bank.key import Key
@@ -223,7 +222,7 @@ def _grown(keys: Sequence[Key], mean: Array) -> Array:
 def _normal(keys: Sequence[Key], values: Array) -> NDArray[np.bool_]:
     """Return which numbers are scores that simulations, (recording, number), show as normal."""
     scores = np.array([key.is_peak for key in keys], bool)
-    far = scipy.stats.chi2.sf((values**2).sum(0), len(values)) < _ODD
+    far = scipy.special.chdtrc(len(values), (values**2).sum(0)) < _ODD
     return np.asarray(scores & ~far)
 
 
@@ -260,7 +259,7 @@ def _denied(ratio: Array, dof: int) -> NDArray[np.bool_]:
 
     By themselves those of next to no simulations say nothing: they are never denied.
     """
-    return np.asarray((scipy.stats.chi2.sf(ratio * dof, dof) < _ODD) & (dof >= _FEWEST))
+    return np.asarray((scipy.special.chdtrc(dof, ratio * dof) < _ODD) & (dof >= _FEWEST))
 
 
 def _unlike(own: Array, dof: int) -> tuple[float, float] | None:
@@ -277,7 +276,7 @@ def _unlike(own: Array, dof: int) -> tuple[float, float] | None:
     )
     by_chance = float(scipy.special.polygamma(1, dof / 2))
     scatter = float(logs.var(ddof=1))
-    if (len(own) - 1) * scatter / by_chance < scipy.stats.chi2.isf(_UNLIKE, len(own) - 1):
+    if (len(own) - 1) * scatter / by_chance < scipy.special.chdtri(len(own) - 1, _UNLIKE):
         return None
     if len(own) < _SEVERAL:
         return 1.0, 0.0
@@ -296,7 +295,7 @@ def _with_trigamma(value: float) -> float:
 
 def _farther(dof: float) -> float:
     """Return how far out a Student's variate lies at a small chance."""
-    return float(scipy.stats.t.isf(_RARE, dof))
+    return -float(scipy.special.stdtrit(dof, _RARE))
 
 
 def adjusted(chances: Array, weights: Array) -> Array:

@@ -15,6 +15,7 @@ from dsis.compiled import kernel
 
 Array = NDArray[np.float64]
 MOST_FRAMES = 8  # of which all sequences are summed over
+_NOTHING = -746.0  # whose exponential is 0
 
 
 def of_jumps(x: Array, noise_dn2: Array, heights_dn: Array, switching: Array) -> Array:
@@ -121,7 +122,8 @@ def _mean(terms: Any, most: float, chances: Any, sums: Any, out: Any) -> None:
     kinds, likely = chances
     sums[:] = 0.0
     for s in range(terms.size):
-        sums[kinds[s]] += exp(terms[s] - most)
+        if terms[s] - most > _NOTHING:  # to find that it is nothing takes longest
+            sums[kinds[s]] += exp(terms[s] - most)
     for p in range(out.size):
         own = 0.0
         for k in range(sums.size):
@@ -135,14 +137,17 @@ def _jumps(x: Any, noise: Any, heights: Any, chances: Any, out: Any) -> None:
     sums, squares = np.empty(1 << frames), np.empty(1 << frames)
     counts = np.empty(1 << frames, np.int64)
     classes = np.empty(chances[1].shape[1])
+    losses = np.empty((heights.size, frames + 1))  # of so many frames in the second state
+    for h in range(heights.size):
+        for k in range(frames + 1):
+            losses[h, k] = heights[h] * heights[h] * k * (frames - k) / (2 * frames)
     for i in range(pixels):
         _sums(x[i], frames, sums, squares, counts)
         for h in range(heights.size):
             a = heights[h]
             most = -1e300
             for s in range(sums.size):
-                k = counts[s]
-                squares[s] = (a * sums[s] - a * a * k * (frames - k) / (2 * frames)) / noise[i]
+                squares[s] = (a * sums[s] - losses[h, counts[s]]) / noise[i]
                 most = max(most, squares[s])
             _mean(squares, most, chances, classes, out[i, h])
 

@@ -16,6 +16,7 @@ from dsis.compiled import kernel
 Array = NDArray[np.float64]
 MOST_FRAMES = 8  # of which all sequences are summed over
 _NOTHING = -746.0  # whose exponential is 0
+_SMALL = 1e-100  # a product of two is a number still
 
 
 def of_jumps(x: Array, noise_dn2: Array, heights_dn: Array, switching: Array) -> Array:
@@ -193,6 +194,7 @@ def of_mixtures(own: Any, beside: Any, weight: Any, parts: Any, out: Any) -> Non
         Shares.
     """
     product, sums = np.empty(parts.size), np.empty(parts.size)
+    larger, likely = np.empty(parts.size), np.empty(parts.size)
     for law in range(own.shape[0]):
         product[:] = 1.0
         sums[:] = 0.0
@@ -200,12 +202,26 @@ def of_mixtures(own: Any, beside: Any, weight: Any, parts: Any, out: Any) -> Non
             other, more = beside[i], own[law, i] - beside[i]
             last = i == beside.size - 1 or weight[i + 1] != weight[i]
             for k in range(parts.size):
-                likely = other + parts[k] * more
-                if likely < 1e-100:  # a product of two is a number still
-                    sums[k] += weight[i] * log(max(likely, 1e-300))
-                else:
-                    product[k] *= likely
-                if last or product[k] < 1e-200:
-                    sums[k] += weight[i] * log(product[k])
-                    product[k] = 1.0
+                likely[k] = other + parts[k] * more
+                larger[k] = product[k] * likely[k]
+            small = last
+            for k in range(parts.size):
+                small |= (likely[k] < _SMALL) | (larger[k] < _SMALL**2)
+            if small:
+                _take_logarithms(likely, weight[i], last, product, sums)
+            else:
+                product[:] = larger
         out[law] = sums
+
+
+@kernel
+def _take_logarithms(likely: Any, weight: float, last: bool, product: Any, sums: Any) -> None:
+    """Multiply products by what is likely; add logarithms where they are small, or the last."""
+    for k in range(likely.size):
+        if likely[k] < _SMALL:
+            sums[k] += weight * log(max(likely[k], 1e-300))
+        else:
+            product[k] *= likely[k]
+        if last or product[k] < _SMALL**2:
+            sums[k] += weight * log(product[k])
+            product[k] = 1.0

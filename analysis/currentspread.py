@@ -5,7 +5,7 @@ See `currentlaw` for the law. Beside it few pixels are hot, and have a part of t
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from hashlib import blake2b
 from math import exp, hypot, inf, log, sqrt
 
@@ -116,6 +116,13 @@ class _Pixels:
         if not fit.share:
             return np.asarray(most)
         return np.asarray(most + fit.share * (self.hot(values, fit.share) - most))
+
+    @cached_property
+    def all_hot(self) -> list[Array]:
+        """The density of hot pixels at the values seen, for each share of them there may be."""
+        if self.bright <= 0:
+            return [np.zeros(0)]
+        return [self.hot(self.seen.values, share) for share in _HOT.tolist()]
 
     def hot(self, values: Array, share: float) -> Array:
         """Return the density of hot pixels, a share of all: exponential ones of what is left."""
@@ -342,7 +349,7 @@ def _loglik(pixels: Sequence[_Pixels], sigma: float, width: float = 1.0) -> _Fit
         for i, stray in enumerate(_STRAY):
             most = (1 - stray) * body + stray * own.stray
             for j, share in enumerate(shares.tolist()):
-                both = most + share * (own.hot(values, share) - most) if share else most
+                both = most + share * (own.all_hot[j] - most) if share else most
                 total[i, j] += np.log(both) @ own.seen.counts
     stray, share = np.unravel_index(int(total.argmax()), total.shape)
     return _Fit(sigma, float(total.max()), int(stray), float(shares[share]))

@@ -7,6 +7,8 @@ from numpy.typing import NDArray
 from analysis.mismatch import find_mismatch
 from mismatch_recordings import InMemory, camera, recorded
 
+pytestmark = pytest.mark.usefixtures("unproven")
+
 Array = NDArray[np.float64]
 LEVELS = (100.0, 400.0, 1200.0, 2600.0)
 SIGNALS = {"dark-0": 0.0, "dark-1": 0.0} | {f"flat-{i}": own for i, own in enumerate(LEVELS)}

@@ -7,6 +7,8 @@ from scipy.ndimage import convolve
 from analysis.mismatch import find_mismatch
 from mismatch_recordings import InMemory, camera, recorded
 
+pytestmark = pytest.mark.usefixtures("unproven")
+
 SHARE, FRAMES, ROWS, COLUMNS = 0.028, 8, 80, 96
 LEVELS = (250.0, 900.0, 2600.0)
 

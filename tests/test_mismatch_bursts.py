@@ -16,6 +16,8 @@ from dsis.cfa import Cfa
 from dsis.effects import registry
 from mismatch_recordings import FEW_LEVELS, InMemory, camera, recorded, state_of
 
+pytestmark = pytest.mark.usefixtures("unproven")
+
 ROWS, COLUMNS, FRAMES = 64, 80, 12
 SURE = 5.0  # standard errors
 Array = NDArray[np.float64]

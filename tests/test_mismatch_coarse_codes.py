@@ -7,6 +7,8 @@ from analysis.mismatch import find_mismatch
 from dsis.effects import registry
 from mismatch_recordings import camera, recorded
 
+pytestmark = pytest.mark.usefixtures("unproven")
+
 STEP, INTERCEPT = 8.0, 10.0  # DN and DN^2
 LEVELS = (300.0, 900.0, 2600.0)
 TAILS = frozenset({"heavy_tailed_read_noise", "read_noise_spread", "impulse"})

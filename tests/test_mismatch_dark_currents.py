@@ -19,6 +19,8 @@ from dsis.effects.dark_current import DarkCurrent
 from dsis.effects.hot_pixels import HotPixels
 from mismatch_recordings import InMemory, camera, recorded
 
+pytestmark = pytest.mark.usefixtures("unproven")
+
 ROWS, COLUMNS, FRAMES = 96, 128, 8
 TIMES_S = {"dark-0": 0.005, "dark-1": 0.05}
 SLOPE, INTERCEPT, BLACK = 0.5, 20.0, 64.0

@@ -33,6 +33,8 @@ from dsis.simulate.maps import SensorMaps, with_maps
 from exposing import apply, effect
 from mismatch_recordings import TWO_LEVELS, camera, recorded
 
+pytestmark = pytest.mark.usefixtures("unproven")
+
 NAMED = Finding(
     "omitted_physics",
     (),

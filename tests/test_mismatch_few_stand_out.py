@@ -12,6 +12,8 @@ from analysis.mismatch.fewfixed import of_few_that_stand_out
 from dsis.effects import registry
 from mismatch_recordings import FEW_LEVELS, camera, recorded
 
+pytestmark = pytest.mark.usefixtures("unproven")
+
 Array = NDArray[np.float64]
 ROWS, COLUMNS = 48, 64
 COLUMN_FPN = registry()["column_fpn"](sigma_dn=1.0)

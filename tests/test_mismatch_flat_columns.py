@@ -18,6 +18,8 @@ from dsis.effects.pink_noise import PinkNoise
 from dsis.measures import Accumulator
 from mismatch_recordings import camera, recorded
 
+pytestmark = pytest.mark.usefixtures("unproven")
+
 ROWS, COLUMNS, FRAMES, EXPOSURES = 96, 128, 8, 4
 EFFECTS = registry()
 

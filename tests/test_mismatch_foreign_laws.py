@@ -4,12 +4,15 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 
 from analysis.mismatch import find_mismatch
 from dsis.camera import Camera
 from dsis.effects import registry
 from mismatch_recordings import FEW_LEVELS, LEVELS, InMemory, camera, recorded
+
+pytestmark = pytest.mark.usefixtures("unproven")
 
 Array = NDArray[np.float64]
 

@@ -7,6 +7,8 @@ from numpy.typing import NDArray
 from analysis.mismatch import find_mismatch
 from mismatch_recordings import FEW_LEVELS, InMemory, camera, recorded
 
+pytestmark = pytest.mark.usefixtures("unproven")
+
 BASE = camera()
 KEPT = 0.085
 Array = NDArray[np.float64]

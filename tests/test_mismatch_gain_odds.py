@@ -28,6 +28,8 @@ from dsis.effects import Effect
 from exposing import effect
 from mismatch_recordings import FEW_LEVELS, InMemory, camera, recorded
 
+pytestmark = pytest.mark.usefixtures("unproven")
+
 SHAPE = (96, 128)
 ODDS = log(20)  # which chance has in one of 20 at most (Markov's inequality)
 Y, X = np.mgrid[-1 : 1 : SHAPE[0] * 1j, -1 : 1 : SHAPE[1] * 1j]

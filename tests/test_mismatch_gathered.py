@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from analysis.mismatch import find_mismatch
 from mismatch_recordings import InMemory, camera, recorded
 
+pytestmark = pytest.mark.usefixtures("unproven")
+
 Array = NDArray[np.float64]
 BLACK, SLOPE, INTERCEPT = 64.0, 0.5, 40.0  # DN, DN, DN^2
 LEVELS = (250.0, 900.0)

@@ -11,6 +11,8 @@ from analysis.mismatch.candidates import CANDIDATES
 from dsis.effects import registry
 from mismatch_recordings import TWO_LEVELS, camera, recorded
 
+pytestmark = pytest.mark.usefixtures("unproven")
+
 TIME_S, NOISE_DN = 0.5, 0.3
 GLOW = CANDIDATES["amp_glow"]
 CORNERS = {"top_left": (0, 0), "bottom_right": (63, 95), "top": (0, None), "right": (None, 95)}

@@ -6,6 +6,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
 
+import pytest
 from planter import Choice, draw_case, plant
 from planter.case import Effect as Planted
 
@@ -13,6 +14,8 @@ from analysis.mismatch import Finding, find_mismatch
 from analysis.mismatch.diagnose import VOCABULARY
 from dsis.camera import read_camera
 from dsis.recording import read_recording
+
+pytestmark = pytest.mark.usefixtures("unproven")
 
 WORDS = frozenset({"channel_imbalance", "tap_mismatch", "shading", "row_fpn", "row_prnu"})
 

@@ -5,12 +5,15 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
 
+import pytest
 from planter import Choice, draw_case, plant
 from planter.case import Effect as Planted
 
 from analysis.mismatch import find_mismatch
 from dsis.camera import read_camera
 from dsis.recording import read_recording
+
+pytestmark = pytest.mark.usefixtures("unproven")
 
 WORDS = frozenset({"hot_pixels", "dsnu", "dark_current", "rts", "amp_glow", "impulse", "prnu"})
 

@@ -27,6 +27,8 @@ from analysis.mismatch.rank import SURE_GAIN
 from dsis.effects import registry
 from mismatch_recordings import camera, recorded
 
+pytestmark = pytest.mark.usefixtures("unproven")
+
 RTS: Any = registry()["rts"]
 JUMPS = RTS(pixel_fraction=0.003, amplitude_dn=5.0)
 

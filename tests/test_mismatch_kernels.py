@@ -11,6 +11,8 @@ from dsis.camera import Camera
 from exposing import effect
 from mismatch_recordings import FEW_LEVELS, InMemory, camera, recorded, state_of
 
+pytestmark = pytest.mark.usefixtures("unproven")
+
 
 def _proposed(one: Mapping[str, Any], cfa: str = "MONO") -> list[dict[str, Any]]:
     """Return what is proposed for a recording of a camera that smooths."""

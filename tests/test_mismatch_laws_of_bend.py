@@ -11,6 +11,8 @@ from analysis.mismatch.candidates import CANDIDATES
 from dsis.effects.nonlinearity import Nonlinearity
 from mismatch_recordings import InMemory, camera, recorded, responding, state_of
 
+pytestmark = pytest.mark.usefixtures("unproven")
+
 Array = NDArray[np.float64]
 LEVELS = (150.0, 600.0, 1200.0, 1900.0, 2600.0, 3300.0)
 SLOPE, READ, BLACK, WHITE = 0.5, 6.0, 64.0, 4095.0

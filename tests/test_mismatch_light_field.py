@@ -17,6 +17,8 @@ from dsis.cfa import Cfa
 from dsis.effects.shading import Shading
 from mismatch_recordings import InMemory, camera, recorded, state_of_all
 
+pytestmark = pytest.mark.usefixtures("unproven")
+
 ROWS, COLUMNS, FRAMES, LEVELS = 64, 96, 8, (400.0, 1200.0, 2800.0)
 SLOPE, INTERCEPT, BLACK = 0.25, 10.0, 64.0
 ROW_NOISE = 0.9  # DN

@@ -13,6 +13,8 @@ from analysis.mismatch.candidates.linestart import lines_begin_darker
 from dsis.effects import registry
 from mismatch_recordings import FEW_LEVELS, InMemory, camera, recorded
 
+pytestmark = pytest.mark.usefixtures("unproven")
+
 BLACK, SLOPE, READ = 64.0, 0.5, 20.0
 STEP = {"MONO": 1, "RGGB": 2}
 

@@ -20,6 +20,8 @@ from dsis.effects.nonlinearity import Nonlinearity
 from dsis.effects.quantisation import Quantisation
 from mismatch_recordings import camera, recorded, state_of_all
 
+pytestmark = pytest.mark.usefixtures("unproven")
+
 BLACK, WHITE = 8.4, 4095.0
 DARK, FLAT = ("dark-0", "MONO"), ("flat-0", "MONO")
 SPREAD = Dsnu(sigma_dn=0.1)

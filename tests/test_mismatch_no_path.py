@@ -12,6 +12,8 @@ from analysis.mismatch.bank.key import Key
 from analysis.mismatch.nopath import no_path
 from mismatch_recordings import camera, responding
 
+pytestmark = pytest.mark.usefixtures("unproven")
+
 Array = NDArray[np.float64]
 LEVELS = (400.0, 1000.0, 1600.0, 2200.0, 2800.0, 3200.0, 3700.0)
 FULL = 2900.0

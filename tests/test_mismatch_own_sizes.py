@@ -8,6 +8,8 @@ from dsis.camera import Camera
 from dsis.effects import Effect, registry
 from mismatch_recordings import FEW_LEVELS, LEVELS, camera, recorded
 
+pytestmark = pytest.mark.usefixtures("unproven")
+
 SURE = 3.0  # standard errors
 
 

@@ -12,6 +12,8 @@ from dsis.camera import Camera
 from dsis.effects import registry
 from mismatch_recordings import FEW_LEVELS, camera, recorded, state_of
 
+pytestmark = pytest.mark.usefixtures("unproven")
+
 Array = NDArray[np.float64]
 FRAMES = 9
 AT = (0.125, 0.5)

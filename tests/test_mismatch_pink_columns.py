@@ -10,6 +10,8 @@ from analysis.mismatch import find_mismatch
 from dsis.cfa import Cfa
 from mismatch_recordings import TWO_LEVELS, camera, recorded
 
+pytestmark = pytest.mark.usefixtures("unproven")
+
 ROWS, COLUMNS = 48, 64
 VOCABULARY = frozenset({"pink_noise", "column_noise", "row_noise", "black_level_drift"})
 Moves = Callable[[np.random.Generator, int], NDArray[np.float64]]

@@ -28,6 +28,8 @@ from exposing import apply, effect, flat
 from mismatch_recordings import FEW_LEVELS, camera
 from mismatch_rows import diagnosed
 
+pytestmark = pytest.mark.usefixtures("unproven")
+
 SURE = 5.0  # standard errors
 ROWS, COLUMNS, FRAMES = 64, 48, 40
 

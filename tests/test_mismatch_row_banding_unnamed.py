@@ -6,6 +6,8 @@ from exposing import effect
 from mismatch_recordings import camera
 from mismatch_rows import diagnosed
 
+pytestmark = pytest.mark.usefixtures("unproven")
+
 ROWS = frozenset({"row_banding", "row_noise", "pink_noise", "black_level_drift"})
 """What moves whole rows: where none of it is there, other words only take time."""
 

@@ -7,6 +7,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 from planter import Case, Choice, draw_case, plant
 from planter.chain import frame_codes
@@ -17,6 +18,8 @@ from dsis.camera import read_camera
 from dsis.effects.bistable_pattern import BistablePattern
 from dsis.effects.periodic_noise import PeriodicNoise
 from dsis.recording import read_recording
+
+pytestmark = pytest.mark.usefixtures("unproven")
 
 KINDS = ("periodic_noise", "bistable_pattern")
 LIKE_LINES = ("readout_memory", "crosstalk", "spatial_filtering", "row_noise", "pink_noise")

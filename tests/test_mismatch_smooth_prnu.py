@@ -27,6 +27,8 @@ from dsis.grid import PixelGrid
 from exposing import effect
 from mismatch_recordings import TWO_LEVELS, camera, recorded
 
+pytestmark = pytest.mark.usefixtures("unproven")
+
 SURE = 5.0  # standard errors
 WORDS = frozenset(
     {"smooth_prnu", "prnu", "shading", "tap_mismatch", "crosstalk", "spatial_filtering",

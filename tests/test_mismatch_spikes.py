@@ -19,6 +19,8 @@ from dsis.effects import Effect, registry
 from dsis.measures import Accumulator, Estimate
 from mismatch_recordings import FEW_LEVELS, camera, recorded, state_of
 
+pytestmark = pytest.mark.usefixtures("unproven")
+
 ROWS, COLUMNS, FRAMES = 32, 48, 8
 SIGMA = 3.0
 PLACES = {"MONO": (0, 0, 1)}

@@ -21,6 +21,8 @@ from dsis.measures import Middle
 from mismatch_recordings import camera
 from test_mismatch_absent_codes import BASE, BLACK, INTERCEPT, coded, companded, multiplied
 
+pytestmark = pytest.mark.usefixtures("unproven")
+
 Array = NDArray[np.float64]
 
 

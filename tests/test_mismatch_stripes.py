@@ -8,6 +8,8 @@ from dsis.camera import Camera
 from dsis.effects import registry
 from mismatch_recordings import FEW_LEVELS, camera, recorded, state_of
 
+pytestmark = pytest.mark.usefixtures("unproven")
+
 
 def _striped(frequency: tuple[float, float], amplitude_dn: float = 0.13) -> Camera:
     return camera(registry()["bistable_pattern"](amplitude_dn=amplitude_dn, frequency=frequency))

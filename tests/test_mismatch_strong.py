@@ -1,9 +1,13 @@
 """What is strong is fitted until nothing of it is left: a remainder is no further physics."""
 
+import pytest
+
 from analysis.mismatch import Finding, find_mismatch
 from dsis.effects import Effect
 from exposing import effect
 from mismatch_recordings import FEW_LEVELS, LEVELS, camera, recorded
+
+pytestmark = pytest.mark.usefixtures("unproven")
 
 PERCENT = -2.0  # of full scale: levels depart by more than a thousand standard errors
 WORDS = frozenset(

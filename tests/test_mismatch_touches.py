@@ -10,6 +10,8 @@ from dsis.effects.line_fpn import ColumnFpn, RowFpn
 from dsis.effects.shading import Shading
 from mismatch_recordings import FEW_LEVELS, camera, recorded
 
+pytestmark = pytest.mark.usefixtures("unproven")
+
 NAMES = ("fixed_row_variance", "fixed_edge", "half_seam", "fixed_smooth_tilt", "parity")
 KEYS = tuple(Key(name, "offset", "", "MONO", "rows") for name in NAMES)
 

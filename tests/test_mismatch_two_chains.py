@@ -12,6 +12,8 @@ from dsis.cfa import Cfa
 from dsis.measures import Accumulator
 from mismatch_recordings import FEW_LEVELS, camera, recorded
 
+pytestmark = pytest.mark.usefixtures("unproven")
+
 ROWS, COLUMNS, FRAMES, SD = 64, 80, 8, 5.0
 SURE = 5.0  # standard errors
 Array = NDArray[np.float64]

@@ -16,6 +16,8 @@ from analysis.mismatch.uneven import _Map, _ratio, uneven
 from dsis.effects import registry
 from mismatch_recordings import FEW_LEVELS, camera, recorded
 
+pytestmark = pytest.mark.usefixtures("unproven")
+
 TIME_S, NOISE_DN = 0.5, 0.3
 RATE = 4.0  # DN / s
 DARK_CURRENT = registry()["dark_current"](dn_per_s=RATE)

@@ -16,6 +16,8 @@ from dsis.effects import registry
 from dsis.recording import read_recording
 from mismatch_recordings import FEW_LEVELS, TWO_LEVELS, camera, recorded
 
+pytestmark = pytest.mark.usefixtures("unproven")
+
 FALL, DOWN, RIGHT, BOW = 2.8, -2.1, 1.4, 2.1
 NUMBERS = (
     "falloff_percent",

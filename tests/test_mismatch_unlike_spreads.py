@@ -9,6 +9,8 @@ from analysis.mismatch.null import _by_name, _unlike
 from dsis.effects import registry
 from mismatch_recordings import FEW_LEVELS, camera, recorded, state_of
 
+pytestmark = pytest.mark.usefixtures("unproven")
+
 DOF = 15
 
 

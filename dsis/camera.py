@@ -7,7 +7,7 @@ between them.
 
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self
@@ -268,7 +268,7 @@ class _Reshaped(Draw):
         draw = exposure.temporal
         if not laws:
             return draw
-        return cls(draw.seed, draw.scope, laws, replace(exposure, expected_dn=expected))
+        return cls(draw.seed, draw.scope, laws, exposure._replace(expected_dn=expected))
 
     def normal_rows(
         self, purpose: str, grid: PixelGrid, frame: int, first: int, last: int
@@ -279,7 +279,7 @@ class _Reshaped(Draw):
         if whole is None:
             return deviates
         expected = whole.expected_dn[first:last]
-        block = replace(whole, grid=grid.block(first, last), expected_dn=expected)
+        block = whole._replace(grid=grid.block(first, last), expected_dn=expected)
         for law in self.laws:
             deviates = law.reshape(deviates, block)
         return deviates

@@ -3,7 +3,6 @@
 The test walks the registry: a new file in `dsis/effects` is tested the moment it exists.
 """
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -51,7 +50,7 @@ class TestLaws:
         grid = PixelGrid(40, 50, Cfa.RGGB)
         image = np.random.default_rng(0).uniform(0, 3000, grid.shape).astype(np.float32)
         one = self.exposure(grid, 4, image)
-        others = [replace(one, frame=i, temporal=Draw(i), sensor=Draw(2 * i)) for i in range(5, 15)]
+        others = [one._replace(frame=i, temporal=Draw(i), sensor=Draw(2 * i)) for i in range(5, 15)]
         deviates = np.random.default_rng(1).normal(size=grid.shape).astype(np.float32)
 
         def made(exposure: Exposure) -> np.ndarray:
@@ -71,7 +70,7 @@ class TestLaws:
             asked.append(k)
             return image
 
-        exposure = replace(self.exposure(grid, 4, image), earlier=earlier)
+        exposure = self.exposure(grid, 4, image)._replace(earlier=earlier)
         effect.reshape(effect.apply(image, exposure), exposure)
         assert bool(asked) == effect.looks_back
 

@@ -309,7 +309,8 @@ def _piece(
     """
     if x.size == 0:
         return Piece(low, slope or 0.0, held or 0.0, np.inf, np.inf)
-    free = np.unique(np.round(x / max(np.abs(x).max(), 1e-12), 3)).size > 1
+    rounded = np.round(x / max(np.abs(x).max(), 1e-12), 3)
+    free = bool((rounded != rounded[0]).any())
     if not free and slope is None:
         slope = 0.0
     # Weights need a variance: start from the observed, go on with the fitted.

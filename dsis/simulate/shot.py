@@ -53,9 +53,11 @@ def dark(name: str, *, frames: int, exposure_time_s: float) -> Shot:
 
 def tiled(levels: NDArray[np.generic], grid: PixelGrid) -> Image:
     """Return levels of shape (), (1, 1) or (2, 2) repeated over the pixels of a sensor."""
-    sites = np.broadcast_to(levels, (2, 2)).astype(np.float32)
-    if (sites == sites[0, 0]).all():
-        return np.full((grid.rows, grid.columns), sites[0, 0])
+    sites = np.asarray(levels, np.float32)
+    first = sites.flat[0]
+    if (sites == first).all():
+        return np.full((grid.rows, grid.columns), first)
+    sites = np.broadcast_to(sites, (2, 2))
     light = np.empty((grid.rows, grid.columns), np.float32)
     for y in (0, 1):
         for x in (0, 1):

@@ -68,8 +68,12 @@ def centred(values: Array) -> Array:
 
 def beyond_smooth(values: Array) -> Array:
     """Return means of lines (line, ...) less the smooth polynomials that fit them best."""
-    size = len(values)
-    smooth = np.polynomial.legendre.legvander(
-        np.linspace(-1, 1, size), min(SMOOTH_DEGREE, size - 3)
-    )
+    smooth = _polynomials(len(values))
     return np.asarray(values - smooth @ np.linalg.lstsq(smooth, values, rcond=None)[0])
+
+
+@lru_cache(maxsize=64)
+def _polynomials(size: int) -> Array:
+    """Return the smooth polynomials along so many lines: (line, degree)."""
+    along = np.linspace(-1, 1, size)
+    return np.asarray(np.polynomial.legendre.legvander(along, min(SMOOTH_DEGREE, size - 3)))

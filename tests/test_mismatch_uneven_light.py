@@ -1,6 +1,7 @@
 """Light that is uneven: a fall to the corners, tilts, bows; no amplifier, no glow."""
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
@@ -71,7 +72,9 @@ def test_the_fall_of_a_lens_is_a_fall_and_no_bow(tmp_path: Path) -> None:
     """
     choice = Choice(cfa="MONO", segments=1, light=True, times="darks")
     planted = Planted("shading", {"falloff_percent": 20.0, "law": "cos4"})
-    plant(tmp_path, draw_case(5, "small", choice).having(planted))
+    case = draw_case(5, "small", choice)
+    few = tuple(one for one in case.exposures if one.name not in {"flat-1", "flat-3"})
+    plant(tmp_path, replace(case, exposures=few).having(planted))
     found = find_mismatch(
         read_camera(tmp_path / "camera.toml"),
         read_recording(tmp_path),
@@ -102,7 +105,7 @@ def test_a_fall_is_told_beside_a_decay_that_the_camera_has() -> None:
     edge = registry()["line_settling"](gain_percent=3.0, length_pixels=6.0, edge="left")
     known = camera(edge)
     true = camera(edge, _shading(falloff_percent=1.5))  # type: ignore[arg-type] # an effect of the registry
-    recording = recorded(true, 5, levels=TWO_LEVELS)
+    recording = recorded(true, 5, rows=64, columns=96, levels=TWO_LEVELS)
     found = find_mismatch(known, recording, seed=2, vocabulary=frozenset({"shading"}))
     (named,) = found.omitted_physics
     fall = named.parameters["falloff_percent"]

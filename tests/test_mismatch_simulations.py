@@ -3,6 +3,8 @@
 import os
 import threading
 import time
+from collections.abc import Iterator
+from contextlib import nullcontext
 from functools import partial
 from types import SimpleNamespace
 from typing import Any
@@ -11,9 +13,11 @@ import numpy as np
 import pytest
 
 import analysis.mismatch.simulations as module
+from analysis.mismatch import model
 from analysis.mismatch.model import Model, apart, both, each, in_turn, processes
 from analysis.mismatch.simulations import Simulations
 from dsis.cfa import Cfa
+from dsis.workers import Workers, workers
 from mismatch_recordings import camera
 
 CAMERAS = [camera(black=64.0 + i) for i in range(3)]
@@ -63,6 +67,18 @@ def test_a_single_one_is_left_to_who_asks(made: list[tuple[float, int]]) -> None
     assert not made
 
 
+@pytest.fixture(scope="module")
+def pool() -> Iterator[Workers]:
+    with workers(2, kind="processes") as two:
+        yield two
+
+
+@pytest.fixture
+def at_hand(pool: Workers, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let processes that are asked for be two that several tests use: to start takes seconds."""
+    monkeypatch.setattr(model, "workers", lambda *_, **__: nullcontext(pool))
+
+
 def _twice(offset: int, item: int) -> tuple[int, int]:
     return os.getpid(), offset + 2 * item
 
@@ -83,6 +99,7 @@ def _thread(_item: int) -> tuple[int, int]:
     return os.getpid(), threading.get_ident()
 
 
+@pytest.mark.usefixtures("at_hand")
 def test_what_threads_must_not_do_is_done_by_processes_or_in_turn() -> None:
     with processes(2), processes(3):  # the outer ones
         beside = {own for own, _ in apart(_thread, range(4))}
@@ -98,6 +115,7 @@ def _failing(item: int) -> float:
     return time.monotonic()
 
 
+@pytest.mark.usefixtures("at_hand")
 def test_a_failure_calls_off_what_was_not_begun() -> None:
     with processes(2):
         each(_failing, [1, 2], 2)
@@ -112,11 +130,13 @@ def test_one_job_starts_no_process() -> None:
         assert each(partial(_twice, 0), range(3), 2) == [(os.getpid(), 2 * i) for i in range(3)]
 
 
+@pytest.mark.usefixtures("at_hand")
 def test_results_come_one_by_one() -> None:
     with processes(2):
         assert next(iter(in_turn(_failing, [1, 0], 2))) > 0
 
 
+@pytest.mark.usefixtures("at_hand")
 def test_two_calls_beside_one_another_may_ask_for_processes() -> None:
     work = partial(_twice, 1)
     with processes(2):

@@ -153,7 +153,8 @@ def test_darks_of_which_half_is_cut_off_prove_nothing() -> None:
     rng = np.random.default_rng(14)
     hot = rng.random((64, 64)) < 0.01
     recording.stacks["dark-1"] += (60 * hot).astype(np.uint16)
-    found = find_mismatch(_user(0.0), _Darks.of(recording), seed=1)
+    words = frozenset({"hot_pixels", "dsnu", "dark_current", "rts"})
+    found = find_mismatch(_user(0.0), _Darks.of(recording), seed=1, vocabulary=words)
     assert not found.omitted_physics
     assert "outlying_pixels" in {own.statistic for own in found.unexplained}
     assert all("nan" not in own for own in found.remarks)

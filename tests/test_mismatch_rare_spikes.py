@@ -137,6 +137,39 @@ def test_many_spikes_some_at_one_pixel_some_clipped(seed: int) -> None:
     assert set(own.hits.frame[here]) >= {3, 7}
 
 
+@pytest.mark.parametrize("seed", range(2))
+def test_of_thousands_none_that_could_be_seen_is_left(seed: int) -> None:
+    """One sample in 400: pixels are hit twice and more, also in two frames of a reference."""
+    recording = made(seed, spikes(samples(made(seed)) // 400, 1500.0))
+    own, _, some = without_spikes(recording, MODEL)
+    assert some is not None
+    law = law_of(some, recording, {e.name: range(12) for e in recording.exposures})
+    assert law is not None
+    assert abs(law.share - 1 / 400) < 3 * law.share_error
+    assert abs(law.mean_dn - 1500) < 3 * law.mean_error_dn
+    per_pixel = np.unique(np.stack([some.hits.row, some.hits.column]), axis=1, return_counts=True)
+    assert per_pixel[1].max() >= 3
+    for exposure in own.exposures:
+        stack = np.stack([own.frame(exposure, k) for k in range(12)]).astype(np.float64)
+        apart = stack - np.median(stack, 0)
+        noise = (SLOPE * max(np.median(stack) - BLACK, 0.0) + READ**2 + 1 / 12) ** 0.5
+        assert (apart > 6 * noise).sum() <= 2  # where light is brighter noise is larger
+
+
+def test_low_spikes_are_put_aside_only_where_noise_is_no_wider_downwards() -> None:
+    def change(rng: np.random.Generator, stacks: dict[str, Array]) -> None:
+        spikes(300, 600.0)(rng, stacks)
+        for own in stacks.values():
+            where = rng.choice(own.size, 30, replace=False)
+            own.reshape(-1)[where] += rng.choice([-6.5, 6.5], 30) * own.std(0).mean()
+
+    for plain, many in ((spikes(300, 600.0), True), (change, False)):
+        some = found(made(4, plain))
+        assert some is not None
+        low = some.echoes.ratio[some.echoes.ratio > 0]
+        assert ((low < 8.0).sum() > 5) == many
+
+
 def test_saturated_flats_say_nothing_of_how_often_spikes_hit() -> None:
     def change(rng: np.random.Generator, stacks: dict[str, Array]) -> None:
         spikes(30)(rng, stacks)

@@ -1,6 +1,7 @@
 """What is not told from a rival is not named: memory from exchange, a bend from a second path."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -8,10 +9,12 @@ import numpy as np
 import pytest
 
 from analysis.mismatch import ties
+from analysis.mismatch.candidates import Proposal
 from analysis.mismatch.memory import Memory
 from analysis.mismatch.rank import Ranked
 from analysis.mismatch.segments import Path
 from analysis.mismatch.ties import bends_as_well, twin
+from dsis.effects import registry
 
 MEMORY = (5.0, 0.0)  # changes of two numbers, in standard deviations
 
@@ -32,8 +35,8 @@ def _state() -> Any:
     [
         (36.0, (5.0, 1.0), False),  # the same numbers, as well
         (20.0, (5.0, 1.0), True),  # worse
-        (36.0, (1.0, 9.0), True),  # as well, but others
-        (297.0, (1.0, 9.0), False),  # far better, since it explains others too
+        (36.0, (2.0, 9.0), True),  # as well, but others
+        (297.0, (2.0, 9.0), False),  # far better, since it explains others too
     ],
 )
 def test_memory_is_not_told_from_exchange_that_explains_as_much(
@@ -95,3 +98,29 @@ def test_what_may_be_one_of_two_that_tie_is_no_third() -> None:
     filters = (_ranked("readout_memory", 37.0, mean), _ranked("spatial_filtering", 36.0, mean))
     assert "crosstalk" in ties.akin([filters])
     assert ties.akin([]) == frozenset()
+
+
+def _memory(gain: float, mean: Sequence[float], lag: int) -> Ranked:
+    ranked = _ranked("readout_memory", gain, mean)
+    effect = registry()["readout_memory"](fraction=0.05, lag_pixels=lag)
+    return replace(ranked, proposal=Proposal(effect, ("fraction",)))
+
+
+def test_memory_of_another_lag_is_told_though_one_ties() -> None:
+    """A filter reaches the next sample; what samples two apart have in common it does not make."""
+    filters = (_memory(81.0, MEMORY, 1), _ranked("spatial_filtering", 82.0, MEMORY))
+    assert "readout_memory" not in ties.akin([filters])
+    one, two = (_memory(80.0, MEMORY, lag).proposal.effect for lag in (1, 2))
+    assert ties.of_tied_lag([filters], one)
+    assert not ties.of_tied_lag([filters], two)
+    assert not ties.of_tied_lag([], one)
+    assert not ties.of_tied_lag([filters], registry()["spatial_filtering"](fraction=0.1))
+
+
+def test_what_explains_more_but_nothing_of_the_same_is_no_twin(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    other = _ranked("spatial_filtering", 104.0, (0.5, 9.0))
+    monkeypatch.setattr(ties, "ranked", lambda *_: [other])
+    assert twin(_state(), _ranked("readout_memory", 80.0, MEMORY), {"crosstalk"}, Memory(),
+                lambda: None) is None  # fmt: skip

@@ -29,7 +29,7 @@ def _of(
     """
     state = _state(effect, rows=rows, columns=columns, steps=steps)
     without = state.camera.model_copy(update={"effect": ()})
-    return unmet(state, effect.kind, state.predictor(8).mean(without))
+    return unmet(state, effect, state.predictor(8).mean(without))
 
 
 def _state(effect: Effect, *, rows: float = 0.0, columns: float = 0.0, steps: float = 0.0) -> State:
@@ -112,6 +112,12 @@ def test_an_effect_that_explains_most_of_what_calls_for_it_is_not_denied(columns
     assert _of(MEMORY, rows=SHARE, columns=columns) is None
 
 
+def test_memory_of_two_samples_leaves_what_next_ones_share_to_others() -> None:
+    """A filter beside it makes next samples alike, along rows and columns: not its lag."""
+    memory = registry()["readout_memory"](fraction=0.05, lag_pixels=2, along="rows")
+    assert _beside(memory, registry()["spatial_filtering"](fraction=0.0125)) is None
+
+
 @pytest.mark.parametrize("there", [False, True])
 def test_what_only_levels_hint_at_must_be_seen_by_what_it_carries_over(there: bool) -> None:
     """A converter's residue, or levels that something else moves by as much."""
@@ -121,7 +127,7 @@ def test_what_only_levels_hint_at_must_be_seen_by_what_it_carries_over(there: bo
         return
     state = state_of(recorded(camera(residue), 5, levels=LEVELS), camera(residue))
     without = state.camera.model_copy(update={"effect": ()})
-    assert unmet(state, residue.kind, state.predictor(8).mean(without)) is None
+    assert unmet(state, residue, state.predictor(8).mean(without)) is None
 
 
 def _judged(effect: Effect, state: State, first: str) -> tuple[Named, str] | None:
@@ -147,7 +153,7 @@ def _beside(effect: Effect, other: Effect) -> Denial | None:
     state = state_of(recorded(camera(effect, other), 5, levels=LEVELS), camera(effect))
     assert state.mismatches
     without = state.camera.model_copy(update={"effect": ()})
-    return unmet(state, effect.kind, state.predictor(8).mean(without))
+    return unmet(state, effect, state.predictor(8).mean(without))
 
 
 def test_what_adds_little_to_what_another_makes_is_not_denied() -> None:
@@ -170,4 +176,4 @@ def test_tails_that_single_pixels_have_not_are_no_heavy_tails() -> None:
     tails = registry()["heavy_tailed_read_noise"](tail_df=4 + 6 / excess)
     state = state_of(recorded(camera(spread), 5, levels=LEVELS), camera(tails))
     without = state.camera.model_copy(update={"effect": ()})
-    assert unmet(state, tails.kind, state.predictor(8).mean(without)) is not None
+    assert unmet(state, tails, state.predictor(8).mean(without)) is not None

@@ -35,7 +35,15 @@ from analysis.mismatch.rank import (
 from analysis.mismatch.rowtold import AS_WELL, as_shown, unlike_frames
 from analysis.mismatch.segments import Path, spiky
 from analysis.mismatch.state import State
-from analysis.mismatch.ties import akin, bends_as_well, by_numbers, plainest, ties, twin
+from analysis.mismatch.ties import (
+    akin,
+    bends_as_well,
+    by_numbers,
+    of_tied_lag,
+    plainest,
+    ties,
+    twin,
+)
 from dsis.camera import Camera
 from dsis.effects import Effect
 from dsis.effects.adc_dnl import AdcDnl
@@ -275,6 +283,8 @@ class Choice(Fitted):
         if instance(effect.kind, effect) in self._done() | self.doubted.keys():
             return False
         if any(own.place in self.sized and own.like(effect) for own in self._sizes()):
+            return False
+        if of_tied_lag(self.ties, effect):
             return False
         if self.lines is None or not self.lines.shown(effect):
             return self.lines is None

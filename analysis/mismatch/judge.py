@@ -165,7 +165,7 @@ class Judge:
         denial = denial or mirrored(self.state, named.proposal.effect, mean)
         denial = denial or alike(self.state, named.proposal.effect, mean)
         shown = outlined(self.state, named.proposal.effect)
-        denial = denial or unmet(self.state, named.kind, mean, shown=shown)
+        denial = denial or unmet(self.state, named.proposal.effect, mean, shown=shown)
         if denial is None and not (_called(named, first) or locates(self.state, mean)):
             return 1.0, NOTHING
         return _verdict(denial)

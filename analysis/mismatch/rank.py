@@ -276,12 +276,15 @@ def _tried(
     return [(value, kind, proposal) for value, kind, proposal, _ in kept]
 
 
-def alike(state: State, one: Array, other: Array) -> bool:
-    """Return whether two predictions change the state's numbers in the same way."""
+def alike(state: State, one: Array, other: Array, least: float = _COSINE) -> bool:
+    """Return whether two predictions change the state's numbers in the same way.
+
+    Of vectors of these changes, over their errors, the cosine is more than the `least`.
+    """
     null = state.null
     a, b = (
         np.where(null.known, np.nan_to_num((mean - null.mean) / null.sd), 0.0)
         for mean in (one, other)
     )
     size = float(np.linalg.norm(a) * np.linalg.norm(b))
-    return size > 0 and float(a @ b) / size > _COSINE
+    return size > 0 and float(a @ b) / size > least

@@ -13,6 +13,8 @@ from analysis.mismatch.segments import Path
 from analysis.mismatch.smooth import smooth_as_well
 from analysis.mismatch.state import State
 from dsis.camera import BaseNoise
+from dsis.effects import Effect
+from dsis.effects.readout_memory import ReadoutMemory
 
 # That greens differ is seen; what amplifiers of even and odd rows make of red and blue is not, nor
 # what charge that leaks makes of neighbours. Memory of a sample is that of a residue whose steps
@@ -24,6 +26,8 @@ _SAYS_LESS = {
 _BY_CODES = "quantisation"
 _FAR_AHEAD = 25.0  # nats, that no numbers have by chance
 _KEEPS_VARIANCE = ("spatial_filtering", {"spatial_filtering", "readout_memory"})
+_OF_LAGS = "readout_memory"
+_SOME = 0.2  # cosine of what two effects change, above which one may hide in the other
 _TWINS = {
     "tap_mismatch": ("channel_imbalance",),
     "readout_memory": ("crosstalk", "spatial_filtering"),
@@ -108,7 +112,8 @@ def twin(
     the sample before may be charge that neighbours exchange, or a filter, and such charge a filter,
     which makes read noise alike, too. Noise that differs from pixel to pixel has heavy tails in all
     of them together; pixels that jump at every other frame are noisy ones. Where that explains
-    more, and also what the best leaves alone, so much the more.
+    more, and also what the best leaves alone, so much the more; but not where it leaves alone what
+    the best explains, as charge of neighbours does what samples two apart have in common.
     """
     others = [kind for kind in _TWINS.get(best.kind, ()) if kind not in vocabulary]
     if not others:
@@ -117,7 +122,8 @@ def twin(
         (
             one
             for one in ranked(state, others, memory, step)
-            if ties(state, best, one) or one.gain > best.gain + TOLD_APART
+            if ties(state, best, one)
+            or (one.gain > best.gain + TOLD_APART and alike(state, best.mean, one.mean, _SOME))
         ),
         None,
     )
@@ -127,10 +133,22 @@ def akin(pairs: Sequence[tuple[Ranked, Ranked | Path]]) -> frozenset[str]:
     """Return kinds that may be what one of a pair is, of pairs that tie: none is claimed alone.
 
     Of tails and of noise that differs from pixel to pixel neither is told; then pixels that jump,
-    which explain less of the same, are no third.
+    which explain less of the same, are no third. Memory that ties is told from memory of another
+    lag: see `of_tied_lag`.
     """
     kinds = {one.kind for pair in pairs for one in pair}
-    return frozenset(kind for kind, own in _TWINS.items() if kinds.intersection(own))
+    found = {kind for kind, own in _TWINS.items() if kinds.intersection(own)}
+    return frozenset(found - (kinds & {_OF_LAGS}))
+
+
+def of_tied_lag(pairs: Sequence[tuple[Ranked, Ranked | Path]], effect: Effect) -> bool:
+    """Return whether an effect is memory of as many samples as one that ties with another effect.
+
+    Along either axis: what neighbours share by a filter, they share along both.
+    """
+    fits = (one.proposal.effect for pair in pairs for one in pair if isinstance(one, Ranked))
+    lags = {own.lag_pixels for own in fits if isinstance(own, ReadoutMemory)}
+    return isinstance(effect, ReadoutMemory) and effect.lag_pixels in lags
 
 
 def by_numbers(

@@ -27,19 +27,20 @@ _MAPS = {
 _LEFT = 0.5  # of what calls for an effect, that may stay where it is explained
 
 
-def unmet(state: State, kind: str, without: Array, *, shown: bool = False) -> Denial | None:
+def unmet(state: State, effect: Effect, without: Array, *, shown: bool = False) -> Denial | None:
     """Return how an effect is denied by what calls for it; None: it is not.
 
     `without` are the numbers predicted without the effect; `shown`: maps show what numbers need
     not.
     """
+    kind = effect.kind
     if kind not in CANDIDATES:
         return None
     known = set(CANDIDATES[kind].calls)
     if "level" not in registry()[kind].measures:
         known.discard("level")  # which only scatters with it: what stays is another's
     calls = np.array([key.statistic in known for key in state.null.keys])
-    calls &= _of_its_map(state, kind) & _of_its_law(state, kind)
+    calls &= _of_its_map(state, kind) & _of_its_law(state, kind) & _of_its_lag(state, effect)
     change = changed(state, without)
     departures, off = off_without(state, without)
     if not (off & calls).any() and CANDIDATES[kind].hints:
@@ -72,6 +73,22 @@ def _of_its_law(state: State, kind: str) -> Mask:
         return np.ones(len(keys), np.bool_)
     brightest = {("outlying_pixels", ""), ("one_off_outliers", "")}
     return np.array([(key.statistic, key.detail) not in brightest for key in keys])
+
+
+def _of_its_lag(state: State, effect: Effect) -> Mask:
+    """Return which numbers say whether there is memory: along either axis, those of its own lag.
+
+    What else makes neighbours alike says nothing of samples two apart that are alike as well. Of
+    memory of the sample before all say something: what neighbours share reaches farther.
+    """
+    keys = state.null.keys
+    if not isinstance(effect, ReadoutMemory) or effect.lag_pixels == 1:
+        return np.ones(len(keys), np.bool_)
+    lag = effect.lag_pixels
+    step = 1 if state.setting.layout.channels == ("MONO",) else 2
+    own = {f"correlation_0_{lag}", f"correlation_{lag}_0"}
+    lines = {f"{axis} {lag / step:g}" for axis in ("rows", "columns")}
+    return np.array([key.statistic in own or key.detail in lines for key in keys])
 
 
 def _stays(state: State, calls: Mask, change: Array, departures: Array, off: Mask) -> Denial | None:

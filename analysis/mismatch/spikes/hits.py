@@ -24,9 +24,9 @@ from dsis.cfa import Cfa
 from dsis.measures.median import median
 from dsis.recording import RecordedExposure, Recording
 
-FAR = 6.0  # noises of a pixel: nearer samples are not looked at
+FAR = 5.0  # noises of a pixel: nearer samples are not looked at
 _MOST = 2000  # far samples of an exposure: more are no rare spikes
-_SHARE = 1e-3  # of its samples
+_SHARE = 1e-2  # of its samples
 _FEW = 100  # which any exposure may have
 _AROUND = 2  # pixels of one colour to each side
 _TWO = 2
@@ -120,7 +120,18 @@ def hits_of(recording: Recording, source: Source, camera: Camera, number: int) -
         places.append(found)
         moved.append(own)
         count += len(found)
+    places = _all_of_the_often_far(places)
     return Looked(_exact(watch, source, places, moved, number), watch.noise, watch.level)
+
+
+def _all_of_the_often_far(places: list[Places]) -> list[Places]:
+    """Return places by frame, in all frames those that are far in most.
+
+    Of such a pixel the reference itself may have been hit, from which the others were far then.
+    """
+    site, times = np.unique(np.concatenate(places), axis=0, return_counts=True)
+    often = site[times > len(places) / 2]
+    return [np.unique(np.concatenate([own, often]), axis=0) for own in places]
 
 
 @dataclass(frozen=True)
@@ -262,9 +273,11 @@ def _seen(
     rows, columns = at
     k, values = frame[i], series[:, i] - shift[:, i]
     others = np.delete(values, k)
-    far = frame[(rows == rows[i]) & (columns == columns[i])]
-    calm = np.delete(values, far) if far.size < values.size - 1 else others
     level, site = float(np.median(others)), (rows[i] % 2, columns[i] % 2)
+    far = frame[(rows == rows[i]) & (columns == columns[i])]
+    if far.size == values.size:  # it is asked in all frames
+        far = np.flatnonzero(np.abs(values - level) > FAR * watch.noise[site])
+    calm = np.delete(values, far) if far.size < values.size - 1 else others
     line = watch.camera.segments.variance_dn2
     ends = line(np.maximum(np.array([level, watch.level[site]]) - watch.black, 0.0))
     lit = float(watch.noise[site] ** 2 + max(float(ends[0] - ends[1]), 0.0))

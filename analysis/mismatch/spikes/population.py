@@ -20,7 +20,7 @@ _ELECTRONS = 20.0  # of a strong spike: one electron of few may be far out of th
 _LIT = 2.0  # times the variance of the darkest exposure: light tells what an electron is
 _LEAST = 3
 _BY_TAIL = 0.02  # chance that so many are strong
-_MOST = 1e-4  # of the samples
+_MOST = 5e-3  # of the samples
 _COMPLETE = 0.8  # of the spikes, where noise is least, that are strong
 _TAIL = 0.25  # as many would be of a tail that falls with the square of the distance, and more
 _FALLING = 2.0  # power of the distance with which a tail falls at least, if noise has a variance
@@ -29,9 +29,11 @@ _BY_FALL = 1e-3  # chance that those of a tail are as large
 _NEGATIVE = 0.1  # of the spikes
 _RETURNING = 0.2  # pixels that come back, beside the spikes
 _BLINKING = 0.05  # of them, where they rise as high: others may do so once
-_TWICE = 1e-3  # chance that so many pixels are hit twice
+_TWICE = 1e-3  # chance that so many pixels are hit twice, or one so often
+_TWO, _OFTEN = 2, 10
 _ECHO = 0.1  # of a spike: as much smaller a sample in its row, its column or around it follows it
 _LAG = 0.3  # of a spike, that stays at its pixel
+_CROWDED = 0.2  # strong spikes of a frame in the row or the column of a sample
 _NEAR = 4  # rows and columns, and frames after
 
 
@@ -44,7 +46,8 @@ class Spikes:
     hits
         One-off positive samples of uniform exposures and scenes.
     echoes
-        Samples that a spike drags along: of its row, its column, or its pixel afterwards.
+        Samples that a spike drags along: of its row, its column, or its pixel afterwards; and
+        spikes that are too low to be counted.
     quiet_dn
         Noise of uniform exposures by number, as rows and columns of the colour filter: (2, 2);
         infinite where a spike has no room below the white level.
@@ -83,22 +86,37 @@ def spikes_of(recording: Recording, source: Source, camera: Camera) -> Spikes | 
         return None
     count = _samples(recording, uniform)
     hits = Hits.joined([*(own.hits for own in uniform.values()), *(own.hits for own in scenes)])
-    echo = _echoes(hits)
+    lines = 1 / recording.rows + 1 / recording.columns
+    crowded = lines * float((hits.ratio > STRONG).sum()) > _CROWDED * _frames(recording)
+    echo = _echoes(hits, crowded=crowded)
     again = _returning(hits, ~echo, recording.rows * recording.columns)
     if again is None:
         return None
-    once = ~echo & ~again & (np.abs(hits.ratio) > SPIKE)
-    in_uniform = np.isin(hits.exposure, list(uniform))
-    if not _certain(hits.of(once & in_uniform), _electron_dn(camera, uniform), count):
+    alone = ~echo & ~again
+    once = alone & (np.abs(hits.ratio) > SPIKE)
+    in_uniform, electron = np.isin(hits.exposure, list(uniform)), _electron_dn(camera, uniform)
+    if not _certain(hits.of(once & in_uniform), electron, count):
         return None
     spikes = hits.of(once & (hits.ratio > 0))
     spikes = spikes.of(np.argsort(-spikes.ratio, kind="stable"))
+    lower = _lower(hits.of(alone & ~once), electron)
     white = recording.sensor.white_level
     quiet = {
         number: np.where(own.level_dn + SPIKE * own.noise_dn < white, own.noise_dn, np.inf)
         for number, own in uniform.items()
     }
-    return Spikes(spikes, _following(hits.of(echo & ~again), spikes), quiet)
+    echoes = _following(hits.of(echo & ~again), spikes, crowded=crowded)
+    return Spikes(spikes, Hits.joined([echoes, lower]), quiet)
+
+
+def _lower(hits: Hits, electron_dn: float) -> Hits:
+    """Return samples that spikes hit as well, though noise may be as far: lower ones of many.
+
+    None of them, unless nearly all are on the side of spikes.
+    """
+    up = (hits.ratio > 0) & (hits.height_dn > _ELECTRONS * electron_dn)
+    down = hits.ratio < 0
+    return hits.of(up & (down.sum() <= _NEGATIVE * up.sum()))
 
 
 def _electron_dn(camera: Camera, uniform: dict[int, Looked]) -> float:
@@ -154,15 +172,25 @@ def _farther(ratio: Array) -> float:
     return float(scipy.stats.gamma.sf(_FALLING * np.log(ratio / SPIKE).sum(), ratio.size))
 
 
-def _echoes(hits: Hits) -> Flags:
-    """Return which samples a much stronger one of the frame, or of a frame before, drags along."""
+def _frames(recording: Recording) -> int:
+    return sum(len(exposure.frames) for exposure in recording.exposures)
+
+
+def _echoes(hits: Hits, *, crowded: bool) -> Flags:
+    """Return which samples a much stronger one of the frame, or of a frame before, drags along.
+
+    Where spikes are `crowded`, any has others in its row and its column: only around it are they
+    its own.
+    """
     found = np.zeros(hits.height_dn.size, bool)
     size = np.abs(hits.height_dn)
     for i in np.flatnonzero(hits.ratio > STRONG):
         own = hits.exposure == hits.exposure[i]
         here = own & (hits.frame == hits.frame[i])
         down, right = np.abs(hits.row - hits.row[i]), np.abs(hits.column - hits.column[i])
-        beside = (down == 0) | (right == 0) | ((down <= _NEAR) & (right <= _NEAR))
+        beside = (down <= _NEAR) & (right <= _NEAR)
+        if not crowded:
+            beside |= (down == 0) | (right == 0)
         found |= here & beside & (size < _ECHO * size[i])
         later = hits.frame - hits.frame[i]
         pixel = own & (down == 0) & (right == 0) & (later > 0) & (later <= _NEAR)
@@ -170,28 +198,40 @@ def _echoes(hits: Hits) -> Flags:
     return found
 
 
-def _following(echoes: Hits, spikes: Hits) -> Hits:
+def _following(echoes: Hits, spikes: Hits, *, crowded: bool) -> Hits:
     """Return the echoes of what was taken for spikes."""
     both = Hits.joined([spikes, echoes])
-    return both.of(_echoes(both) & (np.arange(both.frame.size) >= spikes.frame.size))
+    found = _echoes(both, crowded=crowded)
+    return both.of(found & (np.arange(both.frame.size) >= spikes.frame.size))
 
 
 def _returning(hits: Hits, counted: Flags, pixels: int) -> Flags | None:
     """Return which samples are of pixels that come back; None: those are too many beside others.
 
-    As many pixels as chance hits twice do not.
+    As many pixels as chance hits twice, and more often, do not.
     """
     site = np.stack([hits.row, hits.column])
     _, which = np.unique(site, axis=1, return_inverse=True)
     which = which.reshape(-1)
     times = np.bincount(which, weights=counted, minlength=which.max(initial=0) + 1)
-    rare = times[(times > 0) & (times <= 2)]
-    twice = int((rare == 2).sum())
-    expected = float(rare.sum()) ** 2 / (2 * pixels)
-    chance = scipy.stats.poisson.sf(twice - 1, expected) > _TWICE
-    again = times > (2 if chance else 1)
+    often = _by_chance(float(times[times <= _TWO].sum()) / pixels, pixels)
+    rare = times[(times > 0) & (times <= often)]
+    rate = float(rare.sum()) / pixels
+    expected = pixels * scipy.stats.poisson.sf(1, rate)
+    twice = int((rare >= _TWO).sum())
+    chance = scipy.stats.poisson.sf(twice - 1, expected) > _TWICE or expected > _MOSTLY * twice
+    again = times > (often if chance else 1)
     once = int(((times > 0) & ~again).sum())
     blinks = np.bincount(which[counted & (hits.ratio > STRONG)], minlength=times.size) > 0
     if again.sum() > _RETURNING * once or (again & blinks).sum() > _BLINKING * once:
         return None
     return np.asarray(again[which])
+
+
+def _by_chance(rate: float, pixels: int) -> int:
+    """Return how often chance may hit one of all pixels that are hit at this rate; twice at least.
+
+    Beyond that fewer than one in a thousand recordings has such a pixel.
+    """
+    times = np.arange(_TWO, _OFTEN)
+    return int(times[pixels * scipy.stats.poisson.sf(times, rate) < _TWICE].min(initial=_OFTEN))

@@ -55,14 +55,14 @@ def thinned(image: NDArray[np.generic], y: int, x: int, step: int) -> Image:
 def noise_dn(one: Codes, other: Codes, y: int, x: int, step: int) -> float:
     """Return the noise of most of a channel's samples, DN; not less than the step of its codes.
 
-    The wider of what most differences are and of all but one in a thousand of them: few electrons
+    The wider of what most differences are and of all but one in fifty of them: few electrons
     and coarse codes leave most samples where they are.
     """
     change = thinned(one, y, x, step) - thinned(other, y, x, step)
     change = change - np.float32(median(change))
     low, high = np.percentile(change, _ONE_SIGMA)
     size = np.abs(change)
-    most = np.minimum(size, np.percentile(size, 99.9)).astype(np.float64)
+    most = np.minimum(size, np.percentile(size, 98.0)).astype(np.float64)
     moved = size[size >= 1]
     step_dn = float(moved.min()) if moved.size else 1.0
     return max(float(high - low) / 2 / 2**0.5, float(np.sqrt((most**2).mean() / 2)), step_dn)

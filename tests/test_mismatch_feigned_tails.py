@@ -11,7 +11,7 @@ from scipy.stats import norm
 from analysis.mismatch import feigned
 from analysis.mismatch.bank.key import Key
 from analysis.mismatch.contradicted import Denial
-from analysis.mismatch.feignedtails import coded, lopsided, mixed, placed, timed
+from analysis.mismatch.feignedtails import coded, lopsided, mixed, placed, timed, underlaid
 from dsis.effects.adc_dnl import AdcDnl
 from exposing import effect
 
@@ -271,3 +271,27 @@ def test_noise_that_neighbours_share_in_the_dark_is_no_law_of_single_samples(
     for kind in ("adc_dnl", "read_noise_spread", TAILS):
         assert (mixed(state, kind) is not None) is denied
     assert mixed(state, "quantisation") is None
+
+
+@pytest.mark.parametrize(
+    ("low_dn4", "leaning", "kind", "denied"),
+    [
+        (81 * 0.08, 0.0, TAILS, True),  # of a kurtosis of 0.1 in noise of 3 DN
+        (81 * 0.03, 0.0, TAILS, False),
+        (81 * 0.03, 12.0, TAILS, True),
+        (0.0, 12.0, TAILS, False),
+        (81 * 0.08, 0.0, "rts", True),
+        (81 * 0.08, 0.0, "row_noise", False),
+    ],
+)
+def test_tails_as_spikes_feign_them_that_are_too_low_are_denied(
+    low_dn4: float, leaning: float, kind: str, *, denied: bool
+) -> None:
+    state = _state(0.1, 0.0)
+    state.setting.low_spikes_dn4 = {"dark": low_dn4} if low_dn4 else {}
+    dark = state.setting.layout.exposures[0]
+    state.setting.layout.uniform = [dark]
+    state.null.sd = np.full(2, 0.01)
+    state.vector.keys = (state.vector.keys[0], replace(state.vector.keys[1], statistic="skewness"))
+    state.null.departures = lambda _: np.array([0.0, leaning])
+    assert (underlaid(state, kind, WITHOUT) is not None) is denied

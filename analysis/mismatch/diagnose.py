@@ -39,7 +39,7 @@ from analysis.mismatch.rowtold import EITHER, SINGLE_ROWS, as_likely, beside_und
 from analysis.mismatch.segments import as_settled, second_path
 from analysis.mismatch.settle import would_settle
 from analysis.mismatch.source import Source
-from analysis.mismatch.spikes import Spikes, told_besides, with_spikes, without_spikes
+from analysis.mismatch.spikes import Spikes, left_dn4, told_besides, with_spikes, without_spikes
 from analysis.mismatch.split import Split
 from analysis.mismatch.state import SUREST, Setting, State
 from analysis.mismatch.steadylight import with_steady_light
@@ -130,6 +130,7 @@ def _found(
         setting,
         jumping=_jumping(camera, trial.lines, frames),
         noisy_rows=partial(_noisy_rows, camera, lines),
+        low_spikes_dn4=left_dn4(spikes, stored),
     )
     whole = State.of(setting if large else _of_all_frames(setting, trial), camera, step)
     if not (words and whole.mismatches):

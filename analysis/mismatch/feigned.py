@@ -15,7 +15,16 @@ from analysis.mismatch.bank.standing import NAME as FIXED_WAVE
 from analysis.mismatch.contradicted import Denial, rival
 from analysis.mismatch.displaced import displaced
 from analysis.mismatch.edged import STATISTIC, edged, single
-from analysis.mismatch.feignedtails import clamped, coded, lopsided, mixed, placed, spiked, timed
+from analysis.mismatch.feignedtails import (
+    clamped,
+    coded,
+    lopsided,
+    mixed,
+    placed,
+    spiked,
+    timed,
+    underlaid,
+)
 from analysis.mismatch.fewfixed import of_few_that_stand_out
 from analysis.mismatch.fields import interpolated
 from analysis.mismatch.flatcolumns import flat_columns
@@ -91,6 +100,7 @@ def of_another(state: State, effect: Effect, without: Array) -> Denial | None:
         or unequal(state, effect, without)
         or uneven(state, effect)
         or coded(state, kind, without)
+        or underlaid(state, kind, without)
         or lopsided(state, kind)
         or spiked(state, kind)
         or far_below(state, effect)

@@ -87,6 +87,39 @@ def coded(state: State, kind: str, without: Array) -> Denial | None:
     return Denial(1 - fake / whole, "codes are not equally wide, and feign tails")
 
 
+def underlaid(state: State, kind: str, without: Array) -> Denial | None:
+    """Return how tails are denied by spikes too low to be put aside; None: they are not.
+
+    Beside many strong spikes there are weaker ones by the same law: what these add to the kurtosis
+    is known. Where it is half of what tails would explain, or darks lean up, there may be none.
+    """
+    low = state.setting.low_spikes_dn4
+    if kind not in _TAILS or not low:
+        return None
+    why = "spikes too low to be counted make tails as well"
+    darks = {e.name for e in state.setting.layout.uniform if e.kind == "dark"}
+    left = state.null.departures(state.vector)
+    leans = [
+        float(z)
+        for key, z, known in zip(state.vector.keys, left, state.null.known, strict=False)
+        if known and key.statistic == "skewness" and key.exposure in darks
+    ]
+    if sum(leans) > FAR_OFF * sqrt(max(len(leans), 1)):
+        return Denial(0.0, why)
+    whole = fake = 0.0
+    for i, key in enumerate(state.vector.keys):
+        level = state.setting.seen.levels.get(key.place)
+        known = state.null.known[i] and np.isfinite(without[i])
+        if key.statistic != "kurtosis" or key.scope != "exposure" or level is None or not known:
+            continue
+        claimed = float(state.null.mean[i] - without[i]) / float(state.null.sd[i]) ** 2
+        whole += claimed * float(state.null.mean[i] - without[i])
+        fake += claimed * low.get(key.exposure, 0.0) / max(level.variance_dn2, 1e-9) ** 2
+    if whole <= 0 or fake <= _MOST * whole:
+        return None
+    return Denial(max(1 - fake / whole, 0.0), why)
+
+
 def spiked(state: State, kind: str) -> Denial | None:
     """Return how unequal codes are denied by spikes; None: they are not.
 

@@ -1,7 +1,7 @@
 """A recording beside one model of it: calibrated, simulated, judged."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
 from math import inf
 
@@ -65,6 +65,8 @@ class Setting:
     noisy_rows
         By how much likelier all frames are with noise of single rows than without, whichever of
         bands and 1/f noise is beside it: nats.
+    low_spikes_dn4
+        By exposure, what spikes that were not put aside add to fourth moments.
     """
 
     layout: Layout
@@ -83,6 +85,7 @@ class Setting:
     asked_again: bool = False
     jumping: Jumping | None = None
     noisy_rows: Callable[[], float] = lambda: -inf
+    low_spikes_dn4: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod
     def of(

@@ -5,6 +5,7 @@ draws the same handful: such spikes are counted, one by one, and the rest is jud
 """
 
 from analysis.mismatch.spikes.cleaned import Cleaned, without_spikes
+from analysis.mismatch.spikes.law import left_dn4
 from analysis.mismatch.spikes.population import Spikes, spikes_of
 from analysis.mismatch.spikes.told import STATISTIC, told_besides, with_spikes
 
@@ -12,6 +13,7 @@ __all__ = [
     "STATISTIC",
     "Cleaned",
     "Spikes",
+    "left_dn4",
     "spikes_of",
     "told_besides",
     "with_spikes",

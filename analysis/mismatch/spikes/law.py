@@ -7,7 +7,7 @@ all is at the white level. At that level a height is known to be no less.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import exp, log, nan, pi, sqrt
+from math import exp, gamma, log, nan, pi, sqrt
 
 import numpy as np
 import scipy.optimize
@@ -16,16 +16,20 @@ import scipy.sparse.csgraph
 import scipy.stats
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
+from scipy.special import gammainc
 
 from analysis.mismatch.finding import Gain
 from analysis.mismatch.spikes.hits import Hits
-from analysis.mismatch.spikes.population import SPIKE, Spikes
+from analysis.mismatch.spikes.population import NEAR, SPIKE, Spikes
 from dsis.recording import Recording
 
 Array = NDArray[np.float64]
 Frames = Mapping[str, Sequence[int]]
 MOST_NATS = 100.0  # that one spike may count
 _ENDS = (0.025, 0.975)
+_FOURTH = 4
+_BLURRED = 1.0  # noises
+_FAR_OFF = 2 * (NEAR + 1)  # of exposures and frames from one another, where samples are near
 _WIDEST = 1e3  # times the mean of what is seen: where the mean height is looked for
 
 
@@ -91,6 +95,47 @@ def law_of(spikes: Spikes, recording: Recording, frames: Frames) -> SpikeLaw | N
     sizes = _tracks(seen.hits)
     error = sqrt(float(sizes @ sizes)) / n  # of a compound Poisson count
     return SpikeLaw(share, share * error, mean, mean * max(error, 1 / sqrt(known)))
+
+
+def left_dn4(spikes: Spikes | None, recording: Recording) -> dict[str, float]:
+    """Return what spikes that are too low to be put aside add to fourth moments, DN^4, by exposure.
+
+    Of exponential heights of mean m below a limit L: s m^4 times the integral of x^4 exp(-x) from 0
+    to L / m. Noise beside them, and what it makes of that of their pixel, moves the limit outwards on
+    the whole, as high powers have it. So do the samples around spikes that have a share of them, as often as they are seen.
+    """
+    everything = {e.name: range(len(e.frames)) for e in recording.exposures}
+    law = None if spikes is None else law_of(spikes, recording, everything)
+    if spikes is None or law is None:
+        return {}
+    shares, times = _echoed(spikes)
+    means = np.append(shares, 1.0) * law.mean_dn
+    fourth = np.append(times, 1.0) * law.share * gamma(_FOURTH + 1) * means**_FOURTH
+    found: dict[str, float] = {}
+    for number, noise in spikes.quiet_dn.items():
+        ends = (spikes.lowest + _BLURRED) * noise.reshape(-1, 1) / means
+        below = gammainc(_FOURTH + 1, ends).mean(0)
+        found[recording.exposures[number].name] = float(fourth @ below)
+    return found
+
+
+def _echoed(spikes: Spikes) -> tuple[Array, Array]:
+    """Return which shares of a spike samples around it have, and how often: one for each seen.
+
+    Of so many spikes that are as high as to show it.
+    """
+    hits, echoes = spikes.hits, spikes.echoes
+    if not echoes.frame.size:
+        return np.zeros(0), np.zeros(0)
+    at, here = (np.stack([_FAR_OFF * own.exposure, _FAR_OFF * own.frame, own.row, own.column], 1)
+                for own in (hits, echoes))  # fmt: skip
+    near = KDTree(at).query_ball_point(here, NEAR, p=np.inf)
+    tallest = np.array([max(hits.height_dn[own], default=np.inf) for own in near])
+    shares = echoes.height_dn / tallest
+    shares = shares[shares > 0]
+    seen = np.sort(hits.height_dn / (spikes.lowest * hits.noise_dn))
+    shown = seen.size - np.searchsorted(seen, 1 / shares)
+    return shares, 1 / np.maximum(shown, 1)
 
 
 def heldout_gain(

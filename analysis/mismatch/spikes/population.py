@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from analysis.mismatch.scenes import SCENE
 from analysis.mismatch.source import Source
-from analysis.mismatch.spikes.hits import Hits, Looked, hits_of
+from analysis.mismatch.spikes.hits import FAR, Hits, Looked, hits_of
 from dsis.camera import Camera
 from dsis.recording import Recording
 
@@ -17,6 +17,7 @@ Flags = NDArray[np.bool_]
 SPIKE = 8.0  # noises of the pixel: what is taken for a spike where there are any
 STRONG = 30.0  # noises: no law of noise
 _ELECTRONS = 20.0  # of a strong spike: one electron of few may be far out of the noise
+_FEW_ELECTRONS = 10.0  # of a lower one, beside strong ones
 _LIT = 2.0  # times the variance of the darkest exposure: light tells what an electron is
 _LEAST = 3
 _BY_TAIL = 0.02  # chance that so many are strong
@@ -34,7 +35,7 @@ _TWO, _OFTEN = 2, 10
 _ECHO = 0.1  # of a spike: as much smaller a sample in its row, its column or around it follows it
 _LAG = 0.3  # of a spike, that stays at its pixel
 _CROWDED = 0.2  # strong spikes of a frame in the row or the column of a sample
-_NEAR = 4  # rows and columns, and frames after
+NEAR = 4  # rows and columns, and frames after
 
 
 @dataclass(frozen=True)
@@ -46,21 +47,26 @@ class Spikes:
     hits
         One-off positive samples of uniform exposures and scenes.
     echoes
-        Samples that a spike drags along: of its row, its column, or its pixel afterwards; and
-        spikes that are too low to be counted.
+        Samples that a spike drags along: of its row, its column, or its pixel afterwards.
+    lower
+        Spikes that are too low to be counted.
     quiet_dn
         Noise of uniform exposures by number, as rows and columns of the colour filter: (2, 2);
         infinite where a spike has no room below the white level.
+    lowest
+        From how many noises on spikes are put aside.
     """
 
     hits: Hits
     echoes: Hits
+    lower: Hits
     quiet_dn: dict[int, Array]
+    lowest: float = SPIKE
 
     @property
     def replaced(self) -> Hits:
         """All samples that are put aside."""
-        return Hits.joined([self.hits, self.echoes])
+        return Hits.joined([self.hits, self.echoes, self.lower])
 
 
 def spikes_of(recording: Recording, source: Source, camera: Camera) -> Spikes | None:
@@ -106,7 +112,8 @@ def spikes_of(recording: Recording, source: Source, camera: Camera) -> Spikes | 
         for number, own in uniform.items()
     }
     echoes = _following(hits.of(echo & ~again), spikes, crowded=crowded)
-    return Spikes(spikes, Hits.joined([echoes, lower]), quiet)
+    lowest = FAR if lower.frame.size else SPIKE
+    return Spikes(spikes, echoes, lower, quiet, lowest)
 
 
 def _lower(hits: Hits, electron_dn: float) -> Hits:
@@ -114,7 +121,7 @@ def _lower(hits: Hits, electron_dn: float) -> Hits:
 
     None of them, unless nearly all are on the side of spikes.
     """
-    up = (hits.ratio > 0) & (hits.height_dn > _ELECTRONS * electron_dn)
+    up = (hits.ratio > 0) & (hits.height_dn > _FEW_ELECTRONS * electron_dn)
     down = hits.ratio < 0
     return hits.of(up & (down.sum() <= _NEGATIVE * up.sum()))
 
@@ -188,12 +195,12 @@ def _echoes(hits: Hits, *, crowded: bool) -> Flags:
         own = hits.exposure == hits.exposure[i]
         here = own & (hits.frame == hits.frame[i])
         down, right = np.abs(hits.row - hits.row[i]), np.abs(hits.column - hits.column[i])
-        beside = (down <= _NEAR) & (right <= _NEAR)
+        beside = (down <= NEAR) & (right <= NEAR)
         if not crowded:
             beside |= (down == 0) | (right == 0)
         found |= here & beside & (size < _ECHO * size[i])
         later = hits.frame - hits.frame[i]
-        pixel = own & (down == 0) & (right == 0) & (later > 0) & (later <= _NEAR)
+        pixel = own & (down == 0) & (right == 0) & (later > 0) & (later <= NEAR)
         found |= pixel & (size < _LAG * size[i])
     return found
 

@@ -124,7 +124,7 @@ def _mismatch(spikes: Spikes, recording: Recording) -> Mismatch:
 
 
 def _remark(spikes: Spikes) -> str:
-    samples = spikes.hits.frame.size + spikes.echoes.frame.size
+    samples = spikes.replaced.frame.size
     return (
         f"{samples} samples that spikes hit, or that follow one, are taken as their pixels are in "
         "the other frames: all else that is said here is said without them."

@@ -158,7 +158,7 @@ def test_of_thousands_none_that_could_be_seen_is_left(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", range(2))
 def test_what_low_spikes_leave_is_foretold(seed: int) -> None:
-    """Of their fourth moments; a sample beside each has a twentieth of it, also where none shows."""
+    """Of their fourth moments; a sample beside each has a twentieth of it, shown or not."""
 
     def dragging(rng: np.random.Generator, stacks: dict[str, Array]) -> None:
         before = {name: own.copy() for name, own in stacks.items()}

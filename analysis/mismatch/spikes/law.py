@@ -101,8 +101,9 @@ def left_dn4(spikes: Spikes | None, recording: Recording) -> dict[str, float]:
     """Return what spikes that are too low to be put aside add to fourth moments, DN^4, by exposure.
 
     Of exponential heights of mean m below a limit L: s m^4 times the integral of x^4 exp(-x) from 0
-    to L / m. Noise beside them, and what it makes of that of their pixel, moves the limit outwards on
-    the whole, as high powers have it. So do the samples around spikes that have a share of them, as often as they are seen.
+    to L / m. Noise beside them, and what it makes of that of their pixel, moves the limit outwards
+    on the whole, as high powers have it. So do the samples around spikes that have a share of them,
+    as often as they are seen.
     """
     everything = {e.name: range(len(e.frames)) for e in recording.exposures}
     law = None if spikes is None else law_of(spikes, recording, everything)

@@ -279,6 +279,7 @@ def test_noise_that_neighbours_share_in_the_dark_is_no_law_of_single_samples(
         (81 * 0.08, 0.0, TAILS, True),  # of a kurtosis of 0.1 in noise of 3 DN
         (81 * 0.03, 0.0, TAILS, False),
         (81 * 0.03, 12.0, TAILS, True),
+        (81 * 0.01, 12.0, TAILS, False),  # a dozen spikes do not make noise lean
         (0.0, 12.0, TAILS, False),
         (81 * 0.08, 0.0, "rts", True),
         (81 * 0.08, 0.0, "row_noise", False),

@@ -27,6 +27,7 @@ _ALIKE = frozenset(
     }
 )  # fmt: skip
 _MOST = 0.5  # of tails, that something else may feign
+_SOME = 0.2  # of tails, that spikes may feign beside others that lean as they do
 _TALL = 20.0  # standard deviations, that no noise of some lines has
 _SCATTER = 1.84  # see `coded`
 _OF_PIXELS = frozenset({"variance_spread", "one_off_outliers"})
@@ -91,21 +92,12 @@ def underlaid(state: State, kind: str, without: Array) -> Denial | None:
     """Return how tails are denied by spikes too low to be put aside; None: they are not.
 
     Beside many strong spikes there are weaker ones by the same law: what these add to the kurtosis
-    is known. Where it is half of what tails would explain, or darks lean up, there may be none.
+    is known. Where it is half of what tails would explain, or a fifth and darks lean up, there may
+    be none.
     """
     low = state.setting.low_spikes_dn4
     if kind not in _TAILS or not low:
         return None
-    why = "spikes too low to be counted make tails as well"
-    darks = {e.name for e in state.setting.layout.uniform if e.kind == "dark"}
-    left = state.null.departures(state.vector)
-    leans = [
-        float(z)
-        for key, z, known in zip(state.vector.keys, left, state.null.known, strict=False)
-        if known and key.statistic == "skewness" and key.exposure in darks
-    ]
-    if sum(leans) > FAR_OFF * sqrt(max(len(leans), 1)):
-        return Denial(0.0, why)
     whole = fake = 0.0
     for i, key in enumerate(state.vector.keys):
         level = state.setting.seen.levels.get(key.place)
@@ -115,9 +107,21 @@ def underlaid(state: State, kind: str, without: Array) -> Denial | None:
         claimed = float(state.null.mean[i] - without[i]) / float(state.null.sd[i]) ** 2
         whole += claimed * float(state.null.mean[i] - without[i])
         fake += claimed * low.get(key.exposure, 0.0) / max(level.variance_dn2, 1e-9) ** 2
-    if whole <= 0 or fake <= _MOST * whole:
+    if whole <= 0 or fake <= (_SOME if _darks_lean_up(state) else _MOST) * whole:
         return None
-    return Denial(max(1 - fake / whole, 0.0), why)
+    return Denial(max(1 - fake / whole, 0.0), "spikes too low to be counted make tails as well")
+
+
+def _darks_lean_up(state: State) -> bool:
+    """Return whether darks are off, all together, by noise that leans up."""
+    darks = {e.name for e in state.setting.layout.uniform if e.kind == "dark"}
+    left = state.null.departures(state.vector)
+    leans = [
+        float(z)
+        for key, z, known in zip(state.vector.keys, left, state.null.known, strict=False)
+        if known and key.statistic == "skewness" and key.exposure in darks
+    ]
+    return sum(leans) > FAR_OFF * sqrt(max(len(leans), 1))
 
 
 def spiked(state: State, kind: str) -> Denial | None:

@@ -24,7 +24,7 @@ from dsis.cfa import Cfa
 from dsis.measures.median import median
 from dsis.recording import RecordedExposure, Recording
 
-FAR = 5.0  # noises of a pixel: nearer samples are not looked at
+FAR = 6.0  # noises of a pixel: nearer samples are not looked at
 _MOST = 2000  # far samples of an exposure: more are no rare spikes
 _SHARE = 1e-2  # of its samples
 _FEW = 100  # which any exposure may have
@@ -100,8 +100,12 @@ class Looked:
     level_dn: Array
 
 
-def hits_of(recording: Recording, source: Source, camera: Camera, number: int) -> Looked | None:
+def hits_of(
+    recording: Recording, source: Source, camera: Camera, number: int, farthest: float = FAR
+) -> Looked | None:
     """Return the far samples of an exposure; None: they are too many to be rare, or it has no pair.
+
+    They are farther than so many noises of their pixel.
 
     Three frames tell what each pixel has, and one pair how noisy most are.
     """
@@ -109,7 +113,7 @@ def hits_of(recording: Recording, source: Source, camera: Camera, number: int) -
     frames = len(exposure.frames)
     if frames < _TWO:
         return None
-    watch = _Watch.of(recording, source, camera, exposure)
+    watch = _Watch.of(recording, source, camera, exposure, farthest)
     most = min(_MOST, max(_FEW, int(_SHARE * frames * recording.rows * recording.columns)))
     places, moved, count = [], [], 0
     for k, frame in enumerate(source.frames(exposure.name, range(frames))):
@@ -141,6 +145,7 @@ class _Watch:
     exposure: RecordedExposure
     middles: list[Codes]
     farthest: Image
+    noises: float
     noise: Array
     level: Array
     black: float
@@ -150,7 +155,12 @@ class _Watch:
 
     @classmethod
     def of(
-        cls, recording: Recording, source: Source, camera: Camera, exposure: RecordedExposure
+        cls,
+        recording: Recording,
+        source: Source,
+        camera: Camera,
+        exposure: RecordedExposure,
+        noises: float,
     ) -> "_Watch":
         n = len(exposure.frames)
         pair = list(source.frames(exposure.name, [n - 2, n - 1]))
@@ -171,9 +181,9 @@ class _Watch:
         if exposure.kind == SCENE:  # a picture's bright parts are noisier than most
             line = camera.segments.variance_dn2(middles[0].astype(np.float32) - np.float32(black))
             sd = np.sqrt(np.maximum(sd**2, line))
-        farthest = np.ascontiguousarray(FAR * sd, np.float32)
+        farthest = np.ascontiguousarray(noises * sd, np.float32)
         white = recording.sensor.white_level
-        return cls(exposure, middles, farthest, noise, level, black, white, step, camera)
+        return cls(exposure, middles, farthest, noises, noise, level, black, white, step, camera)
 
     def middle(self, frame: int) -> Codes:
         return self.middles[frame % len(self.middles)]
@@ -254,7 +264,7 @@ def _exact(
         instead.astype(np.uint16),
         series[frame, each] >= watch.white,
     )
-    return hits.of(np.abs(hits.ratio) > FAR)
+    return hits.of(np.abs(hits.ratio) > watch.noises)
 
 
 def _seen(
@@ -276,7 +286,7 @@ def _seen(
     level, site = float(np.median(others)), (rows[i] % 2, columns[i] % 2)
     far = frame[(rows == rows[i]) & (columns == columns[i])]
     if far.size == values.size:  # it is asked in all frames
-        far = np.flatnonzero(np.abs(values - level) > FAR * watch.noise[site])
+        far = np.flatnonzero(np.abs(values - level) > watch.noises * watch.noise[site])
     calm = np.delete(values, far) if far.size < values.size - 1 else others
     line = watch.camera.segments.variance_dn2
     ends = line(np.maximum(np.array([level, watch.level[site]]) - watch.black, 0.0))

@@ -114,8 +114,11 @@ def left_dn4(spikes: Spikes | None, recording: Recording) -> dict[str, float]:
     fourth = np.append(times, 1.0) * law.share * gamma(_FOURTH + 1) * means**_FOURTH
     found: dict[str, float] = {}
     for number, noise in spikes.quiet_dn.items():
-        ends = (spikes.lowest + _BLURRED) * noise.reshape(-1, 1) / means
-        below = gammainc(_FOURTH + 1, ends).mean(0)
+        sites = noise[np.isfinite(noise)]
+        if not sites.size:
+            continue  # at the white level: there is no room for them
+        ends = (spikes.lowest + _BLURRED) * sites.reshape(-1, 1) / means
+        below = gammainc(_FOURTH + 1, ends).mean(0) * sites.size / noise.size
         found[recording.exposures[number].name] = float(fourth @ below)
     return found
 

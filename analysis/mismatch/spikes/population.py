@@ -14,6 +14,7 @@ from dsis.recording import Recording
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
+LOW = 5.0  # noises of the pixel, from which spikes are put aside where they are many
 SPIKE = 8.0  # noises of the pixel: what is taken for a spike where there are any
 STRONG = 30.0  # noises: no law of noise
 _ELECTRONS = 20.0  # of a strong spike: one electron of few may be far out of the noise
@@ -22,6 +23,7 @@ _LIT = 2.0  # times the variance of the darkest exposure: light tells what an el
 _LEAST = 3
 _BY_TAIL = 0.02  # chance that so many are strong
 _MOST = 5e-3  # of the samples
+_MANY = 1e-4  # of the samples: from there on lower ones matter
 _COMPLETE = 0.8  # of the spikes, where noise is least, that are strong
 _TAIL = 0.25  # as many would be of a tail that falls with the square of the distance, and more
 _FALLING = 2.0  # power of the distance with which a tail falls at least, if noise has a variance
@@ -32,8 +34,11 @@ _RETURNING = 0.2  # pixels that come back, beside the spikes
 _BLINKING = 0.05  # of them, where they rise as high: others may do so once
 _TWICE = 1e-3  # chance that so many pixels are hit twice, or one so often
 _TWO, _OFTEN = 2, 10
+_NEARLY = 0.9  # of the pixels that are hit twice, that chance hits
+_ALONE = 3.0  # times as high as all others of its pixel a spike is that hits one that comes back
 _ECHO = 0.1  # of a spike: as much smaller a sample in its row, its column or around it follows it
 _LAG = 0.3  # of a spike, that stays at its pixel
+_APART = 1 << 20  # exposures, in frames
 _CROWDED = 0.2  # strong spikes of a frame in the row or the column of a sample
 NEAR = 4  # rows and columns, and frames after
 
@@ -76,12 +81,23 @@ def spikes_of(recording: Recording, source: Source, camera: Camera) -> Spikes | 
     """
     if any(effect.kind == "impulse" for effect in camera.effect):
         return None
+    found = _seen(recording, source, camera, FAR)
+    if found is None or found.hits.frame.size <= _MANY * _samples(recording):
+        return found
+    return _seen(recording, source, camera, LOW) or found
+
+
+def _seen(recording: Recording, source: Source, camera: Camera, farthest: float) -> Spikes | None:
+    """Return the spikes among samples that are farther than so many noises; None: there are none.
+
+    Lower ones are put aside as well where samples are looked at from `LOW` on.
+    """
     uniform: dict[int, Looked] = {}
     scenes: list[Looked] = []
     for number, exposure in enumerate(recording.exposures):
         if len(exposure.frames) < 2:
             continue
-        looked = hits_of(recording, source, camera, number)
+        looked = hits_of(recording, source, camera, number, farthest)
         if exposure.kind == SCENE:
             scenes += [] if looked is None else [looked]
         elif looked is None:
@@ -90,11 +106,11 @@ def spikes_of(recording: Recording, source: Source, camera: Camera) -> Spikes | 
             uniform[number] = looked
     if not uniform:
         return None
-    count = _samples(recording, uniform)
     hits = Hits.joined([*(own.hits for own in uniform.values()), *(own.hits for own in scenes)])
     lines = 1 / recording.rows + 1 / recording.columns
     crowded = lines * float((hits.ratio > STRONG).sum()) > _CROWDED * _frames(recording)
-    echo = _echoes(hits, crowded=crowded)
+    count = _samples(recording)
+    echo = _echoes(hits, count, crowded=crowded)
     again = _returning(hits, ~echo, recording.rows * recording.columns)
     if again is None:
         return None
@@ -105,15 +121,17 @@ def spikes_of(recording: Recording, source: Source, camera: Camera) -> Spikes | 
         return None
     spikes = hits.of(once & (hits.ratio > 0))
     spikes = spikes.of(np.argsort(-spikes.ratio, kind="stable"))
-    lower = _lower(hits.of(alone & ~once), electron)
+    lower = _lower(hits.of(alone & ~once & (farthest <= LOW)), electron)
     white = recording.sensor.white_level
     quiet = {
         number: np.where(own.level_dn + SPIKE * own.noise_dn < white, own.noise_dn, np.inf)
         for number, own in uniform.items()
     }
-    echoes = _following(hits.of(echo & ~again), spikes, crowded=crowded)
-    lowest = FAR if lower.frame.size else SPIKE
-    return Spikes(spikes, echoes, lower, quiet, lowest)
+    both = Hits.joined([spikes, hits.of(echo & ~again)])
+    following = _echoes(both, count, crowded=crowded)
+    following[: spikes.frame.size] = False
+    lowest = LOW if lower.frame.size else SPIKE
+    return Spikes(spikes, both.of(following), lower, quiet, lowest)
 
 
 def _lower(hits: Hits, electron_dn: float) -> Hits:
@@ -140,9 +158,10 @@ def _electron_dn(camera: Camera, uniform: dict[int, Looked]) -> float:
     return max([s.slope for s in camera.noise.segment] + [float(s) for s in slopes])
 
 
-def _samples(recording: Recording, uniform: dict[int, Looked]) -> int:
-    frames = sum(len(recording.exposures[number].frames) for number in uniform)
-    return frames * recording.rows * recording.columns
+def _samples(recording: Recording) -> int:
+    """Return how many samples uniform exposures have that are looked at."""
+    uniform = (e for e in recording.exposures if e.kind != SCENE and len(e.frames) >= _TWO)
+    return sum(len(e.frames) for e in uniform) * recording.rows * recording.columns
 
 
 def _certain(once: Hits, electron_dn: float, samples: int) -> bool:
@@ -183,33 +202,36 @@ def _frames(recording: Recording) -> int:
     return sum(len(exposure.frames) for exposure in recording.exposures)
 
 
-def _echoes(hits: Hits, *, crowded: bool) -> Flags:
+def _echoes(hits: Hits, samples: int, *, crowded: bool) -> Flags:
     """Return which samples a much stronger one of the frame, or of a frame before, drags along.
 
     Where spikes are `crowded`, any has others in its row and its column: only around it are they
-    its own.
+    its own, and not where chance puts half as many there.
     """
-    found = np.zeros(hits.height_dn.size, bool)
-    size = np.abs(hits.height_dn)
-    for i in np.flatnonzero(hits.ratio > STRONG):
-        own = hits.exposure == hits.exposure[i]
-        here = own & (hits.frame == hits.frame[i])
-        down, right = np.abs(hits.row - hits.row[i]), np.abs(hits.column - hits.column[i])
+    order = np.lexsort((hits.frame, hits.exposure))
+    own = hits.of(order)
+    dragged, after = np.zeros(own.frame.size, bool), np.zeros(own.frame.size, bool)
+    time = own.exposure * _APART + own.frame
+    size, strong = np.abs(own.height_dn), own.ratio > STRONG
+    for i in np.flatnonzero(strong):
+        some = slice(*np.searchsorted(time, [time[i], time[i] + NEAR + 1]))
+        here, later = time[some] == time[i], time[some] > time[i]
+        down, right = np.abs(own.row[some] - own.row[i]), np.abs(own.column[some] - own.column[i])
         beside = (down <= NEAR) & (right <= NEAR)
-        if not crowded:
+        if crowded:  # as charge and filters reach, or along a line as a read-out does
+            beside &= (down == 0) | (right == 0) | ((down <= _TWO) & (right <= _TWO))
+        else:
             beside |= (down == 0) | (right == 0)
-        found |= here & beside & (size < _ECHO * size[i])
-        later = hits.frame - hits.frame[i]
-        pixel = own & (down == 0) & (right == 0) & (later > 0) & (later <= NEAR)
-        found |= pixel & (size < _LAG * size[i])
+        dragged[some] |= here & beside & (size[some] < _ECHO * size[i])
+        pixel = (down == 0) & (right == 0)
+        after[some] |= later & pixel & (size[some] < _LAG * size[i])
+    if crowded:
+        around = (2 * _TWO + 1) ** 2 + 4 * (NEAR - _TWO)
+        by_chance = around * float(strong.sum()) / samples * float((~strong).sum())
+        dragged &= dragged.sum() > _TWO * by_chance
+    found = np.zeros(dragged.size, bool)
+    found[order] = dragged | after
     return found
-
-
-def _following(echoes: Hits, spikes: Hits, *, crowded: bool) -> Hits:
-    """Return the echoes of what was taken for spikes."""
-    both = Hits.joined([spikes, echoes])
-    found = _echoes(both, crowded=crowded)
-    return both.of(found & (np.arange(both.frame.size) >= spikes.frame.size))
 
 
 def _returning(hits: Hits, counted: Flags, pixels: int) -> Flags | None:
@@ -226,13 +248,27 @@ def _returning(hits: Hits, counted: Flags, pixels: int) -> Flags | None:
     rate = float(rare.sum()) / pixels
     expected = pixels * scipy.stats.poisson.sf(1, rate)
     twice = int((rare >= _TWO).sum())
-    chance = scipy.stats.poisson.sf(twice - 1, expected) > _TWICE or expected > _MOSTLY * twice
+    chance = scipy.stats.poisson.sf(twice - 1, expected) > _TWICE or expected > _NEARLY * twice
     again = times > (often if chance else 1)
     once = int(((times > 0) & ~again).sum())
     blinks = np.bincount(which[counted & (hits.ratio > STRONG)], minlength=times.size) > 0
     if again.sum() > _RETURNING * once or (again & blinks).sum() > _BLINKING * once:
         return None
-    return np.asarray(again[which])
+    return np.asarray(again[which]) & ~_far_above(hits, which)
+
+
+def _far_above(hits: Hits, which: NDArray[np.intp]) -> Flags:
+    """Return which strong samples are far above all others of their pixel, `which` says.
+
+    A spike may hit a pixel that jumps.
+    """
+    order = np.lexsort((hits.height_dn, which))
+    last = np.append(np.diff(which[order]) != 0, True)
+    below = np.append(0.0, hits.height_dn[order][:-1])
+    below[np.append(True, last[:-1])] = 0.0
+    found = np.zeros(which.size, bool)
+    found[order] = last & (hits.height_dn[order] > _ALONE * np.abs(below))
+    return found & (hits.ratio > STRONG)
 
 
 def _by_chance(rate: float, pixels: int) -> int:

@@ -36,10 +36,11 @@ def shown(
     *,
     some: bool = True,
     own: tuple[Effect, ...] = (),
+    nats: float = 0.1,
 ) -> bool:
     """Return whether all frames of a recording show an effect that was fitted to some.
 
-    `own` are effects that the user's camera has.
+    `own` are effects that the user's camera has; `nats` is what a locked frame gains.
     """
     effects = () if true is None else (true,)
     recording = recorded(camera(*effects), 5, rows=48, columns=64, levels=(400.0, 1600.0))
@@ -56,7 +57,7 @@ def shown(
     search = Search(setting, camera(), final, words, lambda: None, whole=whole)
     named = Named(asked.kind, Proposal(asked, free), {}, 10.0, ())
     without = final.camera.model_copy(update={"effect": own})
-    return shown_by_all(search, final, named, without, trial)
+    return shown_by_all(search, final, named, without, trial, nats)
 
 
 @pytest.mark.parametrize(
@@ -74,6 +75,18 @@ def test_all_frames_show_what_is_there(
     effect: Effect, free: tuple[str, ...], *, there: bool
 ) -> None:
     assert shown(effect if there else None, effect, free) == there
+
+
+@pytest.mark.parametrize("kind", ["prnu", "dsnu"])
+@pytest.mark.parametrize(("nats", "there"), [(1.0, True), (0.01, True), (1.0, False)])
+def test_a_map_is_shown_where_locked_frames_bear_it_out(
+    kind: str, nats: float, *, there: bool
+) -> None:
+    """What each pixel has for good is in locked frames as well: they must say so, if faintly."""
+    size = {"prnu": {"sigma_percent": 0.5}, "dsnu": {"sigma_dn": 1.5}}[kind]
+    effect = registry()[kind](**size)
+    told = shown(effect if there else None, effect, tuple(size), nats=nats)
+    assert told == (there and nats == 1.0)
 
 
 @pytest.mark.parametrize(
@@ -117,7 +130,7 @@ def test_jumps_are_shown_where_frames_locate_or_tell_them(
     trial: Any = Stub(lines=lines)
     without: Any = Stub(effect=(JUMPS,) if known else ())
     named = Named("rts", Proposal(JUMPS, ("pixel_fraction",)), {}, 10.0, ())
-    told = shown_by_all(search, none, named, without, trial)
+    told = shown_by_all(search, none, named, without, trial, 0.1)
     assert told == ((located or rather) and not known)
 
 

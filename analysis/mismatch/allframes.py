@@ -5,14 +5,17 @@ where it may be seen in one exposure only. The odds of locked frames alone then 
 they are worth. Those of all frames are their product with those of the frames before: asked for is
 what takes an effect into a search, once the numbers that were chosen are paid for.
 
-Few pixels that jump are as rarely seen: most stay where they are in two frames.
+Few pixels that jump are as rarely seen: most stay where they are in two frames. Of what each pixel
+has for good locked frames are a few more, which say little by themselves: where they gain by it at
+odds that tell two effects apart, those of all frames count.
 """
 
+from analysis.mismatch.candidates import Proposal
 from analysis.mismatch.instance import LINES, same_place
 from analysis.mismatch.name import Search
 from analysis.mismatch.named import Named
 from analysis.mismatch.proposed import replicates_for
-from analysis.mismatch.rank import SURE_GAIN
+from analysis.mismatch.rank import SURE_GAIN, TOLD_APART
 from analysis.mismatch.resolved import gained
 from analysis.mismatch.state import State
 from analysis.mismatch.trial import Trial
@@ -21,13 +24,16 @@ from dsis.effects import Effect
 
 _OF_FRAMES = frozenset({"frame_variance"})
 _JUMPS = "rts"
+_MAPS = frozenset({"dsnu", "prnu"})
 _ONE_PHASE = LINES | {"line_flicker"}
 
 
-def shown_by_all(search: Search, final: State, named: Named, without: Camera, trial: Trial) -> bool:
+def shown_by_all(
+    search: Search, final: State, named: Named, without: Camera, trial: Trial, nats: float
+) -> bool:
     """Return whether all frames of a small recording show an effect, at odds that take it in.
 
-    `without` is the camera without it.
+    `without` is the camera without it; `nats` what each locked frame gains by it.
     """
     own = named.proposal
     if own is None or search.whole is None:
@@ -36,7 +42,10 @@ def shown_by_all(search: Search, final: State, named: Named, without: Camera, tr
         known = any(one.kind == _JUMPS for one in without.effect)
         lines = trial.lines
         return not known and (lines.jumping(search.least_odds) or lines.jump_rather(SURE_GAIN))
-    if not once_a_frame(own.effect):
+    told = once_a_frame(own.effect) or (
+        own.effect.kind in _MAPS and nats * trial.numbers.frames >= TOLD_APART
+    )
+    if not told:
         return False
     alone = not any(same_place(own.effect, one, search.whole.layout) for one in without.effect)
     # Of its amplitude; its place is paid for.
@@ -44,10 +53,17 @@ def shown_by_all(search: Search, final: State, named: Named, without: Camera, tr
         return True
     if own.effect.kind in LINES:  # one number of the bank says less of them than frames do
         return False
+    return _by_numbers(search, final, own, without) >= SURE_GAIN
+
+
+def _by_numbers(search: Search, final: State, own: Proposal, without: Camera) -> float:
+    """Return what numbers of all frames gain by an effect, less its price, nats."""
+    if search.whole is None:
+        return 0.0
     state = search.of_all(final.camera)
     bare = State.of(search.whole, without, search.step, near=state)
     replicates = replicates_for(search.setting, [own.effect])
-    return gained(state, bare, own.effect, replicates) - own.price >= SURE_GAIN
+    return gained(state, bare, own.effect, replicates) - own.price
 
 
 def once_a_frame(effect: Effect) -> bool:

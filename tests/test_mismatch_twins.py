@@ -124,3 +124,15 @@ def test_what_explains_more_but_nothing_of_the_same_is_no_twin(
     monkeypatch.setattr(ties, "ranked", lambda *_: [other])
     assert twin(_state(), _ranked("readout_memory", 80.0, MEMORY), {"crosstalk"}, Memory(),
                 lambda: None) is None  # fmt: skip
+
+
+@pytest.mark.parametrize(("gain", "told"), [(23.0, False), (30.0, False), (20.0, True)])
+def test_two_paths_apart_are_not_told_from_a_bend_that_has_no_word(
+    monkeypatch: pytest.MonkeyPatch, gain: float, *, told: bool
+) -> None:
+    other = _ranked("nonlinearity", gain, (5.0, 1.0))
+    monkeypatch.setattr(ties, "ranked", lambda *_: [other])
+    best = _ranked("dual_gain_mismatch", 24.0, MEMORY)
+    assert twin(_state(), best, {"nonlinearity"}, Memory(), lambda: None) is None
+    found = twin(_state(), best, {"saturation"}, Memory(), lambda: None)
+    assert found is (None if told else other)

@@ -29,6 +29,7 @@ _KEEPS_VARIANCE = ("spatial_filtering", {"spatial_filtering", "readout_memory"})
 _OF_LAGS = "readout_memory"
 _SOME = 0.2  # cosine of what two effects change, above which one may hide in the other
 _TWINS = {
+    "dual_gain_mismatch": ("nonlinearity",),
     "tap_mismatch": ("channel_imbalance",),
     "readout_memory": ("crosstalk", "spatial_filtering"),
     "spatial_filtering": ("readout_memory",),
@@ -110,7 +111,8 @@ def twin(
     Amplifiers of even and odd rows do nearly what greens that differ do to a mosaic whose light
     is of unknown colour: only the noise of each channel tells. Correlations have no side: memory of
     the sample before may be charge that neighbours exchange, or a filter, and such charge a filter,
-    which makes read noise alike, too. Noise that differs from pixel to pixel has heavy tails in all
+    which makes read noise alike, too. Few levels beyond where a read-out path begins may bend there
+    as all do. Noise that differs from pixel to pixel has heavy tails in all
     of them together; pixels that jump at every other frame are noisy ones. Where that explains
     more, and also what the best leaves alone, so much the more; but not where it leaves alone what
     the best explains, as charge of neighbours does what samples two apart have in common.

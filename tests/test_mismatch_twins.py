@@ -132,6 +132,7 @@ def test_two_paths_apart_are_not_told_from_a_bend_that_has_no_word(
 ) -> None:
     other = _ranked("nonlinearity", gain, (5.0, 1.0))
     monkeypatch.setattr(ties, "ranked", lambda *_: [other])
+    monkeypatch.setattr(ties, "smooth_as_well", lambda *_: False)
     best = _ranked("dual_gain_mismatch", 24.0, MEMORY)
     assert twin(_state(), best, {"nonlinearity"}, Memory(), lambda: None) is None
     found = twin(_state(), best, {"saturation"}, Memory(), lambda: None)

@@ -482,3 +482,18 @@ def test_what_resembles_spikes_is_left_alone(
     recording = made(100 + seed, change, clean=clean, frames=frames)
     assert found(recording) is None
     assert without_spikes(recording, MODEL)[0] is recording
+
+
+@pytest.mark.parametrize(("moving", "count", "left"), [(0.0, 400, False), (12.0, 400, True),
+                                                       (12.0, 30, False)])  # fmt: skip
+def test_many_spikes_are_left_where_lines_move_more_than_pixels(
+    moving: float, count: int, *, left: bool
+) -> None:
+    """Lower ones, which no pixel tells from its line, would look like what they are not."""
+
+    def change(rng: np.random.Generator, stacks: dict[str, Array]) -> None:
+        spikes(count, 3000.0)(rng, stacks)
+        for name, own in stacks.items():
+            stacks[name] = own + rng.normal(0, moving, (*own.shape[:2], 1))
+
+    assert (found(made(2, change)) is None) == left

@@ -16,6 +16,7 @@ from analysis.mismatch.spikes.screen import (
     far_samples,
     movement,
     noise_dn,
+    of_lines,
     reference,
     thinned,
 )
@@ -93,11 +94,14 @@ class Looked:
         Its far samples.
     noise_dn, level_dn
         By row and column of the colour filter: (2, 2).
+    of_lines
+        Share of the spread of samples that is that of whole lines.
     """
 
     hits: Hits
     noise_dn: Array
     level_dn: Array
+    of_lines: float
 
 
 def hits_of(
@@ -125,7 +129,8 @@ def hits_of(
         moved.append(own)
         count += len(found)
     places = _all_of_the_often_far(places)
-    return Looked(_exact(watch, source, places, moved, number), watch.noise, watch.level)
+    hits = _exact(watch, source, places, moved, number)
+    return Looked(hits, watch.noise, watch.level, watch.of_lines)
 
 
 def _all_of_the_often_far(places: list[Places]) -> list[Places]:
@@ -148,6 +153,7 @@ class _Watch:
     noises: float
     noise: Array
     level: Array
+    of_lines: float
     black: float
     white: float
     step: int
@@ -183,7 +189,10 @@ class _Watch:
             sd = np.sqrt(np.maximum(sd**2, line))
         farthest = np.ascontiguousarray(noises * sd, np.float32)
         white = recording.sensor.white_level
-        return cls(exposure, middles, farthest, noises, noise, level, black, white, step, camera)
+        lines = of_lines(pair[0], pair[1], step)
+        return cls(
+            exposure, middles, farthest, noises, noise, level, lines, black, white, step, camera
+        )
 
     def middle(self, frame: int) -> Codes:
         return self.middles[frame % len(self.middles)]

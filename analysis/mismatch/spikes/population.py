@@ -39,6 +39,7 @@ _ALONE = 3.0  # times as high as all others of its pixel a spike is that hits on
 _ECHO = 0.1  # of a spike: as much smaller a sample in its row, its column or around it follows it
 _LAG = 0.3  # of a spike, that stays at its pixel
 _APART = 1 << 20  # exposures, in frames
+_LINED = 0.3  # of the spread of samples, that lines make
 _CROWDED = 0.2  # strong spikes of a frame in the row or the column of a sample
 NEAR = 4  # rows and columns, and frames after
 
@@ -77,14 +78,15 @@ class Spikes:
 def spikes_of(recording: Recording, source: Source, camera: Camera) -> Spikes | None:
     """Return rare strong spikes; None: there are none that a law of noise could not make.
 
-    A camera that has impulses already is asked nothing.
+    Of many, lower ones are told as well, or all are left where they are: where lines move by more
+    than pixels, no pixel tells them. A camera that has impulses already is asked nothing.
     """
     if any(effect.kind == "impulse" for effect in camera.effect):
         return None
     found = _seen(recording, source, camera, FAR)
     if found is None or found.hits.frame.size <= _MANY * _samples(recording):
         return found
-    return _seen(recording, source, camera, LOW) or found
+    return _seen(recording, source, camera, LOW)
 
 
 def _seen(recording: Recording, source: Source, camera: Camera, farthest: float) -> Spikes | None:
@@ -104,7 +106,8 @@ def _seen(recording: Recording, source: Source, camera: Camera, farthest: float)
             return None
         else:
             uniform[number] = looked
-    if not uniform:
+    lined = any(own.of_lines > _LINED for own in uniform.values())
+    if not uniform or (lined and farthest <= LOW):
         return None
     hits = Hits.joined([*(own.hits for own in uniform.values()), *(own.hits for own in scenes)])
     lines = 1 / recording.rows + 1 / recording.columns

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from analysis.mismatch import judge
 from analysis.mismatch.candidates import Proposal, measured
 from analysis.mismatch.contradicted import Denial
+from analysis.mismatch.instance import unmeasured
 from analysis.mismatch.named import Named
 from analysis.mismatch.phase import WholeFrames
 from dsis.effects import Effect, registry
@@ -79,6 +80,28 @@ def test_amplitudes_are_what_was_planted(kind: str, at: tuple[float, float], off
     off_by = np.array([np.subtract(one.frequency, true) / one.frequency_error for one in known])
     off_by *= np.array([ROWS / COLUMNS, 1.0]) ** -1  # the error stated is that of the shorter side
     assert 0.3 < (off_by**2).mean() < 2.0
+
+
+def test_a_frequency_is_less_known_where_each_frame_hardly_shows_its_phase() -> None:
+    """Of noise that has two thirds of a line's power in a frame, products of noise add as much."""
+    at = (0.11, -0.23)
+    effect = registry()["periodic_noise"](amplitude_dn=0.09, frequency=at)
+    found = [_seen(effect, at, seed).line(effect) for seed in range(60)]
+    known = [one for one in found if one is not None]
+    assert len(known) > 20
+    off_by = np.array([np.subtract(one.frequency, at) / one.frequency_error for one in known])
+    off_by *= np.array([COLUMNS / ROWS, 1.0])
+    assert 0.6 < (off_by**2).mean() < 1.5
+
+
+@pytest.mark.parametrize(
+    ("at", "error"),
+    [((0.25, 0.5), 0.0), ((0.125, -0.375), 0.0), ((0.11, -0.23), 1 / 48 / 12**0.5)],
+)
+def test_a_frequency_that_was_not_measured_lies_between_two_waves(
+    at: tuple[float, float], error: float
+) -> None:
+    assert unmeasured(at, LAYOUT) == pytest.approx(error)
 
 
 def test_noise_has_no_amplitude() -> None:

@@ -22,7 +22,7 @@ from analysis.mismatch.finding import (
     Proof,
     Verdict,
 )
-from analysis.mismatch.instance import kind_of
+from analysis.mismatch.instance import kind_of, unmeasured
 from analysis.mismatch.jumping import Jumping
 from analysis.mismatch.layout import Layout
 from analysis.mismatch.model import both, processes
@@ -323,8 +323,7 @@ def _finding(
         for name, after in [explanations[m.statistic]]
     )
     omitted = tuple(
-        _omitted(n, because(explanations, n.name), gains[n.name], final.calibrated)
-        for n in search.named
+        _omitted(n, because(explanations, n.name), gains[n.name], final) for n in search.named
     )
     verdict: Verdict = "match"
     if omitted:
@@ -360,9 +359,7 @@ def _finding(
     )
 
 
-def _omitted(
-    named: Named, why: tuple[str, ...], gain: Gain, calibrated: Calibrated
-) -> OmittedEffect:
+def _omitted(named: Named, why: tuple[str, ...], gain: Gain, final: State) -> OmittedEffect:
     parameters, choices = {}, {}
     if named.proposal is not None:
         effect = named.proposal.effect
@@ -374,14 +371,15 @@ def _omitted(
             elif named.light is not None and name not in named.proposal.errors:
                 continue  # the field has it
             elif isinstance(value, tuple):
-                parameters[name] = FittedParameter(value, named.proposal.errors.get(name, 0.0))
+                least = unmeasured(value, final.setting.layout) if name == "frequency" else 0.0
+                parameters[name] = FittedParameter(value, named.proposal.errors.get(name, least))
             elif isinstance(value, (int, float)) and not isinstance(value, bool):
                 own = named.proposal
                 known = np.inf if name in own.free else own.errors.get(name, 0.0)
                 error = named.errors.get(name, known)
                 parameters[name] = FittedParameter(float(value), error)
     else:
-        switch = as_settled(calibrated, named.switch_dn, named.errors["switch_dn"])
+        switch = as_settled(final.calibrated, named.switch_dn, named.errors["switch_dn"])
         parameters["switch_dn"] = FittedParameter(*switch)
     rivals = tuple(
         Alternative(

@@ -1,5 +1,7 @@
 """Which of its kind an effect is: lines have frequencies of their own, decays their edges."""
 
+from math import sqrt
+
 from analysis.mismatch.layout import Layout
 from dsis.effects import Effect
 from dsis.effects.line_flicker import LineFlicker
@@ -7,6 +9,7 @@ from dsis.effects.line_settling import LineSettling
 
 LINES = frozenset({"periodic_noise", "bistable_pattern"})
 Frequency = tuple[float, float]
+_FEW_PIXELS = 8
 _SAME = 1.5  # bins: a frequency is known no better than where it stands between two
 
 
@@ -16,6 +19,16 @@ def frequency_of(effect: Effect | None) -> Frequency | None:
         return None
     found: Frequency = effect.frequency  # type: ignore[attr-defined] # both lines have one
     return found
+
+
+def unmeasured(frequency: Frequency, layout: Layout) -> float:
+    """Return the standard error of a frequency that frames do not measure, cycles per pixel.
+
+    It is anywhere between two of the waves that fit into a frame; what repeats over two, four or
+    eight pixels lies where it lies.
+    """
+    exact = all((_FEW_PIXELS * f) % 1 == 0 for f in frequency)
+    return 0.0 if exact else 1 / sqrt(12) / min(layout.rows, layout.columns)
 
 
 def instance(kind: str, effect: Effect | None) -> str:

@@ -177,6 +177,15 @@ class Power:
         )
         return float(np.sqrt(1.5 / max(total, 1e-9)) / np.pi)
 
+    def bins_apart(self, power: float) -> float:
+        """Return the same of frames that do not know one another's phase.
+
+        Of a line of power s beside noise of 1 in each, noise times noise adds a share of 1 / s.
+        """
+        each = [power * w for w in self.weights]
+        told = sum((len(own) - 1) * s**2 / (1 + s) for own, s in zip(self.found, each, strict=True))
+        return float(np.sqrt(1.5 / max(told, 1e-9)) / np.pi)
+
     def chance(self, *, real: bool) -> float:
         """Return the chance of as much at the first frequency: a sum of squares as Gamma's.
 

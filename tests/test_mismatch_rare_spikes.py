@@ -157,14 +157,15 @@ def test_of_thousands_none_that_could_be_seen_is_left(seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", range(2))
-def test_what_low_spikes_leave_is_foretold(seed: int) -> None:
-    """Of their fourth moments; a sample beside each has a twentieth of it, shown or not."""
+@pytest.mark.parametrize(("factor", "power"), [(0.05, 1), (2e-5, 2)])
+def test_what_low_spikes_leave_is_foretold(seed: int, factor: float, power: int) -> None:
+    """Of their fourth moments; a sample beside each has some of it, shown or not."""
 
     def dragging(rng: np.random.Generator, stacks: dict[str, Array]) -> None:
         before = {name: own.copy() for name, own in stacks.items()}
         spikes(1500, 1500.0)(rng, stacks)
         for name, own in stacks.items():
-            own[:, :, 1:] += 0.05 * (own - before[name])[:, :, :-1]
+            own[:, :, 1:] += factor * (own - before[name])[:, :, :-1] ** power
 
     stored, quiet = made(seed, dragging), made(seed)
     own, _, some = without_spikes(stored, MODEL)
@@ -179,14 +180,14 @@ def test_what_low_spikes_leave_is_foretold(seed: int) -> None:
             left = stored.frame(exposure, k).astype(float) - quiet.frame(exposure, k)
             seen += float((np.where(put_aside, 0.0, left) ** 4).mean()) / noise**4
         foretold += 12 * found[exposure.name] / noise**4
-    assert foretold == pytest.approx(seen, rel=0.3)
+    assert 0.7 * seen < foretold < 1.6 * seen  # the larger of both laws
 
 
 def test_a_flat_next_to_white_foretells_nothing_of_low_spikes() -> None:
     """There is no room for spikes above it, whatever their law."""
 
     def bright(rng: np.random.Generator, stacks: dict[str, Array]) -> None:
-        stacks["flat-2"] += WHITE - BLACK - 1500 - 300  # eight noises below white, nearly
+        stacks["flat-2"] += WHITE - BLACK - 1500 - 200  # eight noises below white, nearly
         spikes(400, 1500.0)(rng, stacks)
 
     stored = made(3, bright)
@@ -194,7 +195,7 @@ def test_a_flat_next_to_white_foretells_nothing_of_low_spikes() -> None:
     assert some is not None
     low = left_dn4(some, stored)
     assert "flat-1" in low
-    assert low.get("flat-2", 0.0) < low["flat-1"] * 10
+    assert "flat-2" not in low
 
 
 def test_a_spike_on_a_pixel_that_jumps_is_put_aside_and_its_jumps_are_not() -> None:
@@ -214,14 +215,15 @@ def test_a_spike_on_a_pixel_that_jumps_is_put_aside_and_its_jumps_are_not() -> N
     assert (values[jumps] > BLACK + 20).all()
 
 
-def test_tails_of_noise_are_no_echoes_of_many_spikes() -> None:
-    """Far samples of a t of five degrees are everywhere, around spikes no more than by chance."""
+@pytest.mark.parametrize(("freedom", "count"), [(5, 3000), (8, 1000)])
+def test_tails_of_noise_are_no_echoes_of_many_spikes(freedom: float, count: int) -> None:
+    """Far samples of Student's t are everywhere, around spikes no more than by chance."""
 
     def heavy(rng: np.random.Generator, mean: Array) -> Array:
-        return np.asarray(mean + 3.0 * rng.standard_t(5, mean.shape))
+        return np.asarray(mean + 3.0 * rng.standard_t(freedom, mean.shape))
 
     def many(rng: np.random.Generator, stacks: dict[str, Array]) -> None:
-        spikes(3000, 3000.0)(rng, stacks)
+        spikes(count, 3000.0)(rng, stacks)
 
     some = found(made(5, many, clean=heavy))
     assert some is not None

@@ -10,7 +10,7 @@ has for good locked frames are a few more, which say little by themselves: where
 odds that tell two effects apart, those of all frames count.
 """
 
-from analysis.mismatch.candidates import Proposal
+from analysis.mismatch.candidates import CANDIDATES, Proposal
 from analysis.mismatch.instance import LINES, same_place
 from analysis.mismatch.name import Search
 from analysis.mismatch.named import Named
@@ -33,7 +33,8 @@ def shown_by_all(
 ) -> bool:
     """Return whether all frames of a small recording show an effect, at odds that take it in.
 
-    `without` is the camera without it; `nats` what each locked frame gains by it.
+    `without` is the camera without it; `nats` what locked frames gain by it in all. Of maps beside
+    which something is left that calls for them nothing is said.
     """
     own = named.proposal
     if own is None or search.whole is None:
@@ -43,7 +44,7 @@ def shown_by_all(
         lines = trial.lines
         return not known and (lines.jumping(search.least_odds) or lines.jump_rather(SURE_GAIN))
     told = once_a_frame(own.effect) or (
-        own.effect.kind in _MAPS and nats * trial.numbers.frames >= TOLD_APART
+        own.effect.kind in _MAPS and nats >= TOLD_APART and not _called(final, own.effect.kind)
     )
     if not told:
         return False
@@ -54,6 +55,10 @@ def shown_by_all(
     if own.effect.kind in LINES:  # one number of the bank says less of them than frames do
         return False
     return _by_numbers(search, final, own, without) >= SURE_GAIN
+
+
+def _called(state: State, kind: str) -> bool:
+    return any(m.statistic in CANDIDATES[kind].calls for m in state.mismatches)
 
 
 def _by_numbers(search: Search, final: State, own: Proposal, without: Camera) -> float:

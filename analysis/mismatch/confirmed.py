@@ -284,8 +284,8 @@ def _gained(search: Search, final: State, trial: Trial) -> dict[str, Gained]:
             moved = _frame_by_frame(search, final, named, cameras[named.name], trial, one)
             if moved is not None:
                 told[named.name] = moved
-            elif (nats := max(one.gain.nats_per_frame, other.gain.nats_per_frame)) > 0 and (
-                shown_by_all(search, final, named, cameras[named.name], trial, nats)
+            elif max(one.gain.nats_per_frame, other.gain.nats_per_frame) > 0 and shown_by_all(
+                search, final, named, cameras[named.name], trial, one.nats
             ):
                 best = max(one, other, key=lambda own: own.gain.nats_per_frame)
                 told[named.name] = replace(best, certain=True)

@@ -13,6 +13,7 @@ from analysis.mismatch.layout import Place
 from analysis.mismatch.leftopen import left_open
 from analysis.mismatch.recalibrate import code_step
 from analysis.mismatch.resolved import CLEAR, FAR_OFF
+from analysis.mismatch.sidedneighbours import SHARED
 from analysis.mismatch.state import State
 from dsis.effects.adc_dnl import AdcDnl
 from dsis.effects.impulse import Impulse
@@ -27,6 +28,7 @@ _ALIKE = frozenset(
     }
 )  # fmt: skip
 _MOST = 0.5  # of tails, that something else may feign
+_LITTLE = 0.05  # of tails, that spikes may feign whose neighbours have some of them
 _SOME = 0.2  # of tails, that spikes may feign beside others that lean as they do
 _TALL = 20.0  # standard deviations, that no noise of some lines has
 _SCATTER = 1.84  # see `coded`
@@ -93,7 +95,8 @@ def underlaid(state: State, kind: str, without: Array) -> Denial | None:
 
     Beside many strong spikes there are weaker ones by the same law: what these add to the kurtosis
     is known. Where it is half of what tails would explain, or a fifth and darks lean up, there may
-    be none.
+    be none; nor where it is a twentieth and what makes neighbours alike is named, for the samples
+    around all spikes then have some of them.
     """
     low = state.setting.low_spikes_dn4
     if kind not in _TAILS or not low:
@@ -107,7 +110,10 @@ def underlaid(state: State, kind: str, without: Array) -> Denial | None:
         claimed = float(state.null.mean[i] - without[i]) / float(state.null.sd[i]) ** 2
         whole += claimed * float(state.null.mean[i] - without[i])
         fake += claimed * low.get(key.exposure, 0.0) / max(level.variance_dn2, 1e-9) ** 2
-    if whole <= 0 or fake <= (_SOME if _darks_lean_up(state) else _MOST) * whole:
+    least = _SOME if _darks_lean_up(state) else _MOST
+    if not SHARED.isdisjoint(effect.kind for effect in state.camera.effect):
+        least = _LITTLE
+    if whole <= 0 or fake <= least * whole:
         return None
     return Denial(max(1 - fake / whole, 0.0), "spikes too low to be counted make tails as well")
 

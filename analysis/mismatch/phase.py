@@ -133,7 +133,7 @@ class WholeFrames(FramesAsked):
 
         What frames of an exposure have in common is taken off: free phases that agree by chance are
         an error, signs are integrated over. Errors of frequencies are those of a sinusoid in white
-        noise (Rife & Boorstyn, 1974), larger of frames that do not know one another's phase.
+        noise (Rife & Boorstyn, 1974), larger since powers of frames are added, not amplitudes.
         """
         frequency = frequency_of(effect)
         if frequency is None or self.denial(effect) is not None:
@@ -148,8 +148,7 @@ class WholeFrames(FramesAsked):
         pixels = self.layout.rows * self.layout.columns
         unit = float(np.sqrt(power * seen.crest / (pixels if real else pixels / 4)))
         at = frequency if seen.frequency is None else seen.frequency
-        bins = seen.line.bins(power) if kept else seen.line.bins_apart(power)
-        off = 0.0 if at == frequency else bins / min(self._size)
+        off = 0.0 if at == frequency else seen.line.bins_apart(power) / min(self._size)
         return Line(unit * strength, unit * error, at, off)
 
     def gain(self, effect: Effect) -> float:

@@ -178,7 +178,7 @@ class Power:
         return float(np.sqrt(1.5 / max(total, 1e-9)) / np.pi)
 
     def bins_apart(self, power: float) -> float:
-        """Return the same of frames that do not know one another's phase.
+        """Return the same where powers of frames are added, whatever their phases.
 
         Of a line of power s beside noise of 1 in each, noise times noise adds a share of 1 / s.
         """

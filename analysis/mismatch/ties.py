@@ -27,6 +27,7 @@ _BY_CODES = "quantisation"
 _FAR_AHEAD = 25.0  # nats, that no numbers have by chance
 _KEEPS_VARIANCE = ("spatial_filtering", {"spatial_filtering", "readout_memory"})
 _OF_LAGS = "readout_memory"
+_OF_SWITCH = "dual_gain_mismatch"
 _SOME = 0.2  # cosine of what two effects change, above which one may hide in the other
 _TWINS = {
     "dual_gain_mismatch": ("nonlinearity",),
@@ -136,11 +137,11 @@ def akin(pairs: Sequence[tuple[Ranked, Ranked | Path]]) -> frozenset[str]:
 
     Of tails and of noise that differs from pixel to pixel neither is told; then pixels that jump,
     which explain less of the same, are no third. Memory that ties is told from memory of another
-    lag: see `of_tied_lag`.
+    lag: see `of_tied_lag`; a step where a path begins from what bends levels all over.
     """
     kinds = {one.kind for pair in pairs for one in pair}
     found = {kind for kind, own in _TWINS.items() if kinds.intersection(own)}
-    return frozenset(found - (kinds & {_OF_LAGS}))
+    return frozenset(found - (kinds & {_OF_LAGS}) - ({_OF_SWITCH} - kinds))
 
 
 def of_tied_lag(pairs: Sequence[tuple[Ranked, Ranked | Path]], effect: Effect) -> bool:

@@ -49,10 +49,11 @@ _ERRORS = 2.2  # standard errors from a gain to the end of its interval, of few 
 
 @dataclass(frozen=True)
 class Gained:
-    """A gain per locked frame with its interval, and whether chance is ruled out."""
+    """A gain per locked frame with its interval, whether chance is ruled out, and nats in all."""
 
     gain: Gain
     certain: bool
+    nats: float = 0.0
 
 
 def exceeds(gain: Gain) -> bool:
@@ -69,7 +70,8 @@ def _of_pixels(gain: Gain, frames: int) -> Gained:
     mention (Kass & Raftery, Journal of the American Statistical Association 90, 1995).
     """
     total = gain.nats_per_frame * frames
-    return Gained(gain, exceeds(gain) and total > _BARE and (gain.ci95[0] > 0 or total > _TOTAL))
+    sure = exceeds(gain) and total > _BARE and (gain.ci95[0] > 0 or total > _TOTAL)
+    return Gained(gain, sure, total)
 
 
 def denied(gain: Gain, frames: int) -> bool:

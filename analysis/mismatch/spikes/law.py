@@ -100,46 +100,68 @@ def law_of(spikes: Spikes, recording: Recording, frames: Frames) -> SpikeLaw | N
 def left_dn4(spikes: Spikes | None, recording: Recording) -> dict[str, float]:
     """Return what spikes that are too low to be put aside add to fourth moments, DN^4, by exposure.
 
-    Of exponential heights of mean m below a limit L: s m^4 times the integral of x^4 exp(-x) from 0
-    to L / m. Noise beside them, and what it makes of that of their pixel, moves the limit outwards
-    on the whole, as high powers have it. So do the samples around spikes that have a share of them,
-    as often as they are seen.
+    Noise beside them, and what it makes of that of their pixel, moves the limit outwards on the
+    whole, as high powers have it. So do the samples around spikes that have something of them, as
+    often as they are seen: a share of the height, or of its square as of charge that repels charge,
+    whichever is more.
     """
     everything = {e.name: range(len(e.frames)) for e in recording.exposures}
     law = None if spikes is None else law_of(spikes, recording, everything)
     if spikes is None or law is None:
         return {}
-    shares, times = _echoed(spikes)
-    means = np.append(shares, 1.0) * law.mean_dn
-    fourth = np.append(times, 1.0) * law.share * gamma(_FOURTH + 1) * means**_FOURTH
+    themselves = _Dragged(1, np.ones(1), np.ones(1))
+    around = [_Dragged.of(spikes, power) for power in (1, 2)]
     found: dict[str, float] = {}
     for number, noise in spikes.quiet_dn.items():
         sites = noise[np.isfinite(noise)]
         if not sites.size:
             continue  # at the white level: there is no room for them
-        ends = (spikes.lowest + _BLURRED) * sites.reshape(-1, 1) / means
-        below = gammainc(_FOURTH + 1, ends).mean(0) * sites.size / noise.size
-        found[recording.exposures[number].name] = float(fourth @ below)
+        ends = (spikes.lowest + _BLURRED) * sites
+        more = max(own.below_dn4(law, ends) for own in around)
+        left = (themselves.below_dn4(law, ends) + more) * sites.size / noise.size
+        found[recording.exposures[number].name] = left
     return found
 
 
-def _echoed(spikes: Spikes) -> tuple[Array, Array]:
-    """Return which shares of a spike samples around it have, and how often: one for each seen.
+@dataclass(frozen=True)
+class _Dragged:
+    """Samples that have c h^p of a spike of height h: factors c, and how many a spike has."""
 
-    Of so many spikes that are as high as to show it.
-    """
-    hits, echoes = spikes.hits, spikes.echoes
-    if not echoes.frame.size:
-        return np.zeros(0), np.zeros(0)
-    at, here = (np.stack([_FAR_OFF * own.exposure, _FAR_OFF * own.frame, own.row, own.column], 1)
-                for own in (hits, echoes))  # fmt: skip
-    near = KDTree(at).query_ball_point(here, NEAR, p=np.inf)
-    tallest = np.array([max(hits.height_dn[own], default=np.inf) for own in near])
-    shares = echoes.height_dn / tallest
-    shares = shares[shares > 0]
-    seen = np.sort(hits.height_dn / (spikes.lowest * hits.noise_dn))
-    shown = seen.size - np.searchsorted(seen, 1 / shares)
-    return shares, 1 / np.maximum(shown, 1)
+    power: int
+    factors: Array
+    times: Array
+
+    @classmethod
+    def of(cls, spikes: Spikes, power: int) -> "_Dragged":
+        """Return those seen around spikes, of so many as are high enough to show them."""
+        hits, echoes = spikes.hits, spikes.echoes
+        if not echoes.frame.size:
+            return cls(power, np.zeros(0), np.zeros(0))
+        at, here = (
+            np.stack([_FAR_OFF * own.exposure, _FAR_OFF * own.frame, own.row, own.column], 1)
+            for own in (hits, echoes)
+        )
+        near = KDTree(at).query_ball_point(here, NEAR, p=np.inf)
+        tallest = np.array([max(hits.height_dn[own], default=np.inf) for own in near])
+        factors = echoes.height_dn / tallest**power
+        factors = factors[factors > 0]
+        seen = np.sort(hits.height_dn**power / (spikes.lowest * hits.noise_dn))
+        shown = seen.size - np.searchsorted(seen, 1 / factors)
+        return cls(power, factors, 1 / np.maximum(shown, 1))
+
+    def below_dn4(self, law: SpikeLaw, ends_dn: Array) -> float:
+        """Return the mean fourth power of those below some limits, of all samples.
+
+        Of exponential heights of mean m, up to H: s c^4 m^(4p) times the integral of x^(4p) exp(-x)
+        from 0 to H / m, with c H^p the limit.
+        """
+        if not self.factors.size:
+            return 0.0
+        order = _FOURTH * self.power
+        highest = (ends_dn[:, np.newaxis] / self.factors) ** (1 / self.power)
+        below = gammainc(order + 1, highest / law.mean_dn).mean(0) * gamma(order + 1)
+        each = self.times * self.factors**_FOURTH * law.mean_dn**order
+        return law.share * float(each @ below)
 
 
 def heldout_gain(

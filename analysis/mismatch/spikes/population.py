@@ -84,9 +84,9 @@ def spikes_of(recording: Recording, source: Source, camera: Camera) -> Spikes | 
     if any(effect.kind == "impulse" for effect in camera.effect):
         return None
     found = _seen(recording, source, camera, FAR)
-    if found is None or found.hits.frame.size <= _MANY * _samples(recording):
+    if found is None or found.lowest > LOW:
         return found
-    return _seen(recording, source, camera, LOW)
+    return _seen(recording, source, camera, LOW) or found
 
 
 def _seen(recording: Recording, source: Source, camera: Camera, farthest: float) -> Spikes | None:
@@ -106,14 +106,13 @@ def _seen(recording: Recording, source: Source, camera: Camera, farthest: float)
             return None
         else:
             uniform[number] = looked
-    lined = any(own.of_lines > _LINED for own in uniform.values())
-    if not uniform or (lined and farthest <= LOW):
+    if not uniform:
         return None
     hits = Hits.joined([*(own.hits for own in uniform.values()), *(own.hits for own in scenes)])
     lines = 1 / recording.rows + 1 / recording.columns
     crowded = lines * float((hits.ratio > STRONG).sum()) > _CROWDED * _frames(recording)
-    count = _samples(recording)
-    echo = _echoes(hits, count, crowded=crowded)
+    count, lined = _samples(recording), any(own.of_lines > _LINED for own in uniform.values())
+    echo = _echoes(hits, recording, crowded=crowded)
     again = _returning(hits, ~echo, recording.rows * recording.columns)
     if again is None:
         return None
@@ -121,6 +120,9 @@ def _seen(recording: Recording, source: Source, camera: Camera, farthest: float)
     once = alone & (np.abs(hits.ratio) > SPIKE)
     in_uniform, electron = np.isin(hits.exposure, list(uniform)), _electron_dn(camera, uniform)
     if not _certain(hits.of(once & in_uniform), electron, count):
+        return None
+    many = (once & in_uniform).sum() > _MANY * count
+    if many and lined:
         return None
     spikes = hits.of(once & (hits.ratio > 0))
     spikes = spikes.of(np.argsort(-spikes.ratio, kind="stable"))
@@ -131,9 +133,9 @@ def _seen(recording: Recording, source: Source, camera: Camera, farthest: float)
         for number, own in uniform.items()
     }
     both = Hits.joined([spikes, hits.of(echo & ~again)])
-    following = _echoes(both, count, crowded=crowded)
+    following = _echoes(both, recording, crowded=crowded)
     following[: spikes.frame.size] = False
-    lowest = LOW if lower.frame.size else SPIKE
+    lowest = LOW if many else SPIKE
     return Spikes(spikes, both.of(following), lower, quiet, lowest)
 
 
@@ -205,11 +207,11 @@ def _frames(recording: Recording) -> int:
     return sum(len(exposure.frames) for exposure in recording.exposures)
 
 
-def _echoes(hits: Hits, samples: int, *, crowded: bool) -> Flags:
+def _echoes(hits: Hits, recording: Recording, *, crowded: bool) -> Flags:
     """Return which samples a much stronger one of the frame, or of a frame before, drags along.
 
-    Where spikes are `crowded`, any has others in its row and its column: only around it are they
-    its own, and not where chance puts half as many there.
+    Not where chance puts half as many there. Where spikes are `crowded`, any has others in its row
+    and its column: only around it are they its own.
     """
     order = np.lexsort((hits.frame, hits.exposure))
     own = hits.of(order)
@@ -228,10 +230,12 @@ def _echoes(hits: Hits, samples: int, *, crowded: bool) -> Flags:
         dragged[some] |= here & beside & (size[some] < _ECHO * size[i])
         pixel = (down == 0) & (right == 0)
         after[some] |= later & pixel & (size[some] < _LAG * size[i])
-    if crowded:
-        around = (2 * _TWO + 1) ** 2 + 4 * (NEAR - _TWO)
-        by_chance = around * float(strong.sum()) / samples * float((~strong).sum())
-        dragged &= dragged.sum() > _TWO * by_chance
+    around = (2 * _TWO + 1) ** 2 + 4 * (NEAR - _TWO)
+    if not crowded:
+        around = (2 * NEAR + 1) ** 2 + recording.rows + recording.columns
+    samples = _frames(recording) * recording.rows * recording.columns
+    by_chance = around * float(strong.sum()) / samples * float((~strong).sum())
+    dragged &= dragged.sum() > _TWO * by_chance
     found = np.zeros(dragged.size, bool)
     found[order] = dragged | after
     return found
@@ -265,12 +269,13 @@ def _far_above(hits: Hits, which: NDArray[np.intp]) -> Flags:
 
     A spike may hit a pixel that jumps.
     """
-    order = np.lexsort((hits.height_dn, which))
+    size = np.abs(hits.height_dn)
+    order = np.lexsort((size, which))
     last = np.append(np.diff(which[order]) != 0, True)
-    below = np.append(0.0, hits.height_dn[order][:-1])
+    below = np.append(0.0, size[order][:-1])
     below[np.append(True, last[:-1])] = 0.0
     found = np.zeros(which.size, bool)
-    found[order] = last & (hits.height_dn[order] > _ALONE * np.abs(below))
+    found[order] = last & (size[order] > _ALONE * below)
     return found & (hits.ratio > STRONG)
 
 

@@ -14,6 +14,7 @@ Array = NDArray[np.float64]
 Places = NDArray[np.int32]
 _SAMPLES = 8192  # of a channel, that tell by how much a frame moved, and how noisy it is
 _BRIGHT = 0.5  # of a scene's samples: those tell by how much light changed
+_LEAST_LINES = 16
 _ONE_SIGMA = (15.865, 84.135)
 
 
@@ -72,14 +73,18 @@ def of_lines(one: Codes, other: Codes, step: int) -> float:
     """Return which share of the spread of the samples of two frames is that of their lines.
 
     Of the quartiles of their difference: 1 less what is left, as a ratio, without the medians of
-    rows and of columns.
+    rows and of columns. 0 of few lines, whose medians have much of their samples.
     """
     change = thinned(one, 0, 0, step) - thinned(other, 0, 0, step)
+    if min(change.shape) < _LEAST_LINES:
+        return 0.0
     alone = change - np.median(change, 1, keepdims=True)
     alone = alone - np.median(alone, 0, keepdims=True)
-    whole, left = (
-        float(np.subtract(*np.percentile(own, _ONE_SIGMA[::-1]))) for own in (change, alone)
-    )
+    spreads = []
+    for own in (change, alone):
+        low, high = np.percentile(own, _ONE_SIGMA)
+        spreads.append(float(high - low))
+    whole, left = spreads
     return 1 - left / whole if whole > 0 else 0.0
 
 

@@ -138,7 +138,9 @@ def test_numbers_are_settled_where_the_search_has_touched_them(
     search: Any = Proving(after)
     gains = Stub(
         gains=lambda _state, without: {
-            name: Stub(certain=name != "weak", gain=Stub(nats_per_frame=1.0, ci95=(-2.0, 4.0)))
+            name: Stub(
+                nats=0.0, certain=name != "weak", gain=Stub(nats_per_frame=1.0, ci95=(-2.0, 4.0))
+            )
             for name in without
         }
     )
@@ -152,7 +154,9 @@ def test_numbers_are_settled_where_what_was_dropped_gave_them_its_part() -> None
     search.given_back = True
     trial: Any = Stub(
         gains=lambda _state, without: {
-            name: Stub(certain=name != "weak", gain=Stub(nats_per_frame=1.0, ci95=(-2.0, 4.0)))
+            name: Stub(
+                nats=0.0, certain=name != "weak", gain=Stub(nats_per_frame=1.0, ci95=(-2.0, 4.0))
+            )
             for name in without
         }
     )
@@ -166,7 +170,11 @@ def test_what_is_found_only_without_an_effect_must_gain_more_than_that() -> None
     search.named[1] = Named("weak", None, {}, 64.0, ())
     trial: Any = Stub(
         gains=lambda _state, without: {
-            name: Stub(certain=name != "weak", gain=Stub(nats_per_frame=-14.0, ci95=(-20.0, -8.0)))
+            name: Stub(
+                nats=0.0,
+                certain=name != "weak",
+                gain=Stub(nats_per_frame=-14.0, ci95=(-20.0, -8.0)),
+            )
             for name in without
         }
     )
@@ -224,7 +232,7 @@ def test_what_draws_must_exceed_its_errors_where_what_calls_for_it_is_left(left:
     jumps = registry()["rts"](pixel_fraction=0.16, amplitude_dn=0.7, switch_probability=0.1)
     errors = {"pixel_fraction": 1.1, "amplitude_dn": 0.7}
     named = Named("rts", Proposal(jumps, tuple(errors)), errors, 90.0, ())
-    surely: Any = Stub(certain=True, gain=Stub(nats_per_frame=1.6, ci95=(1.3, 1.9)))
+    surely: Any = Stub(nats=0.0, certain=True, gain=Stub(nats_per_frame=1.6, ci95=(1.3, 1.9)))
     state: Any = Stub(
         mismatches=[Stub(statistic="frame_correlation")] if left else [],
         chances=np.array([]),
@@ -241,7 +249,7 @@ def test_an_effect_within_its_errors_is_dropped_and_what_it_hid_is_looked_for() 
     search.named = [_decay(0.3, 0.2), _named("kept", x=1.0)]
     trial: Any = Stub(
         gains=lambda _state, without: {
-            name: Stub(certain=True, gain=Stub(nats_per_frame=1.0, ci95=(-2.0, 4.0)))
+            name: Stub(nats=0.0, certain=True, gain=Stub(nats_per_frame=1.0, ci95=(-2.0, 4.0)))
             for name in without
         }
     )
@@ -256,7 +264,9 @@ def test_what_gained_little_is_asked_first_and_the_rest_only_where_all_of_it_sta
     def gains(_state: Any, without: Any) -> dict[str, Any]:
         asked.append(sorted(without))
         return {
-            name: Stub(certain=name != "weak", gain=Stub(nats_per_frame=1.0, ci95=(-2.0, 4.0)))
+            name: Stub(
+                nats=0.0, certain=name != "weak", gain=Stub(nats_per_frame=1.0, ci95=(-2.0, 4.0))
+            )
             for name in without
         }
 

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from analysis.mismatch.candidates import Proposal
 from analysis.mismatch.evidence import (
     Curve,
     Evidence,
@@ -26,6 +27,7 @@ from analysis.mismatch.finding import (
     Proof,
     Where,
 )
+from analysis.mismatch.named import Named
 from dsis.camera import BaseNoise, Camera, Segment
 from dsis.cfa import Cfa
 from dsis.effects import registry
@@ -111,3 +113,11 @@ def evidence() -> Evidence:
         simulations=100,
         seconds=1.5,
     )
+
+
+def decay(gain: float, error: float) -> Named:
+    """Return a named decay at an edge, of a gain and its standard error, per cent."""
+    effect = registry()["line_settling"](gain_percent=gain, length_pixels=5.0)
+    proposal = Proposal(effect, ("gain_percent", "length_pixels"), frozenset({"gain_percent"}))
+    errors = {"gain_percent": error, "length_pixels": 0.1}
+    return Named("line_settling", proposal, errors, 9.0, ())

@@ -48,37 +48,40 @@ def _asked(
     return confirmed._gained(search, final, trial)["line_flicker"]
 
 
-LITTLE = Gained(_gain(0.3, 0.2), certain=False)
+LITTLE = Gained(_gain(0.3, 0.2), certain=False, nats=0.0)
 
 
 def test_bands_that_foretell_nothing_leave_all_frames_their_say(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    for nothing in (None, Gained(_gain(-0.05, 0.1), certain=False)):
+    for nothing in (None, Gained(_gain(-0.05, 0.1), certain=False, nats=0.0)):
         found = _asked(monkeypatch, LITTLE, nothing, by_all=True)
-        assert found == Gained(LITTLE.gain, certain=True)
+        assert found == Gained(LITTLE.gain, certain=True, nats=0.0)
         assert not _asked(monkeypatch, LITTLE, nothing, by_all=False).certain
 
 
 def test_bands_that_surely_foretell_are_what_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
-    sure = Gained(_gain(0.6, 0.1), certain=True)
+    sure = Gained(_gain(0.6, 0.1), certain=True, nats=0.0)
     assert _asked(monkeypatch, LITTLE, sure, by_all=False) == sure
 
 
 def test_nobody_overrules_pixels_that_are_sure_it_is_worse(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    worse, sure = Gained(_gain(-5, 0.5), certain=False), Gained(_gain(0.6, 0.1), certain=True)
+    worse, sure = (
+        Gained(_gain(-5, 0.5), certain=False, nats=0.0),
+        Gained(_gain(0.6, 0.1), certain=True, nats=0.0),
+    )
     assert _asked(monkeypatch, worse, sure, by_all=True) == worse
 
 
 def test_what_all_frames_show_is_reported_by_what_exceeds_its_error(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    unsure = Gained(_gain(0.02, 0.12), certain=False)
-    foretold = Gained(_gain(0.17, 0.15), certain=False)
+    unsure = Gained(_gain(0.02, 0.12), certain=False, nats=0.0)
+    foretold = Gained(_gain(0.17, 0.15), certain=False, nats=0.0)
     found = _asked(monkeypatch, unsure, foretold, by_all=True)
-    assert found == Gained(foretold.gain, certain=True)
+    assert found == Gained(foretold.gain, certain=True, nats=0.0)
 
 
 @pytest.mark.parametrize(
@@ -89,7 +92,7 @@ def test_odds_count_where_nothing_that_calls_for_the_effect_is_left(
     low: float, left: str, certain: bool
 ) -> None:
     """Of the real CCD without its uneven codes, spikes gained 10 nats in 75 frames."""
-    told = Gained(Gain(0.13, (low, 0.32)), certain=True)
+    told = Gained(Gain(0.13, (low, 0.32)), certain=True, nats=0.0)
     final = _left_open([left], [1.0])
     spikes: Any = Stub(kind="impulse", name="impulse", proposal=Stub())
     search: Any = Stub(without=lambda *_: None, changes={})
@@ -311,7 +314,7 @@ def test_what_no_frames_show_has_a_size_beyond_its_error(
     monkeypatch.setattr(confirmed, "_calls_left", lambda *_: False)
     search: Any = None
     state: Any = Stub(mismatches=())
-    told = Gained(Gain(150.0, (low, 500.0)), certain=True)
+    told = Gained(Gain(150.0, (low, 500.0)), certain=True, nats=0.0)
     why = confirmed.small(search, state, named, told)
     assert why == (
         "no size of it exceeds its standard error (rms lsb 0.0058 ± 0.024)" if refused else ""

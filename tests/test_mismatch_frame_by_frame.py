@@ -149,8 +149,8 @@ def test_one_frame_aside_is_no_flicker() -> None:
     assert not told.certain
 
 
-WORSE = Gained(Gain(-0.4, (-0.6, -0.2)), certain=False)
-SURE = Gained(Gain(1.7, (0.3, 3.4)), certain=True)
+WORSE = Gained(Gain(-0.4, (-0.6, -0.2)), certain=False, nats=0.0)
+SURE = Gained(Gain(1.7, (0.3, 3.4)), certain=True, nats=0.0)
 
 
 def _confirmed(monkeypatch: pytest.MonkeyPatch, **changes: Any) -> Gained:
@@ -195,7 +195,7 @@ def test_two_locked_frames_that_lie_still_do_not_overrule_all_others(
         {"left": ("frame_variance",)},  # something else moves them, too
         {"beside": (FLICKER,)},  # the user's
         {"whole": None},  # a large recording has locked frames enough
-        {"told": Gained(Gain(0.1, (-0.1, 0.3)), certain=False)},
+        {"told": Gained(Gain(0.1, (-0.1, 0.3)), certain=False, nats=0.0)},
         {"told": None},
     ],
 )
@@ -206,5 +206,5 @@ def test_else_the_locked_frames_have_the_last_word(
 
 
 def test_without_locked_frames_nothing_is_proven(monkeypatch: pytest.MonkeyPatch) -> None:
-    nothing = Gained(Gain(float("nan"), (float("-inf"), float("inf"))), certain=False)
+    nothing = Gained(Gain(float("nan"), (float("-inf"), float("inf"))), certain=False, nats=0.0)
     assert not _confirmed(monkeypatch, locked=nothing).certain

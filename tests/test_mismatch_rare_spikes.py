@@ -3,7 +3,6 @@
 import tracemalloc
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,84 +10,32 @@ from numpy.typing import NDArray
 
 from analysis.mismatch import find_mismatch
 from analysis.mismatch.source import Source
-from analysis.mismatch.spikes import Cleaned, Spikes, spikes_of, with_spikes
+from analysis.mismatch.spikes import Cleaned, spikes_of, with_spikes
 from analysis.mismatch.spikes.cleaned import cleaned, without_spikes
 from analysis.mismatch.spikes.hits import Hits
-from analysis.mismatch.spikes.law import _tracks, heldout_gain, law_of, left_dn4
+from analysis.mismatch.spikes.law import _tracks, heldout_gain, law_of
 from analysis.mismatch.split import Split
-from dsis.cfa import Cfa
 from dsis.effects import registry
-from dsis.recording import RecordedExposure, Sensor
 from mismatch_findings import NOTHING
-from mismatch_recordings import InMemory, camera
+from mismatch_recordings import camera
+from spiked_recordings import (
+    BLACK,
+    COLUMNS,
+    MODEL,
+    READ,
+    ROWS,
+    SLOPE,
+    WHITE,
+    Array,
+    Change,
+    found,
+    made,
+    samples,
+    spikes,
+)
 
-Array = NDArray[np.float64]
 Places = NDArray[np.intp]
-ROWS, COLUMNS, BLACK, WHITE, READ, SLOPE = 128, 192, 64.0, 4095, 2.0, 0.5
-MODEL = camera(segments=((SLOPE, READ**2, None),))
-DARKS, FLATS = 3, (200.0, 600.0, 1500.0)
 EVERYTHING = frozenset({"impulse"})
-Change = Callable[[np.random.Generator, dict[str, Array]], None]
-
-
-def made(
-    seed: int,
-    change: Change | None = None,
-    *,
-    frames: int = 12,
-    cfa: str = "MONO",
-    scene: bool = False,
-    clean: Callable[[np.random.Generator, Array], Array] | None = None,
-) -> InMemory:
-    """Return darks and flats by plain numpy, changed before they become codes."""
-    rng = np.random.default_rng(seed)
-    pattern = rng.normal(0, 1, (ROWS, COLUMNS))
-    levels = {f"dark-{i}": 0.0 * pattern for i in range(DARKS)}
-    levels |= {f"flat-{i}": level * (1 + 0.01 * pattern) for i, level in enumerate(FLATS)}
-    if scene:
-        levels["scene"] = np.repeat(rng.uniform(5, 3000, (ROWS // 8, COLUMNS // 8)), 8, 0).repeat(
-            8, 1
-        )
-    noise = clean or (lambda rng, mean: rng.normal(mean, np.sqrt(SLOPE * mean.clip(0) + READ**2)))
-    stacks = {n: np.stack([noise(rng, mean) for _ in range(frames)]) for n, mean in levels.items()}
-    if change is not None:
-        change(rng, stacks)
-    codes = {
-        n: np.clip(np.rint(own + BLACK), 0, WHITE).astype(np.uint16) for n, own in stacks.items()
-    }
-    exposures = tuple(
-        RecordedExposure(
-            name,
-            name.partition("-")[0],  # type: ignore[arg-type] # one of the kinds
-            0.01 * (i + 1),
-            None if name.startswith("dark") else float(i),
-            tuple(Path(str(k)) for k in range(frames)),
-        )
-        for i, name in enumerate(stacks)
-    )
-    sensor = Sensor(name="s", cfa=Cfa(cfa), black_level=BLACK, white_level=WHITE, bit_depth=12)
-    return InMemory(sensor, exposures, ROWS, COLUMNS, Path(), codes)
-
-
-def spikes(count: int, mean_dn: float = 1500.0) -> Change:
-    """Return what adds exactly so many spikes, anywhere."""
-
-    def change(rng: np.random.Generator, stacks: dict[str, Array]) -> None:
-        sizes = np.cumsum([own.size for own in stacks.values()])
-        places = rng.choice(sizes[-1], count, replace=False)
-        for own, end in zip(stacks.values(), sizes, strict=True):
-            here = places[(places >= end - own.size) & (places < end)] - (end - own.size)
-            own.reshape(-1)[here] += rng.exponential(mean_dn, here.size)
-
-    return change
-
-
-def found(recording: InMemory) -> Spikes | None:
-    return spikes_of(recording, Source(recording), MODEL)
-
-
-def samples(recording: InMemory) -> int:
-    return sum(len(e.frames) for e in recording.exposures) * ROWS * COLUMNS
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -135,114 +82,6 @@ def test_many_spikes_some_at_one_pixel_some_clipped(seed: int) -> None:
     assert own is not None
     here = (own.hits.row == 10) & (own.hits.column == 20)
     assert set(own.hits.frame[here]) >= {3, 7}
-
-
-@pytest.mark.parametrize("seed", range(2))
-def test_of_thousands_none_that_could_be_seen_is_left(seed: int) -> None:
-    """One sample in 400: pixels are hit twice and more, also in two frames of a reference."""
-    recording = made(seed, spikes(samples(made(seed)) // 400, 1500.0))
-    own, _, some = without_spikes(recording, MODEL)
-    assert some is not None
-    law = law_of(some, recording, {e.name: range(12) for e in recording.exposures})
-    assert law is not None
-    assert abs(law.share - 1 / 400) < 3 * law.share_error
-    assert abs(law.mean_dn - 1500) < 3 * law.mean_error_dn
-    per_pixel = np.unique(np.stack([some.hits.row, some.hits.column]), axis=1, return_counts=True)
-    assert per_pixel[1].max() >= 3
-    for exposure in own.exposures:
-        stack = np.stack([own.frame(exposure, k) for k in range(12)]).astype(np.float64)
-        apart = stack - np.median(stack, 0)
-        noise = (SLOPE * max(np.median(stack) - BLACK, 0.0) + READ**2 + 1 / 12) ** 0.5
-        assert (apart > 6 * noise).sum() <= 2  # where light is brighter noise is larger
-
-
-@pytest.mark.parametrize("seed", range(2))
-@pytest.mark.parametrize(("factor", "power"), [(0.05, 1), (2e-5, 2)])
-def test_what_low_spikes_leave_is_foretold(seed: int, factor: float, power: int) -> None:
-    """Of their fourth moments; a sample beside each has some of it, shown or not."""
-
-    def dragging(rng: np.random.Generator, stacks: dict[str, Array]) -> None:
-        before = {name: own.copy() for name, own in stacks.items()}
-        spikes(1500, 1500.0)(rng, stacks)
-        for name, own in stacks.items():
-            own[:, :, 1:] += factor * (own - before[name])[:, :, :-1] ** power
-
-    stored, quiet = made(seed, dragging), made(seed)
-    own, _, some = without_spikes(stored, MODEL)
-    assert some is not None
-    found = left_dn4(some, stored)
-    assert left_dn4(None, stored) == {}
-    seen, foretold = 0.0, 0.0
-    for exposure in stored.exposures:
-        noise = (SLOPE * max(np.median(own.frame(exposure, 0)) - BLACK, 0.0) + READ**2) ** 0.5
-        for k in range(12):
-            put_aside = own.frame(exposure, k) != stored.frame(exposure, k)
-            left = stored.frame(exposure, k).astype(float) - quiet.frame(exposure, k)
-            seen += float((np.where(put_aside, 0.0, left) ** 4).mean()) / noise**4
-        foretold += 12 * found[exposure.name] / noise**4
-    assert 0.7 * seen < foretold < 1.6 * seen  # the larger of both laws
-
-
-def test_a_flat_next_to_white_foretells_nothing_of_low_spikes() -> None:
-    """There is no room for spikes above it, whatever their law."""
-
-    def bright(rng: np.random.Generator, stacks: dict[str, Array]) -> None:
-        stacks["flat-2"] += WHITE - BLACK - 1500 - 200  # eight noises below white, nearly
-        spikes(400, 1500.0)(rng, stacks)
-
-    stored = made(3, bright)
-    some = found(stored)
-    assert some is not None
-    low = left_dn4(some, stored)
-    assert "flat-1" in low
-    assert "flat-2" not in low
-
-
-def test_a_spike_on_a_pixel_that_jumps_is_put_aside_and_its_jumps_are_not() -> None:
-    jumps = np.array([0, 1, 3, 4, 6])
-
-    def change(rng: np.random.Generator, stacks: dict[str, Array]) -> None:
-        spikes(400, 3000.0)(rng, stacks)
-        stacks["dark-0"][jumps, 30, 40] += 30
-        stacks["dark-0"][7, 30, 40] += 1500
-
-    stored = made(8, change)
-    own, _, some = without_spikes(stored, MODEL)
-    assert some is not None
-    dark = own.exposure("dark-0")
-    values = np.array([own.frame(dark, k)[30, 40] for k in range(12)], float)
-    assert values[7] < BLACK + 40
-    assert (values[jumps] > BLACK + 20).all()
-
-
-@pytest.mark.parametrize(("freedom", "count"), [(5, 3000), (8, 1000)])
-def test_tails_of_noise_are_no_echoes_of_many_spikes(freedom: float, count: int) -> None:
-    """Far samples of Student's t are everywhere, around spikes no more than by chance."""
-
-    def heavy(rng: np.random.Generator, mean: Array) -> Array:
-        return np.asarray(mean + 3.0 * rng.standard_t(freedom, mean.shape))
-
-    def many(rng: np.random.Generator, stacks: dict[str, Array]) -> None:
-        spikes(count, 3000.0)(rng, stacks)
-
-    some = found(made(5, many, clean=heavy))
-    assert some is not None
-    assert some.echoes.frame.size < 0.02 * some.hits.frame.size
-    assert not some.lower.frame.size
-
-
-def test_low_spikes_are_put_aside_only_where_noise_is_no_wider_downwards() -> None:
-    def change(rng: np.random.Generator, stacks: dict[str, Array]) -> None:
-        spikes(300, 600.0)(rng, stacks)
-        for own in stacks.values():
-            where = rng.choice(own.size, 30, replace=False)
-            own.reshape(-1)[where] += rng.choice([-6.5, 6.5], 30) * own.std(0).mean()
-
-    for plain, many in ((spikes(300, 600.0), True), (change, False)):
-        some = found(made(4, plain))
-        assert some is not None
-        assert (some.lower.frame.size > 5) == many
-        assert (some.lower.ratio <= 8).all()
 
 
 def test_saturated_flats_say_nothing_of_how_often_spikes_hit() -> None:
@@ -484,18 +323,3 @@ def test_what_resembles_spikes_is_left_alone(
     recording = made(100 + seed, change, clean=clean, frames=frames)
     assert found(recording) is None
     assert without_spikes(recording, MODEL)[0] is recording
-
-
-@pytest.mark.parametrize(("moving", "count", "left"), [(0.0, 400, False), (12.0, 400, True),
-                                                       (12.0, 30, False)])  # fmt: skip
-def test_many_spikes_are_left_where_lines_move_more_than_pixels(
-    moving: float, count: int, *, left: bool
-) -> None:
-    """Lower ones, which no pixel tells from its line, would look like what they are not."""
-
-    def change(rng: np.random.Generator, stacks: dict[str, Array]) -> None:
-        spikes(count, 3000.0)(rng, stacks)
-        for name, own in stacks.items():
-            stacks[name] = own + rng.normal(0, moving, (*own.shape[:2], 1))
-
-    assert (found(made(2, change)) is None) == left

@@ -10,7 +10,7 @@ has for good locked frames are a few more, which say little by themselves: where
 odds that tell two effects apart, those of all frames count.
 """
 
-from analysis.mismatch.candidates import CANDIDATES, Proposal
+from analysis.mismatch.candidates import calls_of
 from analysis.mismatch.instance import LINES, same_place
 from analysis.mismatch.name import Search
 from analysis.mismatch.named import Named
@@ -43,10 +43,9 @@ def shown_by_all(
         known = any(one.kind == _JUMPS for one in without.effect)
         lines = trial.lines
         return not known and (lines.jumping(search.least_odds) or lines.jump_rather(SURE_GAIN))
-    told = once_a_frame(own.effect) or (
-        own.effect.kind in _MAPS and nats >= TOLD_APART and not _called(final, own.effect.kind)
-    )
-    if not told:
+    kind, left = own.effect.kind, {m.statistic for m in final.mismatches}
+    borne_out = kind in _MAPS and nats >= TOLD_APART and left.isdisjoint(calls_of(kind))
+    if not (borne_out or once_a_frame(own.effect)):
         return False
     alone = not any(same_place(own.effect, one, search.whole.layout) for one in without.effect)
     # Of its amplitude; its place is paid for.
@@ -54,21 +53,10 @@ def shown_by_all(
         return True
     if own.effect.kind in LINES:  # one number of the bank says less of them than frames do
         return False
-    return _by_numbers(search, final, own, without) >= SURE_GAIN
-
-
-def _called(state: State, kind: str) -> bool:
-    return any(m.statistic in CANDIDATES[kind].calls for m in state.mismatches)
-
-
-def _by_numbers(search: Search, final: State, own: Proposal, without: Camera) -> float:
-    """Return what numbers of all frames gain by an effect, less its price, nats."""
-    if search.whole is None:
-        return 0.0
     state = search.of_all(final.camera)
     bare = State.of(search.whole, without, search.step, near=state)
     replicates = replicates_for(search.setting, [own.effect])
-    return gained(state, bare, own.effect, replicates) - own.price
+    return gained(state, bare, own.effect, replicates) - own.price >= SURE_GAIN
 
 
 def once_a_frame(effect: Effect) -> bool:

@@ -113,10 +113,10 @@ def twin(
     is of unknown colour: only the noise of each channel tells. Correlations have no side: memory of
     the sample before may be charge that neighbours exchange, or a filter, and such charge a filter,
     which makes read noise alike, too. Few levels beyond where a read-out path begins may bend there
-    as all do. Noise that differs from pixel to pixel has heavy tails in all
-    of them together; pixels that jump at every other frame are noisy ones. Where that explains
-    more, and also what the best leaves alone, so much the more; but not where it leaves alone what
-    the best explains, as charge of neighbours does what samples two apart have in common.
+    as all do. Noise that differs from pixel to pixel has heavy tails in all of them together;
+    pixels that jump at every other frame are noisy ones. Where that explains more, and also what
+    the best leaves alone, so much the more; but not where it leaves alone what the best explains,
+    as charge of neighbours does what samples two apart have in common.
     """
     others = [kind for kind in _TWINS.get(best.kind, ()) if kind not in vocabulary]
     if not others:

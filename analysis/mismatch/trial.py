@@ -53,7 +53,7 @@ class Gained:
 
     gain: Gain
     certain: bool
-    nats: float = 0.0
+    nats: float
 
 
 def exceeds(gain: Gain) -> bool:
@@ -202,14 +202,15 @@ class Trial:
         if not frames:
             return None
         gain = gain_of(told.gains, np.zeros(0), seed=self.seed)
-        sure = gain.nats_per_frame * frames >= SURE_GAIN and told.least >= TOLD_APART
-        return Gained(gain, certain=gain.ci95[0] > 0 and sure)
+        nats = gain.nats_per_frame * frames
+        sure = nats >= SURE_GAIN and told.least >= TOLD_APART
+        return Gained(gain, gain.ci95[0] > 0 and sure, nats)
 
     def gains(self, final: State, without: Mapping[str, Camera]) -> dict[str, Gained]:
         """Return what the final model gains over cameras without an effect, by effect."""
         if self.held is None:
             nothing = Gain(float("nan"), (float("-inf"), float("inf")))
-            return {kind: Gained(nothing, certain=False) for kind in without}
+            return {kind: Gained(nothing, certain=False, nats=0.0) for kind in without}
         if not without:
             return {}
         cameras = [final.camera, *without.values()]
@@ -222,7 +223,8 @@ class Trial:
             if not found[kind].certain and not denied(found[kind].gain, frames):
                 told = self.numbers.gain(final, camera)
                 if told is not None and told.certain:
-                    found[kind] = Gained(_per_frame(told, self.numbers.frames), certain=True)
+                    by_numbers = _per_frame(told, self.numbers.frames)
+                    found[kind] = Gained(by_numbers, certain=True, nats=told.nats)
         return found
 
     def _logliks(self, held: Held, cameras: Sequence[Camera], signals: Signals) -> list[Loglik]:

@@ -110,7 +110,7 @@ def left_dn4(spikes: Spikes | None, recording: Recording) -> dict[str, float]:
     if spikes is None or law is None:
         return {}
     themselves = _Dragged(1, np.ones(1), np.ones(1))
-    around = [_Dragged.of(spikes, power) for power in (1, 2)]
+    around = _dragged(spikes)
     found: dict[str, float] = {}
     for number, noise in spikes.quiet_dn.items():
         sites = noise[np.isfinite(noise)]
@@ -131,24 +131,6 @@ class _Dragged:
     factors: Array
     times: Array
 
-    @classmethod
-    def of(cls, spikes: Spikes, power: int) -> "_Dragged":
-        """Return those seen around spikes, of so many as are high enough to show them."""
-        hits, echoes = spikes.hits, spikes.echoes
-        if not echoes.frame.size:
-            return cls(power, np.zeros(0), np.zeros(0))
-        at, here = (
-            np.stack([_FAR_OFF * own.exposure, _FAR_OFF * own.frame, own.row, own.column], 1)
-            for own in (hits, echoes)
-        )
-        near = KDTree(at).query_ball_point(here, NEAR, p=np.inf)
-        tallest = np.array([max(hits.height_dn[own], default=np.inf) for own in near])
-        factors = echoes.height_dn / tallest**power
-        factors = factors[factors > 0]
-        seen = np.sort(hits.height_dn**power / (spikes.lowest * hits.noise_dn))
-        shown = seen.size - np.searchsorted(seen, 1 / factors)
-        return cls(power, factors, 1 / np.maximum(shown, 1))
-
     def below_dn4(self, law: SpikeLaw, ends_dn: Array) -> float:
         """Return the mean fourth power of those below some limits, of all samples.
 
@@ -162,6 +144,27 @@ class _Dragged:
         below = gammainc(order + 1, highest / law.mean_dn).mean(0) * gamma(order + 1)
         each = self.times * self.factors**_FOURTH * law.mean_dn**order
         return law.share * float(each @ below)
+
+
+def _dragged(spikes: Spikes) -> list[_Dragged]:
+    """Return samples seen around spikes by each power, of so many as are high enough for them."""
+    hits, echoes = spikes.hits, spikes.echoes
+    if not echoes.frame.size:
+        return [_Dragged(1, np.zeros(0), np.zeros(0))]
+    at, here = (
+        np.stack([_FAR_OFF * own.exposure, _FAR_OFF * own.frame, own.row, own.column], 1)
+        for own in (hits, echoes)
+    )
+    near = KDTree(at).query_ball_point(here, NEAR, p=np.inf)
+    tallest = np.array([max(hits.height_dn[own], default=np.inf) for own in near])
+    found = []
+    for power in (1, 2):
+        factors = echoes.height_dn / tallest**power
+        factors = factors[factors > 0]
+        seen = np.sort(hits.height_dn**power / (spikes.lowest * hits.noise_dn))
+        shown = seen.size - np.searchsorted(seen, 1 / factors)
+        found.append(_Dragged(power, factors, 1 / np.maximum(shown, 1)))
+    return found
 
 
 def heldout_gain(

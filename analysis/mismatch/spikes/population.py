@@ -83,13 +83,13 @@ def spikes_of(recording: Recording, source: Source, camera: Camera) -> Spikes | 
     """
     if any(effect.kind == "impulse" for effect in camera.effect):
         return None
-    found = _seen(recording, source, camera, FAR)
+    found = _beyond(recording, source, camera, FAR)
     if found is None or found.lowest > LOW:
         return found
-    return _seen(recording, source, camera, LOW) or found
+    return _beyond(recording, source, camera, LOW) or found
 
 
-def _seen(recording: Recording, source: Source, camera: Camera, farthest: float) -> Spikes | None:
+def _beyond(recording: Recording, source: Source, camera: Camera, farthest: float) -> Spikes | None:
     """Return the spikes among samples that are farther than so many noises; None: there are none.
 
     Lower ones are put aside as well where samples are looked at from `LOW` on.
@@ -109,10 +109,8 @@ def _seen(recording: Recording, source: Source, camera: Camera, farthest: float)
     if not uniform:
         return None
     hits = Hits.joined([*(own.hits for own in uniform.values()), *(own.hits for own in scenes)])
-    lines = 1 / recording.rows + 1 / recording.columns
-    crowded = lines * float((hits.ratio > STRONG).sum()) > _CROWDED * _frames(recording)
     count, lined = _samples(recording), any(own.of_lines > _LINED for own in uniform.values())
-    echo = _echoes(hits, recording, crowded=crowded)
+    echo = _echoes(hits, recording)
     again = _returning(hits, ~echo, recording.rows * recording.columns)
     if again is None:
         return None
@@ -133,7 +131,7 @@ def _seen(recording: Recording, source: Source, camera: Camera, farthest: float)
         for number, own in uniform.items()
     }
     both = Hits.joined([spikes, hits.of(echo & ~again)])
-    following = _echoes(both, recording, crowded=crowded)
+    following = _echoes(both, recording)
     following[: spikes.frame.size] = False
     lowest = LOW if many else SPIKE
     return Spikes(spikes, both.of(following), lower, quiet, lowest)
@@ -203,14 +201,10 @@ def _farther(ratio: Array) -> float:
     return float(scipy.stats.gamma.sf(_FALLING * np.log(ratio / SPIKE).sum(), ratio.size))
 
 
-def _frames(recording: Recording) -> int:
-    return sum(len(exposure.frames) for exposure in recording.exposures)
-
-
-def _echoes(hits: Hits, recording: Recording, *, crowded: bool) -> Flags:
+def _echoes(hits: Hits, recording: Recording) -> Flags:
     """Return which samples a much stronger one of the frame, or of a frame before, drags along.
 
-    Not where chance puts half as many there. Where spikes are `crowded`, any has others in its row
+    Not where chance puts half as many there. Where spikes are crowded, any has others in its row
     and its column: only around it are they its own.
     """
     order = np.lexsort((hits.frame, hits.exposure))
@@ -218,6 +212,9 @@ def _echoes(hits: Hits, recording: Recording, *, crowded: bool) -> Flags:
     dragged, after = np.zeros(own.frame.size, bool), np.zeros(own.frame.size, bool)
     time = own.exposure * _APART + own.frame
     size, strong = np.abs(own.height_dn), own.ratio > STRONG
+    frames = sum(len(exposure.frames) for exposure in recording.exposures)
+    density = float(strong.sum()) / (frames * recording.rows * recording.columns)
+    crowded = density * (recording.rows + recording.columns) > _CROWDED
     for i in np.flatnonzero(strong):
         some = slice(*np.searchsorted(time, [time[i], time[i] + NEAR + 1]))
         here, later = time[some] == time[i], time[some] > time[i]
@@ -233,8 +230,7 @@ def _echoes(hits: Hits, recording: Recording, *, crowded: bool) -> Flags:
     around = (2 * _TWO + 1) ** 2 + 4 * (NEAR - _TWO)
     if not crowded:
         around = (2 * NEAR + 1) ** 2 + recording.rows + recording.columns
-    samples = _frames(recording) * recording.rows * recording.columns
-    by_chance = around * float(strong.sum()) / samples * float((~strong).sum())
+    by_chance = around * density * float((~strong).sum())
     dragged &= dragged.sum() > _TWO * by_chance
     found = np.zeros(dragged.size, bool)
     found[order] = dragged | after

@@ -9,7 +9,6 @@ from dsis.effects.line_settling import LineSettling
 
 LINES = frozenset({"periodic_noise", "bistable_pattern"})
 Frequency = tuple[float, float]
-_FEW_PIXELS = 8
 _SAME = 1.5  # bins: a frequency is known no better than where it stands between two
 
 
@@ -21,14 +20,18 @@ def frequency_of(effect: Effect | None) -> Frequency | None:
     return found
 
 
+def of_pixels(frequency: Frequency, most: int = 8) -> bool:
+    """Return whether a frequency is that of what repeats over two, four, `most` pixels."""
+    return all((most * f) % 1 == 0 for f in frequency)
+
+
 def unmeasured(frequency: Frequency, layout: Layout) -> float:
     """Return the standard error of a frequency that frames do not measure, cycles per pixel.
 
     It is anywhere between two of the waves that fit into a frame; what repeats over two, four or
     eight pixels lies where it lies.
     """
-    exact = all((_FEW_PIXELS * f) % 1 == 0 for f in frequency)
-    return 0.0 if exact else 1 / sqrt(12) / min(layout.rows, layout.columns)
+    return 0.0 if of_pixels(frequency) else 1 / sqrt(12) / min(layout.rows, layout.columns)
 
 
 def instance(kind: str, effect: Effect | None) -> str:

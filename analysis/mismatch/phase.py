@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from analysis.mismatch.aliases import aliases, strongest
 from analysis.mismatch.asked import FramesAsked
 from analysis.mismatch.bandgain import gain_of_bands, place_of_bands, turns_of_bands
-from analysis.mismatch.instance import Frequency, frequency_of, same_line
+from analysis.mismatch.instance import Frequency, frequency_of, of_pixels, same_line
 from analysis.mismatch.layout import Layout
 from analysis.mismatch.projections import LEAST, SURE, FramesOf, Power, projections
 from analysis.mismatch.undone import NARROW
@@ -95,7 +95,7 @@ class WholeFrames(FramesAsked):
         if seen.kept is not None:
             kind = "bistable_pattern" if kept else "periodic_noise"
             return None if seen.kept == kept else _PHASE_WORDS[kind]
-        if kept and seen.exact and not _of_pixels(frequency, 4):
+        if kept and seen.exact and not of_pixels(frequency, 4):
             return _UNTOLD
         if not kept and seen.exact and seen.line is not None:
             odds = self._gain(frequency, kept=True) - self._gain(frequency, kept=False)
@@ -262,7 +262,7 @@ def look(
     """
     fx, fy = frequency
     columns, rows = layout.columns, layout.rows
-    exact = _of_pixels(frequency) and not anywhere
+    exact = of_pixels(frequency) and not anywhere
     steps = (0.0,) if exact else _BETWEEN
     tried = [(fx + u / columns, fy + w / rows) for u in steps for w in steps]
     power = Power.of(layout, projections(layout, frames_of, tried))
@@ -304,7 +304,7 @@ def look(
     if exact:
         found = float(own.excess[0])
         error = own.bins(found) if found > 0 else np.inf
-        single = _of_pixels(frequency, 4)  # one or two pixels: interference is hardly there
+        single = of_pixels(frequency, 4)  # one or two pixels: interference is hardly there
         if not single and float(np.linalg.norm(off)) > _BESIDE * error:
             return look(layout, frames_of, frequency, anywhere=True)
         return Look(absent, broad, kept, grows, own, exact=True)
@@ -350,11 +350,6 @@ def _top(at: float, beside: NDArray[np.float64]) -> tuple[float, list[float]]:
             step = _CROSS[1][0] * (low - high) / (2 * (low + high))
             off[axis] = float(np.clip(step, -farthest, farthest))
     return min(found, _MOST_CREST), off
-
-
-def _of_pixels(frequency: Frequency, most: int = 8) -> bool:
-    """Return whether a frequency is that of what repeats over two, four, `most` pixels."""
-    return all((most * f) % 1 == 0 for f in frequency)
 
 
 def _apart(layout: Layout, one: Frequency, other: Frequency) -> bool:

@@ -33,9 +33,12 @@ def pytest_addoption(parser: pytest.Parser, pluginmanager: pytest.PytestPluginMa
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers() -> int:
-    """Return as many processes as there are cores, of which a few are enough."""
+    """Return one process more than there are cores, of which a few are enough.
+
+    Tests that wait, for a browser, a player or time to pass, leave their core to another.
+    """
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-    return min(cores or 1, 8)
+    return min((cores or 1) + 1, 8)
 
 
 @pytest.hookimpl(optionalhook=True)

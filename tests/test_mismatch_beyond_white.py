@@ -6,6 +6,8 @@ import pytest
 from analysis.mismatch import find_mismatch
 from mismatch_recordings import InMemory, camera, recorded
 
+pytestmark = pytest.mark.usefixtures("unproven")
+
 BLACK, WHITE, WELL = 64.0, 4095.0, 3800.0
 SLOPE, READ = 0.5, 20.0
 LEVELS = (1200.0, 2400.0, 3600.0, 4800.0)

@@ -31,6 +31,8 @@ from dsis.camera import read_camera
 from dsis.recording import read_recording
 from exposing import effect
 
+pytestmark = pytest.mark.usefixtures("unproven")
+
 Frames = NDArray[np.float64]
 LEVELS = ((15.0, 3.0), (139.0, 7.0), (460.0, 12.0), (900.0, 16.0))  # mean and noise, DN
 SHAPE = (6, 60, 80)

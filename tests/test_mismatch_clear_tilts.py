@@ -8,6 +8,8 @@ from analysis.mismatch.bank.parts import parts, sure_of_lines
 from dsis.effects import registry
 from mismatch_recordings import camera, recorded
 
+pytestmark = pytest.mark.usefixtures("unproven")
+
 ROWS, COLUMNS = 64, 96
 TILT = 60.0  # of a map of noise 1: from edge to edge 120
 

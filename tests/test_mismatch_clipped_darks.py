@@ -18,6 +18,8 @@ from dsis.effects.prnu import Prnu
 from dsis.recording import Recording
 from mismatch_recordings import InMemory, camera, recorded
 
+pytestmark = pytest.mark.usefixtures("unproven")
+
 GAIN = 5.0  # DN per electron
 LEVELS = (6.0, 20.0, 80.0, 300.0)
 

@@ -14,6 +14,8 @@ from dsis.camera import Camera
 from dsis.effects import registry
 from mismatch_recordings import InMemory, camera, recorded
 
+pytestmark = pytest.mark.usefixtures("unproven")
+
 BLACK, SLOPE, INTERCEPT = 64.3, 0.5, 16.0  # DN, DN, DN^2
 LEVELS = (250.0, 900.0, 2600.0)
 SIZE = {"rows": 64, "columns": 64}

@@ -16,6 +16,8 @@ from dsis.effects import registry
 from dsis.measures import Accumulator
 from mismatch_recordings import FEW_LEVELS, InMemory, camera, recorded
 
+pytestmark = pytest.mark.usefixtures("unproven")
+
 Array = NDArray[np.float64]
 BASE = camera()
 

@@ -16,6 +16,8 @@ from dsis.effects.adc_memory import AdcMemory
 from dsis.effects.poisson_shot_noise import PoissonShotNoise
 from mismatch_recordings import camera, recorded
 
+pytestmark = pytest.mark.usefixtures("unproven")
+
 
 def _state(seen: float, expected: float, sd: float = 2.0, known: bool = True, **more: Any) -> Any:
     keys = [Stub(detail=""), Stub(detail=DETAIL)]

@@ -12,6 +12,8 @@ from analysis.mismatch.bank.scalars import scalars
 from dsis.measures import measure_exposure
 from mismatch_recordings import FEW_LEVELS, camera, recorded
 
+pytestmark = pytest.mark.usefixtures("unproven")
+
 Array = NDArray[np.float64]
 
 

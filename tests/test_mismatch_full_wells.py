@@ -15,6 +15,8 @@ from dsis.effects import Effect, registry
 from dsis.effects.saturation import Saturation
 from mismatch_recordings import InMemory, camera, held_of, recorded
 
+pytestmark = pytest.mark.usefixtures("unproven")
+
 SIDE, FRAMES, FULL = 64, 8, 2000.3
 LEVELS = (100.0, 300.0, 600.0, 1000.0, 1500.0, 2600.0, 5000.0)  # the last one is above white
 ROW_PERCENT = 0.3

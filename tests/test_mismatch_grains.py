@@ -6,9 +6,12 @@ Recordings are numpy's noise; nothing of them is made by the effects.
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from analysis.mismatch import find_mismatch
 from mismatch_recordings import InMemory, camera, recorded
+
+pytestmark = pytest.mark.usefixtures("unproven")
 
 BLACK, SLOPE, INTERCEPT = 64.0, 0.5, 20.0  # DN, DN, DN^2
 BASE = camera(segments=((SLOPE, INTERCEPT, None),), black=BLACK)

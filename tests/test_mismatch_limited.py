@@ -14,6 +14,8 @@ from dsis.cfa import Cfa
 from dsis.effects import registry
 from mismatch_recordings import InMemory, camera, recorded
 
+pytestmark = pytest.mark.usefixtures("unproven")
+
 Array = NDArray[np.float64]
 FULL = 1800.0
 COLOURS = {"R": 0.55, "Gr": 1.0, "Gb": 1.0, "B": 0.84, "MONO": 1.0}

@@ -13,6 +13,8 @@ from analysis.mismatch.movinglines import moving_lines
 from dsis.effects import registry
 from mismatch_recordings import camera, recorded
 
+pytestmark = pytest.mark.usefixtures("unproven")
+
 FRAMES, ROWS, COLUMNS = 6, 96, 2000
 SIGNAL_DN = {"weak": 200.0, "strong": 800.0}
 EFFECTS = registry()

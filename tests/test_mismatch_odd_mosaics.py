@@ -9,6 +9,8 @@ from dsis.cfa import Cfa
 from dsis.effects import registry
 from mismatch_recordings import TWO_LEVELS, camera, recorded
 
+pytestmark = pytest.mark.usefixtures("unproven")
+
 ROWS, COLUMNS = 65, 97
 
 

@@ -11,6 +11,8 @@ from analysis.mismatch.bank.parts import parts
 from analysis.mismatch.bank.patches import OUTLYING_PATCH, outlying
 from mismatch_recordings import COLUMNS, FEW_LEVELS, FRAMES, ROWS, camera, recorded
 
+pytestmark = pytest.mark.usefixtures("unproven")
+
 Array = NDArray[np.float64]
 ROW, COLUMN, RADIUS = 61, 37, 6.0
 

@@ -34,6 +34,8 @@ from spiked_recordings import (
     spikes,
 )
 
+pytestmark = pytest.mark.usefixtures("unproven")
+
 Places = NDArray[np.intp]
 EVERYTHING = frozenset({"impulse"})
 

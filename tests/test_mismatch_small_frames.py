@@ -6,6 +6,8 @@ from analysis.mismatch import find_mismatch
 from dsis.errors import InputError
 from mismatch_recordings import camera, recorded
 
+pytestmark = pytest.mark.usefixtures("unproven")
+
 
 @pytest.mark.parametrize(
     ("cfa", "rows", "columns"), [("MONO", 4, 60), ("MONO", 60, 5), ("RGGB", 8, 40)]

@@ -10,6 +10,8 @@ from analysis.mismatch.bank.persistent import BY_LINE, SURFACE, VarianceSums
 from dsis.effects import registry
 from mismatch_recordings import FEW_LEVELS, InMemory, camera, recorded, state_of
 
+pytestmark = pytest.mark.usefixtures("unproven")
+
 Array = NDArray[np.float64]
 ROWS, COLUMNS, FRAMES = 48, 64, (12, 4, 4, 6)
 Y, X = np.mgrid[-1 : 1 : ROWS * 1j, -1 : 1 : COLUMNS * 1j]

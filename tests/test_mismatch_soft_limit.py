@@ -19,6 +19,8 @@ from dsis.effects.dual_gain_mismatch import DualGainMismatch
 from dsis.effects.saturation import Saturation
 from mismatch_recordings import InMemory, camera, recorded, responding, state_of
 
+pytestmark = pytest.mark.usefixtures("unproven")
+
 LEVELS = (500.0, 1500.0, 2400.0, 2850.0)
 FULL, SOFT = 3000.0, 60.0
 SLOPE, READ = 0.5, 6.0

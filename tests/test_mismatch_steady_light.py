@@ -12,6 +12,8 @@ from analysis.mismatch import find_mismatch
 from analysis.mismatch.source import Source
 from analysis.mismatch.steadylight import with_steady_light
 
+pytestmark = pytest.mark.usefixtures("unproven")
+
 Array = NDArray[np.float64]
 LEVELS = (150.0, 300.0, 600.0, 1100.0, 1900.0, 2900.0)
 

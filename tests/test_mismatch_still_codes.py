@@ -13,6 +13,8 @@ from dsis.cfa import Cfa
 from dsis.recording import Recording
 from dsis.simulate import dark, flat, simulate
 
+pytestmark = pytest.mark.usefixtures("unproven")
+
 
 def recorded(
     folder: Path, cfa: Cfa, intercept: float, levels: int, seed: int = 0

@@ -8,6 +8,8 @@ from analysis.mismatch import find_mismatch
 from dsis.effects import registry
 from mismatch_recordings import camera, recorded, state_of
 
+pytestmark = pytest.mark.usefixtures("unproven")
+
 LEVELS = tuple(float(level) for level in range(5, 65, 6))
 KINDS: dict[str, dict[str, Any]] = {
     "read_noise_spread": {"log_sigma": 0.15},

@@ -19,7 +19,7 @@ import json
 import os
 import shutil
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -32,6 +32,34 @@ UNFINISHED = "journal.jsonl"
 
 Its first line names the work; a command that can resume adds lines of its own.
 """
+
+
+_NAMED = 5
+
+
+def listed(names: Sequence[str]) -> str | None:
+    """Return the first few of these names, and how many more there are; None where there are none.
+
+    What `keep` of a `result_folder` says of files that dsis did not write.
+    """
+    more = len(names) - _NAMED
+    return ", ".join(names[:_NAMED]) + (f" and {more} more" if more > 0 else "") or None
+
+
+@contextmanager
+def said_of(out: Path) -> Iterator[None]:
+    """Say of `out`, which the user named, what the system says of a file beside it."""
+    try:
+        yield
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(out)) from None
+
+
+def check_parents(out: Path) -> None:
+    """Refuse a place below a file: no folder can be made there."""
+    there = next(path for path in out.absolute().parents if path.exists())
+    if not there.is_dir():
+        raise InputError.of(out, "", f"lies below {there}, which is a file: give another place")
 
 
 def _nothing(folder: Path) -> str | None:
@@ -72,12 +100,11 @@ def result_folder(
         raise InputError.of(out, "", "is no place for results: give a folder")
     partial, replaced = (out.with_name(out.name + end) for end in (".partial", ".replaced"))
     with _held(out):
-        if replaced.exists() and not (replaced / mark).is_file():
-            raise InputError.of(replaced, "", f"holds no {mark}: move it away, dsis needs the name")
-        if replaced.exists() and not out.exists():
-            replaced.rename(out)
-        _check_replaceable(out, mark, keep)
-        _make_ready(partial, keep, resume)
+        with said_of(out):
+            check_parents(out)
+            _put_right(out, replaced, mark)
+            _check_replaceable(out, mark, keep)
+            _make_ready(partial, keep, resume)
         try:
             yield partial
         except DsisError:
@@ -91,6 +118,14 @@ def result_folder(
         partial.rename(out)
         (out / UNFINISHED).unlink()
         shutil.rmtree(replaced, ignore_errors=True)
+
+
+def _put_right(out: Path, replaced: Path, mark: str) -> None:
+    """Put back the result that a killed run had moved aside."""
+    if replaced.exists() and not (replaced / mark).is_file():
+        raise InputError.of(replaced, "", f"holds no {mark}: move it away, dsis needs the name")
+    if replaced.exists() and not out.exists():
+        replaced.rename(out)
 
 
 def _check_replaceable(out: Path, mark: str, keep: Callable[[Path], str | None]) -> None:

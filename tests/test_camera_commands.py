@@ -1,5 +1,6 @@
 """Promise: from a recording to a camera model and back, by the two commands that users type."""
 
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from dsis.cli import main
 from dsis.effects import registry
 from dsis.recording import read_recording
 from dsis.simulate import dark, flat, simulate, simulate_like
+from folder_bytes import every_byte
 
 LEVELS_DN = (100.0, 300.0, 700.0, 1500.0, 2600.0)
 PLANTED = Camera(
@@ -86,6 +88,21 @@ def test_messages_name_the_file_that_was_given(
     ):
         assert main(["camera", *arguments]) == 2
         assert capsys.readouterr().err.startswith(f"dsis: {file}: {key}: ")
+
+
+def test_a_simulated_recording_that_was_fitted_in_place_keeps_its_model(
+    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    made = tmp_path / "made"
+    shutil.copytree(recording, made)
+    assert main(["camera", "fit", str(made), "-o", str(made / "camera.toml")]) == 0
+    before = every_byte(made)
+    again = ["camera", "simulate", str(made / "camera.toml"), "--like", str(recording)]
+    assert main([*again, "-o", str(made)]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith(f"dsis: {made}: holds camera-distribution.png, camera-fit.json, ")
+    assert said.endswith(" and 1 more, which would be lost: give another folder\n")
+    assert every_byte(made) == before
 
 
 def test_the_same_sensor_with_the_recordings_own_seed(tmp_path: Path) -> None:

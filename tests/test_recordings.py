@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 from PIL import Image
 
 from dsis.cfa import Cfa
@@ -106,6 +107,40 @@ class TestRoundTrip:
         with pytest.raises(InputError, match="give another folder"):
             write_recording(real, SENSOR, plans, frames_of(1))
         assert every_byte(real) == before
+
+    @pytest.mark.parametrize(
+        "name", ["notes.txt", "a/notes.txt", "a/0.tif", "real/recording.toml", "b/0000.tif"]
+    )
+    def test_what_dsis_did_not_write_into_one_is_not_lost(self, tmp_path: Path, name: str) -> None:
+        plans = [ExposurePlan("a", "flat", 1.0, 2)]
+        own = tmp_path / "own"
+        write_recording(own, SENSOR, plans, frames_of(2, 1))
+        (own / name).parent.mkdir(exist_ok=True)
+        (own / name).write_text("mine", encoding="utf-8")
+        before = every_byte(own)
+        lost = name if name.startswith("a/") else name.split("/", maxsplit=1)[0]
+        with pytest.raises(InputError, match=f"own: holds {lost}, which would be lost: give ano"):
+            write_recording(own, SENSOR, plans, frames_of(2, 2))
+        assert every_byte(own) == before
+
+    def test_unfinished_work_is_replaced_and_what_lies_in_it_is_not_lost(
+        self, tmp_path: Path
+    ) -> None:
+        plans, own = [ExposurePlan("a", "flat", 1.0, 2)], tmp_path / "own"
+
+        def broken() -> Iterator[NDArray[np.uint16]]:
+            yield from frames_of(1)
+            raise KeyboardInterrupt
+
+        for _ in range(2):  # the second time there are frames of the first
+            with pytest.raises(KeyboardInterrupt):
+                write_recording(own, SENSOR, plans, broken())
+        notes = tmp_path / "own.partial" / "a" / "notes.txt"
+        notes.write_text("mine", encoding="utf-8")
+        with pytest.raises(InputError, match=r"holds a/notes\.txt, which would be lost"):
+            write_recording(own, SENSOR, plans, frames_of(2))
+        notes.unlink()
+        write_recording(own, SENSOR, plans, frames_of(2))
 
 
 class TestFormats:

@@ -56,6 +56,29 @@ def test_what_must_be_kept_is_kept(tmp_path: Path) -> None:
     assert (tmp_path / "out" / MARK).read_text(encoding="utf-8") == "votes"
 
 
+@pytest.mark.parametrize("inside", ["out", "new/out"])
+def test_a_place_below_a_file_is_refused(tmp_path: Path, inside: str) -> None:
+    (tmp_path / "file").write_text("mine", encoding="utf-8")
+    with pytest.raises(InputError) as refused:
+        make(tmp_path / "file" / inside)
+    place = tmp_path / "file"
+    fact = f"lies below {place}, which is a file: give another place"
+    assert str(refused.value) == f"{place / inside}: {fact}"
+
+
+def test_what_the_system_refuses_is_said_of_the_folder_that_was_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(path: Path, **_: object) -> None:
+        raise PermissionError(errno.EACCES, "Permission denied", str(path))
+
+    monkeypatch.setattr(Path, "mkdir", refuse)
+    monkeypatch.setattr("dsis.outdir._held", lambda _: contextlib.nullcontext())
+    with pytest.raises(PermissionError) as refused:
+        make(tmp_path / "out")
+    assert refused.value.filename == str(tmp_path / "out")
+
+
 def interrupted(out: Path, resume: str | None) -> None:
     with contextlib.suppress(KeyboardInterrupt), result_folder(out, MARK, resume=resume) as folder:
         (folder / "half").write_text("half", encoding="utf-8")

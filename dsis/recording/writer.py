@@ -2,6 +2,7 @@
 
 import json
 import re
+import tomllib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from importlib.metadata import version
 from itertools import islice
@@ -11,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsis.imagefile import write_codes
-from dsis.outdir import result_folder
+from dsis.outdir import UNFINISHED, listed, result_folder
 from dsis.recording.model import ExposurePlan, Recording, Sensor
 from dsis.recording.reader import read_recording
 from dsis.recording.tomlfile import RECORDING, write_listing
@@ -20,6 +21,7 @@ PROVENANCE = "provenance.json"
 """Marks a recording that dsis wrote: only such a one may be replaced by another."""
 
 Progress = Callable[[int, int, str], None]
+_FRAME = re.compile(r"\d{4,}\.tif|\.\d{4,}\.unfinished\.tif")
 _PLAIN = re.compile(r"[A-Za-z0-9_][A-Za-z0-9._-]*")
 
 
@@ -38,7 +40,7 @@ def write_recording(
     ----------
     out
         Folder for the result. Work goes on in `OUT.partial`; an earlier recording that dsis wrote
-        is replaced, anything else is refused.
+        is replaced; anything else is refused, also an earlier one that holds more than that.
     sensor
         Its sensor.
     exposures
@@ -55,13 +57,13 @@ def write_recording(
     if not exposures or len({plan.name for plan in exposures}) < len(exposures):
         message = "a recording needs exposures, each with a name of its own"
         raise ValueError(message)
-    with result_folder(out, PROVENANCE) as partial:
+    with result_folder(out, PROVENANCE, keep=_not_ours) as partial:
         folders = _folders([plan.name for plan in exposures])
         _write_frames(partial, sensor, exposures, frames, folders, progress)
-        listed = {plan.name: (plan, f"{folders[plan.name]}/*.tif") for plan in exposures}
+        globs = {plan.name: (plan, f"{folders[plan.name]}/*.tif") for plan in exposures}
         mark = {"written_by": f"dsis {version('dsis')}", "origin": origin}
         (partial / PROVENANCE).write_text(json.dumps(mark, indent=2) + "\n", encoding="utf-8")
-        write_listing(partial / RECORDING, sensor, listed)
+        write_listing(partial / RECORDING, sensor, globs)
         read_recording(partial)  # what cannot be read must not take the place of an earlier one
     return read_recording(out)
 
@@ -113,3 +115,27 @@ def _folders(names: Sequence[str]) -> dict[str, str]:
     if plain and len({name.lower() for name in names}) == len(names):
         return {name: name for name in names}
     return {name: f"exposure-{number:03d}" for number, name in enumerate(names)}
+
+
+def _not_ours(folder: Path) -> str | None:
+    """Return what in an earlier recording, or an unfinished one, is no part of it."""
+    exposures = _exposure_folders(folder / RECORDING)
+    other = []
+    for path in sorted(folder.iterdir()):
+        if path.is_dir() and (exposures is None or path.name in exposures):
+            names = (p.name for p in sorted(path.iterdir()))
+            other += [f"{path.name}/{name}" for name in names if not _FRAME.fullmatch(name)]
+        elif path.name not in {PROVENANCE, RECORDING, UNFINISHED}:
+            other.append(path.name)
+    return listed(other)
+
+
+def _exposure_folders(listing: Path) -> frozenset[str] | None:
+    """Return the folders that a `recording.toml` names; None where it is not yet written."""
+    if not listing.is_file():
+        return None
+    try:
+        entries = tomllib.loads(listing.read_text(encoding="utf-8"))["exposure"]
+        return frozenset(Path(entry["frames"]).parent.as_posix() for entry in entries)
+    except (ValueError, KeyError, TypeError):  # changed by hand: its folders are no more ours
+        return frozenset()

@@ -11,7 +11,7 @@ from dsis.draw import Draw
 from dsis.effects import Effect, Exposure, Image, Stage, registry
 from dsis.errors import InputError
 from dsis.grid import PixelGrid
-from dsis.recording import ExposurePlan, Recording, Sensor, write_recording
+from dsis.recording import ExposurePlan, Recording, Sensor, read_recording, write_recording
 from dsis.simulate import Shot, dark, flat, simulate, simulate_like, simulated_frames
 from folder_bytes import every_byte
 from simulated_stacks import (
@@ -295,6 +295,30 @@ class TestRefused:
         assert "bit_depth: is 20, must be at most 16" in message
         assert "is the recording itself" in message
         assert every_byte(tmp_path / "real") == before
+
+    def test_a_folder_that_holds_the_recording(self, tmp_path: Path) -> None:
+        """Its description, or frames that are described elsewhere."""
+        out = tmp_path / "out"
+        simulate(camera_of(), SHOTS, 8, 8, out)
+        inside = recorded(out / "real", SHOTS)
+        elsewhere = tmp_path / "elsewhere" / "recording.toml"
+        elsewhere.parent.mkdir()
+        text = (out / "recording.toml").read_text(encoding="utf-8")
+        elsewhere.write_text(text.replace('frames = "', f'frames = "{out.as_posix()}/'))
+        before = every_byte(out)
+        for like in (inside, read_recording(elsewhere)):
+            with pytest.raises(InputError, match="holds the recording that is read"):
+                simulate_like(camera_of(), like, out)
+        assert every_byte(out) == before
+
+    def test_a_white_level_that_would_clip_what_was_recorded(self, tmp_path: Path) -> None:
+        like = recorded(tmp_path / "real", SHOTS)
+        low = camera_of().model_copy(update={"white_level": WHITE - 1})
+        wanted = f"white_level: is {WHITE - 1:g}, must be {WHITE:g} or more as in the recording"
+        with pytest.raises(InputError, match=wanted):
+            simulate_like(low, like, tmp_path / "made")
+        high = camera_of().model_copy(update={"white_level": WHITE + 1, "bit_depth": 16})
+        assert simulate_like(high, like, tmp_path / "made").sensor.white_level == WHITE + 1
 
     def test_progress_counts_every_frame(self, tmp_path: Path) -> None:
         told: list[tuple[int, int, str]] = []

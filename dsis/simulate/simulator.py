@@ -59,15 +59,10 @@ def simulate_like(
     Raises
     ------
     InputError
-        Where camera and recording do not fit: another colour filter array, maps of another size,
-        codes of more than 16 bits; or where `out` may not be replaced.
+        Where camera and recording do not fit: another colour filter array, a lower white level,
+        maps of another size, codes of more than 16 bits; or where `out` may not be replaced.
     """
-    faults = _faults(camera)
-    if camera.cfa != recording.sensor.cfa:
-        fact = f"is {camera.cfa}, must be {recording.sensor.cfa} as in the recording"
-        faults.append(Fault(f"camera {camera.name!r}", "cfa", fact))
-    if out.resolve() == recording.folder.resolve():
-        faults.append(Fault(str(out), "", "is the recording itself: give another folder"))
+    faults = [*_faults(camera), *_unlike(camera, recording.sensor), *_overwrites(recording, out)]
     if faults:
         raise InputError(faults)
     used = camera if maps is None else with_maps(camera, maps, recording.grid)
@@ -167,6 +162,30 @@ def _draw(seed: int, recording: Recording, maps: SensorMaps | None) -> Draw:
     if maps is not None:
         content = zlib.crc32(maps.prnu_gain.tobytes(), zlib.crc32(maps.dsnu_dn.tobytes(), content))
     return Draw(seed).within("like", f"{content}")
+
+
+def _unlike(camera: Camera, sensor: Sensor) -> list[Fault]:
+    """Return why a camera cannot have the layout and the signal levels of a recording."""
+    pairs: list[tuple[str, str]] = []
+    if camera.cfa != sensor.cfa:
+        pairs.append(("cfa", f"is {camera.cfa}, must be {sensor.cfa}"))
+    if camera.white_level < sensor.white_level:  # it would clip what the recording shows
+        fact = f"is {camera.white_level:g}, must be {sensor.white_level:g} or more"
+        pairs.append(("white_level", fact))
+    file = f"camera {camera.name!r}"
+    return [Fault(file, key, f"{fact} as in the recording") for key, fact in pairs]
+
+
+def _overwrites(recording: Recording, out: Path) -> list[Fault]:
+    """Return why `out` may not be replaced: the recording, or some of its frames, lie there."""
+    target, own = out.resolve(), recording.folder.resolve()
+    if target == own:
+        return [Fault(str(out), "", "is the recording itself: give another folder")]
+    frames = {path.parent for exposure in recording.exposures for path in exposure.frames}
+    if any(place.is_relative_to(target) for place in (own, *(p.resolve() for p in frames))):
+        fact = "holds the recording that is read, which would be lost: give another folder"
+        return [Fault(str(out), "", fact)]
+    return []
 
 
 def _faults(camera: Camera) -> list[Fault]:

@@ -65,6 +65,18 @@ def test_effects_can_be_appended_to_what_a_fit_wrote(recording: Path, tmp_path: 
     assert registry()["row_noise"](sigma_dn=3.0) in read_camera(model).effect
 
 
+def test_the_description_of_a_recording_is_not_overwritten_by_a_fit(
+    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    made = tmp_path / "made"
+    shutil.copytree(recording, made)
+    before = every_byte(made)
+    assert main(["camera", "fit", str(made), "-o", str(made / "recording.toml")]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith(f"dsis: {made / 'recording.toml'}: was not written by dsis, or ")
+    assert every_byte(made) == before
+
+
 def test_what_cannot_be_fitted_gets_a_message(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

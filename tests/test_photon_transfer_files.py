@@ -1,5 +1,6 @@
 """Promise: a fitted camera is written whole: what reads it back makes the same recording again."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,6 +15,8 @@ from dsis.effects import registry
 from dsis.errors import InputError
 from dsis.grid import PixelGrid
 from dsis.simulate import read_maps
+from dsis.simulate.maps import owner_of
+from folder_bytes import every_byte
 from planted_camera import ONE, TWO, Z_MAX, record
 
 
@@ -40,6 +43,61 @@ def test_what_is_written_reads_back(tmp_path: Path) -> None:
     write_fit(fit, tmp_path / "camera.toml", "made for a test")
     assert before == [file.read_bytes() for file in files]
     assert "| gain |" in summary(fit)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda text: text + '\n[[effect]]\nkind = "row_noise"\nsigma_dn = 3.2\n',
+        lambda text: text.replace("slope = ", "slope = 1", 1),
+        lambda _: "[notes]\n",
+        lambda _: "",
+    ],
+)
+def test_what_dsis_did_not_write_is_not_overwritten(
+    tmp_path: Path, change: Callable[[str], str]
+) -> None:
+    fit, path = fit_camera(record(ONE, 2)), tmp_path / "camera.toml"
+    write_fit(fit, path)
+    path.write_text(change(path.read_text()))
+    before = every_byte(tmp_path)
+    wanted = "was not written by dsis, or was changed since, and would be lost: give another name"
+    with pytest.raises(InputError) as refused:
+        write_fit(fit, path)
+    assert str(refused.value) == f"{path}: {wanted}"
+    assert every_byte(tmp_path) == before
+
+
+def test_a_place_below_a_file_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("mine")
+    with pytest.raises(InputError, match=r"camera\.toml: lies below .*file, which is a file"):
+        write_fit(fit_camera(record(ONE, 2)), tmp_path / "file" / "camera.toml")
+
+
+def test_a_file_that_was_copied_with_other_ends_of_lines_is_unchanged(tmp_path: Path) -> None:
+    fit, path = fit_camera(record(ONE, 2)), tmp_path / "camera.toml"
+    write_fit(fit, path)
+    path.write_bytes(path.read_bytes().replace(b"\n", b"\r\n"))
+    write_fit(fit, path)
+    assert b"\r" not in path.read_bytes()
+
+
+def test_the_maps_of_another_camera_are_not_overwritten(tmp_path: Path) -> None:
+    fit = fit_camera(record(TWO, 2))
+    write_fit(fit, tmp_path / "a.toml")
+    before = every_byte(tmp_path)
+    with pytest.raises(InputError, match=r"maps\.npz: camera: holds the patterns of a\.toml, must"):
+        write_fit(fit, tmp_path / "b.toml")
+    assert every_byte(tmp_path) == before
+    write_fit(replace(fit, maps=None), tmp_path / "b.toml")
+    assert owner_of(tmp_path / "maps.npz") == "a.toml"
+    (tmp_path / "a.toml").unlink()
+    write_fit(fit, tmp_path / "b.toml")
+    assert owner_of(tmp_path / "maps.npz") == "b.toml"
+    (tmp_path / "maps.npz").write_bytes(b"a map of mine")
+    with pytest.raises(InputError, match=r"maps\.npz: camera: does not say whose patterns"):
+        write_fit(fit, tmp_path / "b.toml")
+    assert (tmp_path / "maps.npz").read_bytes() == b"a map of mine"
 
 
 def test_the_written_camera_makes_the_same_recording_again(tmp_path: Path) -> None:

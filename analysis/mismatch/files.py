@@ -7,14 +7,18 @@ from pathlib import Path
 from analysis.mismatch.finding import Finding
 from analysis.mismatch.jsonfile import write_json
 from analysis.mismatch.report import write_page
+from analysis.mismatch.report.figures import drawn_by_dsis
 from analysis.mismatch.report.sentences import fitted
+from analysis.photon_transfer.checksum import unchanged, with_checksum
 from analysis.photon_transfer.files import camera_tables
 from dsis.camera import camera_values
-from dsis.outdir import UNFINISHED, result_folder
+from dsis.outdir import UNFINISHED, listed, result_folder
 from dsis.simulate.maps import MAPS, SensorMaps, write_maps
 
 MARK = "mismatch.json"
-FILES = frozenset({MARK, "report.html", "camera.toml", MAPS, "figures"})
+CAMERA = "camera.toml"
+FIGURES = "figures"
+FILES = frozenset({MARK, "report.html", CAMERA, MAPS, FIGURES})
 
 
 def write_finding(
@@ -46,8 +50,9 @@ def finding_folder(out: Path) -> Iterator[Path]:
 
 def fill(folder: Path, finding: Finding, origin: str = "", maps: SensorMaps | None = None) -> None:
     """Write the files of a diagnosis into a folder, `mismatch.json` last."""
-    camera = folder / "camera.toml"
-    camera.write_text(camera_text(finding, origin), encoding="utf-8", newline="")
+    camera = folder / CAMERA
+    text = with_checksum(camera_text(finding, origin))
+    camera.write_text(text, encoding="utf-8", newline="")
     if maps is not None:
         write_maps(maps, camera)
     write_page(finding, folder, origin)
@@ -72,6 +77,11 @@ def camera_text(finding: Finding, origin: str = "") -> str:
 
 
 def _not_ours(out: Path) -> str | None:
-    """Return what in an earlier result is no part of one."""
-    other = sorted(p.name for p in out.iterdir() if p.name not in FILES | {UNFINISHED})
-    return ", ".join(other) or None
+    """Return what in an earlier result is no part of one, or was changed by the user."""
+    other = [p.name for p in sorted(out.iterdir()) if p.name not in FILES | {UNFINISHED}]
+    if (out / MARK).is_file():  # else unfinished: what was being written is cut off
+        drawn = sorted((out / FIGURES).glob("*"))
+        other += [f"{FIGURES}/{path.name}" for path in drawn if not drawn_by_dsis(path)]
+        if (out / CAMERA).is_file() and not unchanged(out / CAMERA):
+            other.append(f"changes to {CAMERA}")
+    return listed(other)

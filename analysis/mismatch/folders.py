@@ -1,7 +1,7 @@
 """From files to files: a camera model and recordings in, a folder of results for each out."""
 
 import difflib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
@@ -80,6 +80,7 @@ def diagnose_recordings(
     allowed = VOCABULARY - set(VOCABULARY if locate_only else without)
     maps = _maps(camera_file)
     folders = _folders(opened, out)
+    _check_kept(camera_file, folders.values())
     found: dict[str, Finding] = {}
     with ExitStack() as left:
         # All folders are refused before any work begins; each result is there as soon as it is.
@@ -226,6 +227,14 @@ def _folders(opened: Sequence[Recording], out: Path) -> dict[str, Path]:
             name, number = f"{wanted}-{number}", number + 1
         names.append(name)
     return {name: out / name for name in names}
+
+
+def _check_kept(camera_file: Path, folders: Iterable[Path]) -> None:
+    """Refuse a folder that holds the camera model: the result would take its place."""
+    for folder in folders:
+        if camera_file.resolve().is_relative_to(folder.resolve()):
+            fact = f"holds {camera_file.name}, the camera model that is read, which would be lost"
+            raise InputError.of(folder, "", f"{fact}: give another folder")
 
 
 def _origin(recording: Recording, camera_file: Path, seed: int, without: Sequence[str]) -> str:

@@ -11,11 +11,12 @@ import numpy as np
 import tomli_w
 
 from analysis.figures_camera import draw_distribution, draw_photon_transfer
+from analysis.photon_transfer.checksum import check_camera_file, with_checksum
 from analysis.photon_transfer.fit import Fit
 from analysis.photon_transfer.quantity import Quantity
 from dsis.camera import Camera, camera_values
-from dsis.errors import InputError
-from dsis.simulate.maps import MAPS, owner_of, write_maps
+from dsis.outdir import check_parents, said_of
+from dsis.simulate.maps import MAPS, check_maps_file, owner_of, write_maps
 
 SCHEMA = "dsis-camera-fit/1"
 
@@ -28,7 +29,9 @@ def write_fit(fit: Fit, out_toml: Path, origin: str = "") -> tuple[Path, ...]:
     fit
         The fit; raises `InputError` where it is no possible camera.
     out_toml
-        Where the camera model goes; the other names start with its stem.
+        Where the camera model goes; the other names start with its stem. Raises `InputError` where
+        a file lies there that was not written by dsis or was changed since, or beside it the maps
+        of another camera.
     origin
         A comment that says what was recorded: source, copyright, licence.
 
@@ -36,9 +39,16 @@ def write_fit(fit: Fit, out_toml: Path, origin: str = "") -> tuple[Path, ...]:
     -------
     The files written.
     """
-    if out_toml.suffix != ".toml":
-        raise InputError.of(out_toml, "", "must end in .toml: the camera model is written to it")
-    text = camera_text(fit, origin)  # first: where it fails, nothing is written
+    text = with_checksum(camera_text(fit, origin))  # first: where it fails, nothing is written
+    with said_of(out_toml):
+        check_parents(out_toml)
+        check_camera_file(out_toml)
+        if fit.maps is not None:
+            check_maps_file(out_toml)
+        return _written(fit, out_toml, text)
+
+
+def _written(fit: Fit, out_toml: Path, text: str) -> tuple[Path, ...]:
     out_toml.parent.mkdir(parents=True, exist_ok=True)
 
     def beside(ending: str) -> Path:

@@ -61,9 +61,11 @@ def _add_simulate(add: Add) -> None:
 def camera_fit(options: argparse.Namespace) -> None:
     """Fit a camera model to a recording by photon transfer."""
     from analysis.photon_transfer import fit_camera, summary, write_fit
+    from analysis.photon_transfer.checksum import check_camera_file
     from dsis.recording import read_recording
 
     recording = read_recording(options.recording)
+    check_camera_file(options.out)  # before the work, not after
     with _called({recording.sensor.name: options.recording}):
         with progress_bar("fit") as progress:
             fit = fit_camera(recording, options.segments, threads=options.jobs, progress=progress)

@@ -119,7 +119,7 @@ def _folders(names: Sequence[str]) -> dict[str, str]:
 
 def _not_ours(folder: Path) -> str | None:
     """Return what in an earlier recording, or an unfinished one, is no part of it."""
-    exposures = _exposure_folders(folder / RECORDING)
+    exposures = _exposure_folders(folder)
     other = []
     for path in sorted(folder.iterdir()):
         if path.is_dir() and (exposures is None or path.name in exposures):
@@ -130,12 +130,12 @@ def _not_ours(folder: Path) -> str | None:
     return listed(other)
 
 
-def _exposure_folders(listing: Path) -> frozenset[str] | None:
-    """Return the folders that a `recording.toml` names; None where it is not yet written."""
-    if not listing.is_file():
+def _exposure_folders(folder: Path) -> frozenset[str] | None:
+    """Return the folders that a recording's `recording.toml` names; None: it is unfinished."""
+    if (folder / UNFINISHED).is_file():
         return None
     try:
-        entries = tomllib.loads(listing.read_text(encoding="utf-8"))["exposure"]
+        entries = tomllib.loads((folder / RECORDING).read_text(encoding="utf-8"))["exposure"]
         return frozenset(Path(entry["frames"]).parent.as_posix() for entry in entries)
-    except (ValueError, KeyError, TypeError):  # changed by hand: its folders are no more ours
+    except (OSError, ValueError, KeyError, TypeError):  # changed by hand: no more ours
         return frozenset()

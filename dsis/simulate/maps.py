@@ -76,10 +76,7 @@ def read_maps(camera_file: Path) -> SensorMaps:
         raise InputError.of(path, "", f"is damaged: {str(error).splitlines()[0]}") from None
     owner = str(arrays.pop("camera", camera_file.name))
     if owner != camera_file.name:
-        fact = (
-            f"holds the patterns of {owner}, must be those of {camera_file.name}: a folder holds "
-        )
-        raise InputError.of(path, "camera", f"{fact}the maps of one camera; fit into another")
+        raise _of_another(path, owner, camera_file)
     noise = {name: arrays.pop(name, np.float64(0)) for name in ("dsnu_noise_dn", "prnu_noise")}
     faults = [
         Fault(str(path), name, f"is {value}, must be a number >= 0")
@@ -126,6 +123,24 @@ def owner_of(maps_file: Path) -> str | None:
             return str(stored["camera"])
     except (OSError, ValueError, EOFError, KeyError, BadZipFile):
         return None
+
+
+def check_maps_file(camera_file: Path) -> None:
+    """Refuse to write the maps of a camera over those of another, or over what is no such file."""
+    path = camera_file.parent / MAPS
+    if not path.exists():
+        return
+    owner = owner_of(path)
+    if owner is None:
+        fact = "does not say whose patterns it holds, and would be lost: fit into another folder"
+        raise InputError.of(path, "camera", fact)
+    if owner != camera_file.name and (camera_file.parent / owner).exists():
+        raise _of_another(path, owner, camera_file)
+
+
+def _of_another(path: Path, owner: str, camera_file: Path) -> InputError:
+    fact = f"holds the patterns of {owner}, must be those of {camera_file.name}: a folder holds "
+    return InputError.of(path, "camera", f"{fact}the maps of one camera; fit into another")
 
 
 def write_maps(maps: SensorMaps, camera_file: Path) -> None:

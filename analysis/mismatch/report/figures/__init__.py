@@ -46,6 +46,8 @@ _SURFACES = ("fixed_smooth_variance", "fixed_patch_variance", "outlying_patch")
 NOISY_PARTS = "smooth_variance_spread"
 MANY_PIXELS = frozenset({"fixed_pixel_variance"})
 VARIANCE = "pixel_variance"
+_MARKS = {".svg": b"<dc:title>dsis</dc:title>", ".png": b"Software\0dsis"}
+_METADATA_BYTES = 4096  # before any drawing
 _EXPOSURES = 3  # panels of frame means
 
 Size = tuple[float, float]
@@ -102,6 +104,15 @@ def save(picture: Picture, folder: Path) -> bytes:
         figure.set_layout_engine(None)  # it is laid out: with one it would be drawn twice again
         figure.savefig(png, metadata={"Software": "dsis", "Title": title}, dpi=200)
     return svg.read_bytes()
+
+
+def drawn_by_dsis(path: Path) -> bool:
+    """Tell whether a file is a figure that `save` wrote: its metadata say so."""
+    mark = _MARKS.get(path.suffix)
+    if mark is None or not path.is_file():
+        return False
+    with path.open("rb") as file:
+        return mark in file.read(_METADATA_BYTES)
 
 
 def _in_turn(finding: Finding) -> Iterator[Mismatch]:

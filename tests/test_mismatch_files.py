@@ -1,6 +1,7 @@
 """Promise: what `dsis mismatch` leaves on disk is complete, the same every time, and of use."""
 
 import json
+import shutil
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,8 @@ from analysis.mismatch.finding import Change, Finding, Where
 from analysis.mismatch.jsonfile import finding_values, write_json
 from dsis.camera import Camera, read_camera
 from dsis.cli import main
-from dsis.recording import read_recording
+from dsis.errors import InputError
+from dsis.recording import Recording, read_recording
 from dsis.simulate import dark, flat, simulate
 from dsis.simulate.maps import SensorMaps
 from mismatch_findings import BASE, CAMERA, FOUND, NOTHING, ROWS, evidence
@@ -211,6 +213,30 @@ def test_several_recordings_get_a_folder_each_and_a_table(
     assert first == second
     table = [line for line in capsys.readouterr().out.splitlines() if "| omitted_physics |" in line]
     assert [line.split(" | ")[0] for line in table] == ["| recording", "| recording-2"]
+
+
+def test_what_was_found_before_a_recording_fails_is_said(
+    recording: Path,
+    model: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    shutil.copytree(recording, tmp_path / "damaged")
+
+    def find(_: Camera, one: Recording, **__: object) -> Finding:
+        if one.folder.name == "damaged":
+            raise InputError.of("frame.tif", "", "is damaged")
+        return NOTHING
+
+    monkeypatch.setattr(folders, "find_mismatch", find)
+    both, out = [str(recording), str(tmp_path / "damaged")], tmp_path / "out"
+    assert main(["mismatch", str(model), *both, "-o", str(out), "--jobs", "1"]) == 2
+    said = capsys.readouterr()
+    assert said.err == "dsis: frame.tif: is damaged\n"
+    assert said.out.startswith("# recording\n\n**match**")
+    assert f"report in {out / 'recording' / 'report.html'}" in said.out
+    assert [path.name for path in out.iterdir()] == ["recording"]
 
 
 def test_recordings_side_by_side_are_those_one_by_one(

@@ -42,6 +42,7 @@ def diagnose_recordings(
     locate_only: bool = False,
     scheduler: str | None = None,
     progress: Progress | None = None,
+    finished: Callable[[Diagnosis], None] | None = None,
 ) -> tuple[Diagnosis, ...]:
     """Compare recordings with a camera model; what is wrong with the input is said before work.
 
@@ -66,6 +67,8 @@ def diagnose_recordings(
         Whether to say where they differ, and to look for no physics.
     progress
         Told (done, total, doing).
+    finished
+        Told each diagnosis as soon as its files are there: a later recording may fail.
 
     Raises
     ------
@@ -81,7 +84,7 @@ def diagnose_recordings(
     maps = _maps(camera_file)
     folders = _folders(opened, out)
     _check_kept(camera_file, folders.values())
-    found: dict[str, Finding] = {}
+    found: dict[str, Diagnosis] = {}
     with ExitStack() as left:
         # All folders are refused before any work begins; each result is there as soon as it is.
         held = {name: ExitStack() for name in folders}
@@ -95,8 +98,10 @@ def diagnose_recordings(
                 partial_folders[name], finding, _origin(of[name], camera_file, seed, without), maps
             )
             held[name].close()
-            found[name] = finding
-    return tuple(Diagnosis(name, folder, found[name]) for name, folder in folders.items())
+            found[name] = Diagnosis(name, folders[name], finding)
+            if finished is not None:
+                finished(found[name])
+    return tuple(found[name] for name in folders)
 
 
 def _found(

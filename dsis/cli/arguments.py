@@ -29,12 +29,16 @@ def adder(commands: Commands, prefix: str = "") -> Add:
     return add
 
 
-def whole(low: int, high: int = 2**63 - 1) -> Callable[[str], int]:
+_LARGEST = 2**63 - 1
+
+
+def whole(low: int, high: int = _LARGEST) -> Callable[[str], int]:
     """Return what reads a whole number from `low` to `high`."""
+    bounds = f"from {low} to {high}" if high < _LARGEST else f"of {low} or more"
 
     def read(text: str) -> int:
         if not text.isdecimal() or not low <= int(text) <= high:
-            message = f"is {text!r}, must be a whole number from {low} to {high}"
+            message = f"is {text!r}, must be a whole number {bounds}"
             raise argparse.ArgumentTypeError(message)
         return int(text)
 

@@ -1,10 +1,15 @@
 """`dsis mismatch`: what physics a camera model leaves out."""
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from dsis.cli.arguments import Add, add_jobs, add_scheduler, add_seed
 from dsis.cli.progress import progress_bar
+
+if TYPE_CHECKING:
+    from analysis.mismatch.folders import Diagnosis
 
 
 def add_mismatch(add: Add) -> None:
@@ -34,20 +39,30 @@ def add_mismatch(add: Add) -> None:
 def mismatch(options: argparse.Namespace) -> None:
     """Say where recordings differ from a camera model, and what physics it leaves out."""
     from analysis.mismatch.folders import diagnose_recordings
+
+    done: list[Diagnosis] = []
+    found: Sequence[Diagnosis] = done
+    try:
+        with progress_bar("mismatch") as progress:
+            found = diagnose_recordings(
+                options.camera,
+                options.recordings,
+                options.out,
+                seed=options.seed or 0,
+                jobs=options.jobs,
+                without=options.without,
+                locate_only=options.locate_only,
+                scheduler=options.scheduler,
+                progress=progress,
+                finished=done.append,
+            )
+    finally:
+        _say(found)  # where one recording fails, what was found in others before it is on disk
+
+
+def _say(found: "Sequence[Diagnosis]") -> None:
     from analysis.mismatch.report.summary import comparison, summary
 
-    with progress_bar("mismatch") as progress:
-        found = diagnose_recordings(
-            options.camera,
-            options.recordings,
-            options.out,
-            seed=options.seed or 0,
-            jobs=options.jobs,
-            without=options.without,
-            locate_only=options.locate_only,
-            scheduler=options.scheduler,
-            progress=progress,
-        )
     for one in found:
         print(f"# {one.name}\n\n{summary(one.finding)}")
     if len(found) > 1:

@@ -2,6 +2,7 @@
 
 import argparse
 import errno
+import io
 import os
 import sys
 from collections.abc import Sequence
@@ -9,6 +10,7 @@ from collections.abc import Sequence
 from dsis import __version__
 from dsis.cli.arguments import adder
 from dsis.cli.camera import add_camera
+from dsis.cli.commandparser import CommandParser
 from dsis.cli.demo import add_demo
 from dsis.cli.mismatch import add_mismatch
 from dsis.cli.paper import add_paper
@@ -22,6 +24,7 @@ from dsis.errors import DsisError, InputError
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status: 0 done, 1 damaged files, 2 bad input."""
+    _print_anything()
     options = parser().parse_args(arguments)
     try:
         options.command(options)
@@ -41,13 +44,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 0
 
 
+def _print_anything() -> None:
+    """Put a question mark where a terminal's encoding lacks a character, instead of failing."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
+
+
 def _complain(message: str) -> None:
     print("\n".join(f"dsis: {line}" for line in message.splitlines()), file=sys.stderr)
 
 
 def parser() -> argparse.ArgumentParser:
     """Return what reads a command line: `command` is the function that it names."""
-    program = argparse.ArgumentParser(
+    program: argparse.ArgumentParser = CommandParser(
         prog="dsis",
         description="Prepare, run and analyse a double-stimulus impairment test (ITU-R BT.500) "
         "of real camera noise.",

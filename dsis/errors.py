@@ -49,6 +49,10 @@ class InputError(DsisError):
         self.faults = tuple(faults)
         super().__init__("\n".join(str(fault) for fault in self.faults))
 
+    def __reduce__(self) -> tuple[type[Self], tuple[tuple[Fault, ...]]]:
+        """Travel from a process with the faults; exceptions do so with their message alone."""
+        return type(self), (self.faults,)
+
     @classmethod
     def of(cls, file: object, key: str, fact: str) -> Self:
         """Return the error for a single fault."""

@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 
 from dsis.cli import main
-from dsis.errors import InputError
+from dsis.errors import Fault, InputError
 from dsis.workers import MOST_TRIES, Workers, WorkersLostError, completed, workers
 
 SECONDS = 60.0  # in which processes must start, however busy the machine is
@@ -33,6 +33,10 @@ def slow(x: int) -> int:
 def fails(x: int) -> int:
     message = f"no {x}"
     raise ValueError(message)
+
+
+def refuses(x: int) -> int:
+    raise InputError([Fault("a.toml", "key", f"is {x}"), Fault("b.toml", "", "is missing")])
 
 
 def die_once(mark: Path, x: int) -> int:
@@ -86,6 +90,13 @@ def test_no_more_is_begun_after_a_failure() -> None:
     with workers(1) as pool, pytest.raises(ValueError, match="no 0"):
         list(completed(pool, work, range(50)))
     assert len(begun) <= 2 * pool.count
+
+
+def test_what_a_process_refuses_is_said_in_its_words() -> None:
+    with pytest.raises(InputError) as refused, workers(1, kind="processes") as pool:
+        pool.submit(refuses, 3).result(SECONDS)
+    assert str(refused.value) == "a.toml: key: is 3\nb.toml: is missing"
+    assert refused.value.faults[1] == Fault("b.toml", "", "is missing")
 
 
 def test_work_of_a_process_that_died_is_done_again(tmp_path: Path) -> None:

@@ -93,7 +93,8 @@ class Camera(Model):
             message += f"the largest code of bit_depth = {self.bit_depth}"
             raise ValueError(message)
         if self.black_level >= self.white_level:
-            message = f"black_level is {self.black_level}, must be below white_level"
+            message = f"black_level is {self.black_level}, must be below white_level "
+            message += f"({self.white_level})"
             raise ValueError(message)
         if abs(np.linalg.det(np.array(self.camera_from_scene))) < 1e-6:
             message = "camera_from_scene must be invertible"

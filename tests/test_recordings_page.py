@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from analysis.mismatch import finding
+from analysis.mismatch.files import FILES as DIAGNOSIS
 from dsis.camera import BaseNoise, Camera, Segment, read_camera
 from dsis.cli import main
 from dsis.recording import Sensor, read_recording
@@ -92,6 +93,11 @@ def test_the_tables_have_the_keys_that_there_are() -> None:
 def test_every_key_of_mismatch_json_is_told(of: type) -> None:
     for field in fields(of):
         assert f"`{field.name}`" in FILES, field.name
+
+
+def test_every_file_of_a_diagnosis_is_told() -> None:
+    for name in DIAGNOSIS:
+        assert re.search(rf"^\| `{name}/?` \|", FILES, re.MULTILINE), name
 
 
 def test_links_lead_to_pages() -> None:

@@ -141,6 +141,19 @@ gain_error_percent = 1.0
         with pytest.raises(InputError, match=says):
             read_camera(path)
 
+    def test_signals_that_single_precision_does_not_hold(self, tmp_path: Path) -> None:
+        path = tmp_path / "camera.toml"
+        write_camera(BACKGROUND.model_copy(update={"saturation_dn": 1.5}), path)
+        path.write_text(path.read_text().replace("saturation_dn = 1.5", "saturation_dn = 1e300"))
+        with pytest.raises(InputError, match=r"saturation_dn: is 1e\+300, must be less than"):
+            read_camera(path)
+        write_camera(BACKGROUND, path)
+        path.write_text(path.read_text().replace("upper_dn = 1000.0", "upper_dn = 1e300"))
+        with pytest.raises(
+            InputError, match=r"segment\[0\].upper_dn: is 1e\+300, must be less than"
+        ):
+            read_camera(path)
+
     def test_text_may_begin_with_a_byte_order_mark(self, tmp_path: Path) -> None:
         path = tmp_path / "camera.toml"
         write_camera(BACKGROUND, path)

@@ -104,3 +104,6 @@ def test_links_lead_to_pages() -> None:
     for page in (RECORDINGS, CAMERAS, FILES):
         for link in re.findall(r"\]\((.*?)\)", page):
             assert (DOCS / link).is_file(), link
+    readme = (DOCS.parent / "README.md").read_text(encoding="utf-8")
+    for page in ("recordings.md", "camera-models.md", "mismatch-files.md"):
+        assert f"](docs/{page})" in readme

@@ -31,13 +31,14 @@ from dsis.noise import Segments, read_noise, shot_noise
 Row = tuple[float, float, float]
 Positive = Annotated[float, Field(gt=0)]
 NotNegative = Annotated[float, Field(ge=0)]
+Signal = Annotated[float, Field(gt=0, le=1e30)]  # DN above black; single precision holds it
 _MOST_BITS = 24  # of float32's significand
 
 
 class Segment(Model):
     """One read-out path: variance = slope * x + intercept, x in DN above black."""
 
-    upper_dn: Positive | None = None
+    upper_dn: Signal | None = None
     slope: Annotated[float, Field(ge=0, le=1e6)]
     intercept: Annotated[float, Field(ge=-1e12, le=1e12)]
     slope_se: NotNegative | None = None
@@ -72,8 +73,8 @@ class Camera(Model):
     black_level: NotNegative
     white_level: Positive
     bit_depth: Annotated[int, Field(ge=1)]
-    saturation_dn: Positive | None = None
-    diffuse_white_dn: Positive | None = None
+    saturation_dn: Signal | None = None
+    diffuse_white_dn: Signal | None = None
     white_balance: tuple[Positive, Positive, Positive] = (1.0, 1.0, 1.0)
     camera_from_scene: tuple[Row, Row, Row] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
     noise: BaseNoise
@@ -93,7 +94,8 @@ class Camera(Model):
             message += f"the largest code of bit_depth = {self.bit_depth}"
             raise ValueError(message)
         if self.black_level >= self.white_level:
-            message = f"black_level is {self.black_level}, must be below white_level"
+            message = f"black_level is {self.black_level}, must be below white_level "
+            message += f"({self.white_level})"
             raise ValueError(message)
         if abs(np.linalg.det(np.array(self.camera_from_scene))) < 1e-6:
             message = "camera_from_scene must be invertible"

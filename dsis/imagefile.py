@@ -124,6 +124,13 @@ class CodesInfo:
     images: int
 
 
+def known_format(path: Path) -> bool:
+    """Return whether a file has the suffix of a format that can be read."""
+    formats = str(oiio.get_string_attribute("extension_list")).split(";")
+    known = {suffix for form in formats for suffix in form.rpartition(":")[2].split(",")}
+    return path.suffix.lower().removeprefix(".") in known - {""}
+
+
 def codes_info(path: Path) -> CodesInfo:
     """Return what the header says of a file's codes; raise `InputError` where it is no image."""
     opened = _opened(path)

@@ -34,8 +34,8 @@ M = TypeVar("M", bound=Model)
 
 def read_toml(path: Path) -> dict[str, Any]:
     """Return a TOML file as a dictionary; raise `InputError` where it cannot be read."""
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+    try:  # Windows' editors begin UTF-8 with a byte order mark
+        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "is not UTF-8 text"
         raise InputError.of(path, "", f"cannot be read: {reason}") from None

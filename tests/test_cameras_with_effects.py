@@ -131,6 +131,7 @@ gain_error_percent = 1.0
     @pytest.mark.parametrize(("level", "bits", "says"), [
         ("1022.5", "10", r"white_level is 1022\.5, must be a whole number"),
         ("1023", "25", "bit_depth is 25, must be <= 24: frames are computed in single precision"),
+        ("255", "16", r"black_level is 500\.0, must be below white_level \(255\.0\)"),
     ])  # fmt: skip
     def test_codes_that_cannot_be(self, tmp_path: Path, level: str, bits: str, says: str) -> None:
         path = tmp_path / "camera.toml"
@@ -139,6 +140,25 @@ gain_error_percent = 1.0
         path.write_text(text.replace("bit_depth = 16", f"bit_depth = {bits}"))
         with pytest.raises(InputError, match=says):
             read_camera(path)
+
+    def test_signals_that_single_precision_does_not_hold(self, tmp_path: Path) -> None:
+        path = tmp_path / "camera.toml"
+        write_camera(BACKGROUND.model_copy(update={"saturation_dn": 1.5}), path)
+        path.write_text(path.read_text().replace("saturation_dn = 1.5", "saturation_dn = 1e300"))
+        with pytest.raises(InputError, match=r"saturation_dn: is 1e\+300, must be less than"):
+            read_camera(path)
+        write_camera(BACKGROUND, path)
+        path.write_text(path.read_text().replace("upper_dn = 1000.0", "upper_dn = 1e300"))
+        with pytest.raises(
+            InputError, match=r"segment\[0\].upper_dn: is 1e\+300, must be less than"
+        ):
+            read_camera(path)
+
+    def test_text_may_begin_with_a_byte_order_mark(self, tmp_path: Path) -> None:
+        path = tmp_path / "camera.toml"
+        write_camera(BACKGROUND, path)
+        path.write_text(path.read_text(encoding="utf-8"), encoding="utf-8-sig")
+        assert read_camera(path) == BACKGROUND
 
     def test_a_law_given_twice(self, tmp_path: Path) -> None:
         with pytest.raises(InputError, match="poisson_shot_noise is given 2 times"):

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from analysis.mismatch.bank.key import Key
 from analysis.mismatch.evidence import Curve, Evidence, Histogram, Map, Series, Shown
-from analysis.mismatch.files import write_finding
+from analysis.mismatch.files import FILES, write_finding
 from analysis.mismatch.finding import Finding, FittedParameter, Gain, Where
 from analysis.mismatch.model import processes
 from analysis.mismatch.report import render
@@ -49,6 +49,13 @@ class Page(HTMLParser):
     @property
     def text(self) -> str:
         return re.sub(r"\s+", " ", " ".join(self.words))
+
+
+def test_it_names_all_files_beside_it() -> None:
+    text = Page(render(FOUND, [], "")).text
+    beside = text[text.index("Files beside this page") :]
+    for name in FILES - {"report.html"}:
+        assert name in beside, name
 
 
 def test_processes_draw_the_same_bytes(tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from analysis.photon_transfer import fit_camera
+from dsis.cfa import Cfa
 from dsis.errors import InputError
 from planted_camera import ONE, Z_MAX, Recording, camera, misses, record
 
@@ -21,6 +22,24 @@ class TestBroken:
         single = tuple(replace(e, stack=e.stack[:1]) for e in self.recording.exposures)
         with pytest.raises(InputError, match="one frame only"):
             fit_camera(replace(self.recording, exposures=single))
+
+    @pytest.mark.parametrize(
+        ("cfa", "rows", "columns", "least"),
+        [
+            (Cfa.MONO, 1, 1, r"2 or more$"),
+            (Cfa.RGGB, 1, 128, r"2 or more of each colour \(RGGB\)$"),
+            (Cfa.RGGB, 1, 1, r"2 or more of each colour \(RGGB\)$"),
+            (Cfa.RGGB, 3, 3, r"2 or more of each colour \(RGGB\)$"),
+        ],
+    )
+    def test_frames_of_few_pixels(self, cfa: Cfa, rows: int, columns: int, least: str) -> None:
+        small = tuple(
+            replace(e, stack=np.ascontiguousarray(e.stack[:, :rows, :columns]))
+            for e in self.recording.exposures
+        )
+        sensor = replace(self.recording.sensor, cfa=cfa)
+        with pytest.raises(InputError, match=rf"are of \d+ x {rows} pixels, must have {least}"):
+            fit_camera(Recording(sensor, small))
 
     def test_some_with_one_frame(self) -> None:
         exposures = list(self.recording.exposures)
@@ -106,6 +125,17 @@ class TestBroken:
         assert abs(misses(fit, ONE)["slope 0"]) < Z_MAX
         with pytest.raises(InputError, match="1 distinct levels"):
             fit_camera(self.recording.where(lambda e: e.light == 6000.0))
+
+    def test_why_a_figure_has_no_value(self) -> None:
+        """Nothing fixed is planted: in half of all recordings less than nothing is left of it."""
+        fits = [fit_camera(record(ONE, seed)) for seed in range(1, 5)]
+        for fit in fits:
+            (channel,) = fit.channels.values()
+            unknown = {q.name for q in channel.figures if q.value is None}
+            says = [r for r in fit.remarks if r.startswith("No value (-) of ")]
+            assert len(says) == bool(unknown)
+            assert all(f"{name} (MONO)" in says[0] for name in unknown)
+        assert any("No value (-) of DSNU1288" in r for fit in fits for r in fit.remarks)
 
     def test_too_many_segments(self) -> None:
         with pytest.raises(InputError, match="--segments 7"):

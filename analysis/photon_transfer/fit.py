@@ -38,6 +38,7 @@ from analysis.photon_transfer.remarks import (
     remark_on_fit,
     remarks_on_clipped_darks,
     remarks_on_patterns,
+    remarks_on_unknown,
 )
 from analysis.photon_transfer.segments import SegmentFit, fit_segments, lines_between
 from analysis.photon_transfer.statistics import LevelStatistics, expose_statistics
@@ -227,6 +228,7 @@ def fit_camera(
     remarks += remarks_on_clipped_darks(measured, recording.sensor.black_level)
     remark_on_fit(found, alike, darks, levels, remarks, full_well_means=full_means)
     remarks += remarks_on_patterns(patterns)
+    remarks += remarks_on_unknown({name: channel.figures for name, channel in channels.items()})
     return Fit(
         name=recording.sensor.name,
         cfa=recording.sensor.cfa,

@@ -1,6 +1,6 @@
 """What limits the numbers of a fit, in sentences."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from scipy import stats
@@ -10,6 +10,7 @@ from analysis.photon_transfer.levels import WANDER_P, FittedLevel
 from analysis.photon_transfer.parts import P_SEEN
 from analysis.photon_transfer.patterns import LEAST_GAIN, FixedPatterns
 from analysis.photon_transfer.projections import OUTLIER_SD
+from analysis.photon_transfer.quantity import Quantity
 from analysis.photon_transfer.segments import SegmentFit
 from analysis.photon_transfer.statistics import LevelStatistics
 from dsis.recording.hygiene import CLIPPED_SHARE
@@ -116,6 +117,19 @@ def remarks_on_patterns(patterns: FixedPatterns) -> list[str]:
         if p.smooth.p < P_SEEN and p.smooth.variance > 0
     ]
     return found
+
+
+def remarks_on_unknown(figures: Mapping[str, Sequence[Quantity]]) -> list[str]:
+    """Return why tables have no value for some figures; `figures` of each channel."""
+    channels: dict[str, dict[str, None]] = {}
+    for channel, own in figures.items():
+        for name in (q.name for q in own if q.value is None):
+            channels.setdefault(name, {})[channel] = None
+    if not channels:
+        return []
+    names = ", ".join(f"{name} ({', '.join(of)})" for name, of in channels.items())
+    why = "the fixed pattern is too weak to be seen beside the noise of these frames"
+    return [f"No value (-) of {names}: {why}."]
 
 
 def _remarks_on_lines(levels: Sequence[FittedLevel]) -> list[str]:

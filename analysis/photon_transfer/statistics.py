@@ -25,8 +25,11 @@ from analysis.photon_transfer.sums import (
     begin,
     square_total,
 )
+from dsis.cfa import Cfa
+from dsis.errors import InputError
 from dsis.recording.hygiene import CLIPPED_SHARE, Inspection
 
+_LEAST_PIXELS = 2  # of a channel: their common change is taken off
 LINES_P = 1e-3  # rows or columns that vary more than chance does so often have their own noise
 
 
@@ -114,7 +117,8 @@ def expose_statistics(
 
     `inspection` sees every frame in passing, and says which code is white; `patterns` is given the
     sum of the frames where none is repeated and no more than `CLIPPED_SHARE` of the samples are
-    clipped.
+    clipped. Raises `InputError` where a channel has a single pixel or none: its noise is no other
+    than a change of the light.
     """
     white = int(inspection.white_level if inspection else recording.sensor.white_level)
     sums: Sums | None = None
@@ -123,6 +127,7 @@ def expose_statistics(
         if inspection is not None:
             inspection.look(str(exposure.name), count, frame)
         if sums is None:
+            _refuse_few(recording, frame.shape)
             sums = begin(frame)
         row, column = (
             np.empty((frame.shape[0], 2), np.int64),
@@ -150,6 +155,16 @@ def expose_statistics(
     names = channel_names(recording.sensor.cfa)
     found = dict.fromkeys(names[i][j] for i, j in product((0, 1), (0, 1)))
     return [_channel(exposure, name, names, sums, pattern) for name in found]
+
+
+def _refuse_few(recording: Recorded, size: tuple[int, ...]) -> None:
+    """Raise `InputError` where frames of this size (rows, columns) hold too few pixels."""
+    cfa = recording.sensor.cfa
+    step = 1 if cfa is Cfa.MONO else 2
+    if (size[0] // step) * (size[1] // step) < _LEAST_PIXELS:
+        each = f" of each colour ({cfa.value})" if step > 1 else ""
+        fact = f"are of {size[1]} x {size[0]} pixels, must have {_LEAST_PIXELS} or more{each}"
+        raise InputError.of(recording.sensor.name, "frames", fact)
 
 
 def _channel(

@@ -17,6 +17,7 @@ from dsis.grid import PixelGrid
 
 BLOCK_CODES = 64
 _TOGETHER = 4096  # samples whose codes stay in the cache
+_LEAST_LSB = 1e-9  # of a smaller spread all codes are as wide, in single precision
 
 
 class AdcDnl(Effect):
@@ -42,7 +43,7 @@ class AdcDnl(Effect):
 
     def apply(self, image: Image, exposure: Exposure) -> Image:
         """Return whole codes less black, by the converter's edges."""
-        if not self.rms_lsb:
+        if self.rms_lsb < _LEAST_LSB:
             return image
         black = np.float32(exposure.read_out.black_level_dn)
         white = int(exposure.read_out.white_level_dn)

@@ -6,7 +6,7 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, Stage
+from dsis.effects.effect import MOST_DN, Effect, Exposure, Image, OperatingPoint, Stage
 
 _PLACES = {
     "top_left": (0, 0),
@@ -28,7 +28,7 @@ class AmpGlow(Effect):
     """
 
     kind: Literal["amp_glow"] = "amp_glow"
-    dn_per_s: Annotated[float, Field(ge=0, examples=[1500.0])]
+    dn_per_s: Annotated[float, Field(ge=0, le=MOST_DN, examples=[1500.0])]
     place: Literal[
         "top_left",
         "top_right",

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pydantic import Field, field_validator
 
 from dsis.cfa import Cfa
-from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, Stage
+from dsis.effects.effect import MOST_DN, Effect, Exposure, Image, OperatingPoint, Stage
 from dsis.grid import PixelGrid
 from dsis.lines import shifted
 
@@ -28,7 +28,7 @@ class BistablePattern(Effect):
     """
 
     kind: Literal["bistable_pattern"] = "bistable_pattern"
-    amplitude_dn: Annotated[float, Field(ge=0, examples=[1.5])]
+    amplitude_dn: Annotated[float, Field(ge=0, le=MOST_DN, examples=[1.5])]
     frequency: Annotated[tuple[Frequency, Frequency], Field(examples=[(0.5, 0.5)])]
 
     stage: ClassVar[Stage] = Stage.READ_OUT

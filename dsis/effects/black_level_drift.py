@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import Field
 
 from dsis.cfa import Cfa
-from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, Stage
+from dsis.effects.effect import MOST_DN, Effect, Exposure, Image, OperatingPoint, Stage
 from dsis.grid import PixelGrid
 
 
@@ -19,7 +19,7 @@ class BlackLevelDrift(Effect):
     """
 
     kind: Literal["black_level_drift"] = "black_level_drift"
-    sigma_dn: Annotated[float, Field(ge=0, examples=[6.0])]
+    sigma_dn: Annotated[float, Field(ge=0, le=MOST_DN, examples=[6.0])]
     persistence: Annotated[float, Field(ge=0, lt=1)] = 0.0
 
     stage: ClassVar[Stage] = Stage.READ_OUT

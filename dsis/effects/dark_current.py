@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, Stage
+from dsis.effects.effect import MOST_DN, Effect, Exposure, Image, OperatingPoint, Stage
 
 MOST_APART = 3.0  # standard deviation of a logarithm: more is no law of a sensor
 _OF_PIXELS = frozenset({"fixed_pixel_variance", "variance_spread", "kurtosis"})
@@ -23,7 +23,7 @@ class DarkCurrent(Effect):
     """
 
     kind: Literal["dark_current"] = "dark_current"
-    dn_per_s: Annotated[float, Field(ge=0, examples=[400.0])]
+    dn_per_s: Annotated[float, Field(ge=0, le=MOST_DN, examples=[400.0])]
     log_sigma: Annotated[float, Field(ge=0, le=MOST_APART, exclude_if=not_)] = 0.0
 
     stage: ClassVar[Stage] = Stage.LIGHT

@@ -6,7 +6,7 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, Stage
+from dsis.effects.effect import MOST_DN, Effect, Exposure, Image, OperatingPoint, Stage
 from dsis.lines import shifted
 
 
@@ -18,7 +18,7 @@ class Dsnu(Effect):
     """
 
     kind: Literal["dsnu"] = "dsnu"
-    sigma_dn: Annotated[float, Field(ge=0, examples=[4.0])]
+    sigma_dn: Annotated[float, Field(ge=0, le=MOST_DN, examples=[4.0])]
 
     stage: ClassVar[Stage] = Stage.READ_OUT
     reference: ClassVar[str] = "EMVA Standard 1288, release 3.1, section 4"

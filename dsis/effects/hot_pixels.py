@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import Field
 from scipy.special import ndtr, ndtri
 
-from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, Stage
+from dsis.effects.effect import MOST_DN, Effect, Exposure, Image, OperatingPoint, Stage
 
 
 class HotPixels(Effect):
@@ -19,7 +19,7 @@ class HotPixels(Effect):
 
     kind: Literal["hot_pixels"] = "hot_pixels"
     pixel_fraction: Annotated[float, Field(ge=0, le=0.5, examples=[0.02])]
-    mean_dn_per_s: Annotated[float, Field(ge=0, examples=[300.0])]
+    mean_dn_per_s: Annotated[float, Field(ge=0, le=MOST_DN, examples=[300.0])]
 
     stage: ClassVar[Stage] = Stage.LIGHT
     rank: ClassVar[int] = 50  # after what acts on light alone

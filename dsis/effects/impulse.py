@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import Field
 from scipy.special import ndtr, ndtri
 
-from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, Stage
+from dsis.effects.effect import MOST_DN, Effect, Exposure, Image, OperatingPoint, Stage
 
 
 class Impulse(Effect):
@@ -18,7 +18,7 @@ class Impulse(Effect):
 
     kind: Literal["impulse"] = "impulse"
     per_megapixel_frame: Annotated[float, Field(ge=0, le=1e5, examples=[2000.0])]
-    mean_dn: Annotated[float, Field(gt=0, examples=[60.0])] = 500.0
+    mean_dn: Annotated[float, Field(gt=0, le=MOST_DN, examples=[60.0])] = 500.0
 
     stage: ClassVar[Stage] = Stage.CHARGE
     rank: ClassVar[int] = -60

@@ -6,7 +6,7 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, Stage
+from dsis.effects.effect import MOST_DN, Effect, Exposure, Image, OperatingPoint, Stage
 from dsis.lines import moved
 
 
@@ -18,7 +18,7 @@ class RowFpn(Effect):
     """
 
     kind: Literal["row_fpn"] = "row_fpn"
-    sigma_dn: Annotated[float, Field(ge=0, examples=[6.0])]
+    sigma_dn: Annotated[float, Field(ge=0, le=MOST_DN, examples=[6.0])]
 
     stage: ClassVar[Stage] = Stage.READ_OUT
     reference: ClassVar[str] = (
@@ -50,7 +50,7 @@ class ColumnFpn(Effect):
     """
 
     kind: Literal["column_fpn"] = "column_fpn"
-    sigma_dn: Annotated[float, Field(ge=0, examples=[6.0])]
+    sigma_dn: Annotated[float, Field(ge=0, le=MOST_DN, examples=[6.0])]
 
     stage: ClassVar[Stage] = Stage.READ_OUT
     reference: ClassVar[str] = (

@@ -10,7 +10,7 @@ from pydantic import Field, field_validator
 
 from dsis.cfa import Cfa
 from dsis.compiled import kernel
-from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, Stage
+from dsis.effects.effect import MOST_DN, Effect, Exposure, Image, OperatingPoint, Stage
 from dsis.grid import PixelGrid
 
 Frequency = Annotated[float, Field(ge=-0.5, le=0.5)]
@@ -26,7 +26,7 @@ class PeriodicNoise(Effect):
     """
 
     kind: Literal["periodic_noise"] = "periodic_noise"
-    amplitude_dn: Annotated[float, Field(ge=0, examples=[2.0])]
+    amplitude_dn: Annotated[float, Field(ge=0, le=MOST_DN, examples=[2.0])]
     frequency: Annotated[tuple[Frequency, Frequency], Field(examples=[(0.21, 0.13)])]
 
     stage: ClassVar[Stage] = Stage.READ_OUT

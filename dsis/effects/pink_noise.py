@@ -10,7 +10,7 @@ from pydantic import Field
 from scipy import fft
 
 from dsis.cfa import Cfa
-from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, Stage
+from dsis.effects.effect import MOST_DN, Effect, Exposure, Image, OperatingPoint, Stage
 from dsis.grid import PixelGrid
 from dsis.kept import Kept
 
@@ -29,7 +29,7 @@ class PinkNoise(Effect):
     """
 
     kind: Literal["pink_noise"] = "pink_noise"
-    sigma_dn: Annotated[float, Field(ge=0, examples=[1.5])]
+    sigma_dn: Annotated[float, Field(ge=0, le=MOST_DN, examples=[1.5])]
     along: Annotated[Literal["rows", "columns"], Field(exclude_if=_ROWS.__eq__)] = "rows"
 
     stage: ClassVar[Stage] = Stage.READ_OUT

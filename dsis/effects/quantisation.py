@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, ReadOut, Stage
+from dsis.effects.effect import MOST_DN, Effect, Exposure, Image, OperatingPoint, ReadOut, Stage
 
 _ROUNDED = 1e-9  # of a step: 4095 / 1.05 is 3900
 
@@ -26,8 +26,8 @@ class Quantisation(Effect):
     """
 
     kind: Literal["quantisation"] = "quantisation"
-    step_dn: Annotated[float, Field(ge=1, examples=[4.0])]
-    phase_dn: Annotated[float, Field(ge=0, exclude_if=not_)] = 0.0
+    step_dn: Annotated[float, Field(ge=1, le=MOST_DN, examples=[4.0])]
+    phase_dn: Annotated[float, Field(ge=0, le=MOST_DN, exclude_if=not_)] = 0.0
 
     stage: ClassVar[Stage] = Stage.CODE
     rank: ClassVar[int] = 60

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from dsis.cfa import Cfa
 from dsis.compiled import kernel
-from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, Stage
+from dsis.effects.effect import MOST_DN, Effect, Exposure, Image, OperatingPoint, Stage
 from dsis.grid import PixelGrid
 from dsis.lines import moved
 
@@ -25,7 +25,7 @@ class RowBanding(Effect):
     """
 
     kind: Literal["row_banding"] = "row_banding"
-    sigma_dn: Annotated[float, Field(ge=0, examples=[3.0])]
+    sigma_dn: Annotated[float, Field(ge=0, le=MOST_DN, examples=[3.0])]
     length_rows: Annotated[float, Field(ge=_LEAST_ROWS, examples=[2.5])]
 
     stage: ClassVar[Stage] = Stage.READ_OUT

@@ -11,7 +11,7 @@ from pydantic import Field
 from scipy.special import ndtr, ndtri
 
 from dsis.draw import Draw
-from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, Stage
+from dsis.effects.effect import MOST_DN, Effect, Exposure, Image, OperatingPoint, Stage
 from dsis.grid import PixelGrid
 
 _Traps = tuple[tuple[NDArray[np.intp], ...], NDArray[np.int64], NDArray[np.float64]]
@@ -34,7 +34,7 @@ class Rts(Effect):
 
     kind: Literal["rts"] = "rts"
     pixel_fraction: Annotated[float, Field(ge=0, le=0.5, examples=[0.05])]
-    amplitude_dn: Annotated[float, Field(ge=0, examples=[8.0])]
+    amplitude_dn: Annotated[float, Field(ge=0, le=MOST_DN, examples=[8.0])]
     switch_probability: Annotated[float, Field(gt=0, le=0.5)] = 0.2
     levels: Annotated[Literal["about", "above", "either"], Field(exclude_if=_ABOUT.__eq__)] = _ABOUT
 

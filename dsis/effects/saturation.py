@@ -8,11 +8,12 @@ import numpy as np
 from pydantic import Field
 from scipy.special import ndtr
 
-from dsis.effects.effect import Effect, Exposure, Image, OperatingPoint, Stage
+from dsis.effects.effect import MOST_DN, Effect, Exposure, Image, OperatingPoint, Stage
 
 _OF_PIXELS = frozenset({"fixed_pixel_variance"})
 _NODES, _WEIGHTS = np.polynomial.hermite_e.hermegauss(41)
 _WEIGHTS = _WEIGHTS / _WEIGHTS.sum()
+_LEAST_DN = 1e-6  # a limit that is less soft is hard, in single precision
 
 
 class Saturation(Effect):
@@ -25,8 +26,8 @@ class Saturation(Effect):
     """
 
     kind: Literal["saturation"] = "saturation"
-    full_well_dn: Annotated[float, Field(gt=0, examples=[5010.0])]
-    softness_dn: Annotated[float, Field(ge=0, exclude_if=not_)] = 0.0
+    full_well_dn: Annotated[float, Field(gt=0, le=MOST_DN, examples=[5010.0])]
+    softness_dn: Annotated[float, Field(ge=0, le=MOST_DN, exclude_if=not_)] = 0.0
     spread_percent: Annotated[float, Field(ge=0, le=20, exclude_if=not_)] = 0.0
 
     stage: ClassVar[Stage] = Stage.CHARGE
@@ -68,7 +69,7 @@ class Saturation(Effect):
         return self._limited(image, full)
 
     def _limited(self, image: Image, full: Image) -> Image:
-        if not self.softness_dn:
+        if self.softness_dn < _LEAST_DN:
             return np.minimum(image, full)
         k = np.float32(self.softness_dn)
         left: Image = full - k * np.logaddexp(np.float32(0), (full - image) / k)

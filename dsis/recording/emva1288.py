@@ -11,10 +11,11 @@ from pathlib import Path
 
 from dsis.cfa import Cfa
 from dsis.errors import Fault, InputError
-from dsis.recording.listing import Listed, Listing, absolute
+from dsis.recording.listing import Listed, Listing, absolute, counted
 from dsis.recording.model import Kind, RecordedExposure, Sensor
 
 _NS_PER_S = 1e9
+_NAMED = 3  # missing frames that are named one by one
 _ALLOWED = "v release, n bits width height, b exposure photons, d exposure, i path"
 
 
@@ -36,6 +37,8 @@ class _Parser:
         self.file = file
         self.faults: list[Fault] = []
         self.groups: list[_Group] = []
+        self.missing: list[Fault] = []
+        self.frames: list[Path] | None = None  # of the last `b` or `d`, understood or not
         self.format: tuple[int, int, int] | None = None
 
     def line(self, number: int, text: str) -> None:
@@ -45,7 +48,9 @@ class _Parser:
             return
         try:
             self._command(number, command, rest.strip())
-        except (ValueError, IndexError):
+        except ValueError:
+            if command in ("b", "d"):  # its frames are of no exposure, and no faults themselves
+                self.frames = []
             self._fault(number, f"{text.strip()!r} is not understood, must be one of: {_ALLOWED}")
 
     def _command(self, number: int, command: str, rest: str) -> None:
@@ -64,10 +69,7 @@ class _Parser:
                 (time,) = (_number(word) for word in rest.split())
                 self._open(number, "dark", time, None)
             case "i":
-                path = absolute(self.file.parent, rest.replace("\\", "/"))
-                self.groups[-1].frames.append(path)
-                if not path.is_file():
-                    self._fault(number, f"{rest!r} is missing")
+                self._frame(number, rest)
             case _:
                 raise ValueError
 
@@ -77,6 +79,16 @@ class _Parser:
         if light is not None and not light > 0:
             self._fault(number, f"light is {light:g}, must be greater than 0")
         self.groups.append(_Group(number, kind, time_ns / _NS_PER_S, light))
+        self.frames = self.groups[-1].frames
+
+    def _frame(self, number: int, name: str) -> None:
+        path = absolute(self.file.parent, name.replace("\\", "/"))
+        if self.frames is None:
+            self._fault(number, f"'i {name}' stands before the first b or d")
+            return
+        self.frames.append(path)
+        if not path.is_file():
+            self.missing.append(Fault(str(self.file), f"line {number}", f"{name!r} is missing"))
 
     def _fault(self, number: int, fact: str) -> None:
         self.faults.append(Fault(str(self.file), f"line {number}", fact))
@@ -120,7 +132,7 @@ def read_descriptor(path: Path) -> Listing:
     """Return what an EMVA 1288 descriptor file lists."""
     try:
         # Comments may hold letters of any old code page; commands are ASCII.
-        text = path.read_text(encoding="utf-8", errors="surrogateescape")
+        text = path.read_text(encoding="utf-8-sig", errors="surrogateescape")
     except OSError as error:
         raise InputError.of(path, "", f"cannot be read: {error.strerror}") from None
     parser = _Parser(path)
@@ -128,7 +140,8 @@ def read_descriptor(path: Path) -> Listing:
         parser.line(number, line)
     sensor, exposures = parser.sensor(), parser.exposures()
     size = None if parser.format is None else parser.format[1:]
-    return Listing(path, sensor, exposures, size, tuple(parser.faults))
+    faults = [*parser.faults, *counted(parser.missing, "missing frames", _NAMED)]
+    return Listing(path, sensor, exposures, size, tuple(faults))
 
 
 def _number(word: str) -> float:

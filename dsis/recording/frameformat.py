@@ -7,12 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsis.errors import InputError
-from dsis.imagefile import codes_info, read_codes
+from dsis.imagefile import CodesInfo, codes_info, known_format, read_codes
 from dsis.recording.cameraraw import RAW_SUFFIXES, raw_frame, raw_header
-from dsis.recording.png import plain_codes
+from dsis.recording.png import plain_codes, refuse_cut
 
 _UNSIGNED = {"uint8": 8, "uint16": 16, "uint": 32, "uint32": 32, "uint64": 64}
-_ALLOWED = "must hold unsigned whole codes (uint8 or uint16)"
+_ALLOWED = "must hold unsigned whole codes (uint8, uint16, uint32 or uint64)"
+_FORMATS = "TIFF, PNG, PGM, DPX, .npy, DNG or camera raw"
 
 
 @dataclass(frozen=True)
@@ -51,7 +52,7 @@ def read_header(path: Path) -> FrameHeader:
     if suffix in RAW_SUFFIXES:
         raw = raw_header(path)
         return FrameHeader(raw.rows, raw.columns, "uint16", 16, raw.colours)
-    held = codes_info(path)
+    held = _info(path)
     if held.images > 1:
         raise InputError.of(path, "", "holds more than one image, must hold one frame")
     shape = (held.rows, held.columns, held.channels)[: 2 if held.channels == 1 else 3]
@@ -67,8 +68,24 @@ def read_frame(path: Path) -> NDArray[np.unsignedinteger]:
         return np.array(stored)
     if suffix in RAW_SUFFIXES:
         return raw_frame(path)
-    plain = plain_codes(path) if suffix == ".png" else None
-    return read_codes(path) if plain is None else plain
+    if suffix != ".png":
+        return read_codes(path)
+    plain = plain_codes(path)
+    if plain is None:
+        refuse_cut(path)
+        return read_codes(path)
+    return plain
+
+
+def _info(path: Path) -> CodesInfo:
+    """Return what the header says; raise `InputError`, with the formats there are, if none."""
+    try:
+        return codes_info(path)
+    except InputError:
+        if known_format(path):
+            raise
+        kind = f"is a {path.suffix} file" if path.suffix else "has no suffix"
+        raise InputError.of(path, "", f"{kind}, must be a frame in {_FORMATS}") from None
 
 
 def _header(path: Path, shape: tuple[int, ...], pixel_type: str) -> FrameHeader:

@@ -6,8 +6,9 @@ Nothing here refuses a recording; each remark states a limit of what it can show
 import math
 import zlib
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from threading import Lock
 from typing import Protocol
 
@@ -22,6 +23,8 @@ CLIPPED_SHARE = 1e-4
 _FIRST = 4096  # samples of a frame, which tell that codes are ordinary
 _LEAST_STEPS = 4  # that all codes reach over: of fewer no step is told
 
+Place = tuple[str, int]  # exposure, and number of the frame
+
 
 class Planned(Protocol):
     """What the remarks need to know of an exposure."""
@@ -30,6 +33,8 @@ class Planned(Protocol):
     def name(self) -> str: ...  # noqa: D102 - `ExposurePlan` says it
     @property
     def kind(self) -> str: ...  # noqa: D102 - `ExposurePlan` says it
+    @property
+    def frames(self) -> object: ...  # noqa: D102 - their files, or arrays, or how many
 
 
 @dataclass(frozen=True)
@@ -84,7 +89,7 @@ class Inspection:
         seen = [(e, [self._seen[e.name][i] for i in sorted(self._seen[e.name])])
                 for e in exposures if e.name in self._seen]  # fmt: skip
         found = [remark for e, frames in seen for remark in _on_exposure(e, frames)]
-        return (*found, *self._copies(), *self._on_codes(), *_on_light(seen))
+        return (*found, *self._copies(exposures), *self._on_codes(), *_on_light(seen))
 
     def copied_exposures(self) -> frozenset[str]:
         """Return the exposures that hold a frame which occurs twice in what was looked at."""
@@ -107,21 +112,29 @@ class Inspection:
     def _frames(self) -> list[FrameSummary]:
         return [frame for frames in self._seen.values() for frame in frames.values()]
 
-    def _same(self) -> list[list[tuple[str, int]]]:
+    def _same(self) -> list[list[Place]]:
         """Return the places (exposure, frame) of every frame that occurs more than once."""
-        places: dict[tuple[int, int, int], list[tuple[str, int]]] = defaultdict(list)
+        places: dict[tuple[int, int, int], list[Place]] = defaultdict(list)
         for name, frames in self._seen.items():
             for index, frame in sorted(frames.items()):
                 if not frame.constant:  # these have a remark of their own
                     places[frame.identity].append((name, index))
         return [same for same in places.values() if len(same) > 1]
 
-    def _copies(self) -> list[str]:
-        return sorted(
-            "byte-identical frames, noise cannot repeat itself: "
-            + ", ".join(sorted(f"{name} frame {index}" for name, index in same))
-            for same in self._same()
-        )
+    def _copies(self, exposures: Sequence[Planned]) -> list[str]:
+        """Return a remark for the exposures that share frames, with the first of these frames."""
+        files, rank = _files_of(exposures), {e.name: i for i, e in enumerate(exposures)}
+
+        def order(place: Place) -> tuple[int, int]:
+            return rank.get(place[0], len(rank)), place[1]
+
+        groups: dict[tuple[bool, tuple[str, ...]], list[list[Place]]] = defaultdict(list)
+        found = [sorted(same, key=order) for same in self._same()]
+        for same in sorted(found, key=lambda same: order(same[0])):
+            held = {files.get(place) for place in same}
+            once = len(held) == 1 and None not in held
+            groups[once, tuple(dict.fromkeys(name for name, _ in same))].append(same)
+        return [_on_copies(groups[key], key, files) for key in groups]
 
     def _on_codes(self) -> list[str]:
         step, phase = self.step_dn(), self.phase_dn()
@@ -131,6 +144,29 @@ class Inspection:
             return [f"all codes are {phase} and multiples of {step}: coarser than the bit depth"]
         says = f"all codes are multiples of {step}: left-aligned, or converted?"
         return [f"{says} Codes must be right-aligned"]
+
+
+def _files_of(exposures: Sequence[Planned]) -> dict[Place, Path]:
+    """Return the file of each frame that has one."""
+    return {
+        (e.name, index): file
+        for e in exposures
+        if isinstance(e.frames, tuple)
+        for index, file in enumerate(e.frames)
+        if isinstance(file, Path)
+    }
+
+
+def _on_copies(
+    groups: list[list[Place]], shared: tuple[bool, tuple[str, ...]], files: Mapping[Place, Path]
+) -> str:
+    once, names = shared
+    frames = ", ".join(f"{name} frame {index}" for name, index in groups[0])
+    more = f" (the first of {len(groups)} in {', '.join(names)})" if len(groups) > 1 else ""
+    if once:
+        file = files[groups[0][0]]
+        return f"the same file is listed more than once: {file.name} is {frames}{more}"
+    return f"byte-identical frames, noise cannot repeat itself: {frames}{more}"
 
 
 def _on_exposure(exposure: Planned, frames: list[FrameSummary]) -> list[str]:

@@ -1,7 +1,8 @@
 """What a description of a recording lists, before any frame has been looked at."""
 
 import os
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from dsis.errors import Fault
@@ -44,3 +45,11 @@ class Listing:
 def absolute(folder: Path, name: str) -> Path:
     """Return the absolute path of a file named in a description that lies in `folder`."""
     return Path(os.path.normpath(folder.absolute() / Path(name).expanduser()))
+
+
+def counted(faults: Sequence[Fault], what: str, named: int = 1) -> list[Fault]:
+    """Return up to `named` faults of one kind as they are, of more the first and their number."""
+    if len(faults) <= named:
+        return list(faults)
+    first = faults[0]
+    return [replace(first, fact=f"{first.fact} (the first of {len(faults)} {what})")]

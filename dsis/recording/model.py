@@ -205,4 +205,4 @@ class Recording:
         for exposure in self.exposures:
             for _ in self.frames(exposure, ahead=threads, inspection=inspection):
                 pass
-        return inspection.remarks([exposure.plan for exposure in self.exposures])
+        return inspection.remarks(self.exposures)

@@ -100,6 +100,18 @@ def chunks(content: bytes) -> tuple[tuple[int, ...], bytes] | None:
     return None
 
 
+def refuse_cut(path: Path) -> None:
+    """Raise `InputError` where a PNG ends within its lines: the library would also print it."""
+    content = path.read_bytes()
+    at = len(_SIGNATURE)
+    while content.startswith(_SIGNATURE) and at + 8 <= len(content):
+        length, kind = struct.unpack_from(">I4s", content, at)
+        at += 12 + length
+        if at > len(content) and kind in (b"IHDR", b"IDAT"):
+            fact = f"is damaged: it ends within its chunk {kind.decode()}, cut short?"
+            raise InputError.of(path, "", fact)
+
+
 @inlined
 def _nearest(left: np.int32, up: np.int32, corner: np.int32) -> np.int32:
     """Return which is nearest to left + up - corner; ties in this order."""

@@ -1,21 +1,29 @@
 """A recording from its folder, its TOML, an EMVA 1288 descriptor or a camera raw file."""
 
-from collections import Counter
-from collections.abc import Callable, Hashable, Mapping
+from collections import Counter, defaultdict
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from pathlib import Path
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 from dsis.cfa import Cfa
 from dsis.errors import Fault, InputError
 from dsis.recording.cameraraw import RAW_SUFFIXES, raw_header
 from dsis.recording.emva1288 import read_descriptor
 from dsis.recording.frameformat import FrameHeader, read_header
-from dsis.recording.listing import Listed, Listing
+from dsis.recording.listing import Listed, Listing, counted
 from dsis.recording.model import RecordedExposure, Recording, Sensor
 from dsis.recording.tomlfile import RECORDING, read_listing
 
 Headers = Mapping[Path, FrameHeader]
 V = TypeVar("V", bound=Hashable)
+
+
+class Unfit(NamedTuple):
+    """A frame that does not fit, and why."""
+
+    listed: Listed
+    frame: Path
+    fact: str
 
 
 def read_recording(path: Path) -> Recording:
@@ -30,16 +38,17 @@ def read_recording(path: Path) -> Recording:
     Raises
     ------
     InputError
-        With every fault: unknown keys, missing files, empty exposures, frames of different size
-        or bits, several channels, signed or floating-point values. What only the codes show (a
-        truncated file, a code above `white_level`) is raised when the frames are streamed.
+        With every fault, what is alike in many frames said once: unknown keys, missing files, empty
+        exposures, frames of different size or bits, several channels, signed or floating-point
+        values. What only the codes show (a truncated file, a code above `white_level`) is raised
+        when the frames are streamed.
     """
     listing = _listing(Path(path))
-    headers, faults = _headers(listing)
-    faults = [*listing.faults, *_duplicates(listing), *faults]
-    rows, columns = _size(listing, headers, faults)
-    _check_bits(listing, headers, faults)
-    _check_colours(listing, headers, faults)
+    headers, unfit = _headers(listing)
+    rows, columns = _size(listing, headers, unfit)
+    _check_bits(listing, headers, unfit)
+    _check_colours(listing, headers, unfit)
+    faults = [*listing.faults, *_duplicates(listing), *_faults(listing, unfit)]
     if faults or listing.sensor is None:
         raise InputError(faults)
     exposures = tuple(listed.exposure for listed in listing.exposures)
@@ -88,10 +97,10 @@ def _single_raw(path: Path) -> Listing:
     return Listing(path, sensor, (Listed("", exposure),))
 
 
-def _headers(listing: Listing) -> tuple[dict[Path, FrameHeader], list[Fault]]:
+def _headers(listing: Listing) -> tuple[dict[Path, FrameHeader], list[Unfit]]:
     """Return the header of every frame that has one, in the order listed."""
     headers: dict[Path, FrameHeader] = {}
-    faults = []
+    unfit = []
     for listed in listing.exposures:
         for frame in listed.exposure.frames:
             if frame in headers or not frame.is_file():
@@ -100,8 +109,8 @@ def _headers(listing: Listing) -> tuple[dict[Path, FrameHeader], list[Fault]]:
                 headers[frame] = read_header(frame)
             except InputError as error:
                 facts = "; ".join(fault.fact for fault in error.faults)
-                faults.append(_fault(listing, listed, frame, facts))
-    return headers, faults
+                unfit.append(Unfit(listed, frame, facts))
+    return headers, unfit
 
 
 def _duplicates(listing: Listing) -> list[Fault]:
@@ -113,8 +122,8 @@ def _duplicates(listing: Listing) -> list[Fault]:
     ]
 
 
-def _size(listing: Listing, headers: Headers, faults: list[Fault]) -> tuple[int, int]:
-    """Return rows and columns; add a fault for every frame of another size."""
+def _size(listing: Listing, headers: Headers, unfit: list[Unfit]) -> tuple[int, int]:
+    """Return rows and columns; add every frame of another size to `unfit`."""
     if listing.size is not None:
         wanted, model = listing.size, listing.file.name
     elif headers:
@@ -125,11 +134,11 @@ def _size(listing: Listing, headers: Headers, faults: list[Fault]) -> tuple[int,
         if (header.rows, header.columns) != wanted:
             fact = f"has {header.rows} x {header.columns} pixels, "
             fact += f"must have {wanted[0]} x {wanted[1]} (rows x columns) like {model}"
-            faults.append(_fault(listing, listed, frame, fact))
+            unfit.append(Unfit(listed, frame, fact))
     return wanted
 
 
-def _check_bits(listing: Listing, headers: Headers, faults: list[Fault]) -> None:
+def _check_bits(listing: Listing, headers: Headers, unfit: list[Unfit]) -> None:
     """Refuse files of different bits: one of them has been converted."""
     if not headers:
         return
@@ -138,13 +147,13 @@ def _check_bits(listing: Listing, headers: Headers, faults: list[Fault]) -> None
     for listed, frame, header in _frames(listing, headers):
         if header.pixel_type != wanted:
             fact = f"holds {header.pixel_type} codes, must hold {wanted} like {model}"
-            faults.append(_fault(listing, listed, frame, fact))
+            unfit.append(Unfit(listed, frame, fact))
         elif white > 2**header.bits - 1:
             fact = f"holds {header.pixel_type} codes, which cannot reach white_level = {white:g}"
-            faults.append(_fault(listing, listed, frame, fact))
+            unfit.append(Unfit(listed, frame, fact))
 
 
-def _check_colours(listing: Listing, headers: Headers, faults: list[Fault]) -> None:
+def _check_colours(listing: Listing, headers: Headers, unfit: list[Unfit]) -> None:
     """Compare the colour filters with those that camera raw files state themselves."""
     if listing.sensor is None:
         return
@@ -152,7 +161,7 @@ def _check_colours(listing: Listing, headers: Headers, faults: list[Fault]) -> N
     for listed, frame, header in _frames(listing, headers):
         if header.colours not in (None, cfa):
             fact = f"has filters {header.colours}, must have {cfa} as the sensor says"
-            faults.append(_fault(listing, listed, frame, fact))
+            unfit.append(Unfit(listed, frame, fact))
 
 
 def _usual(listing: Listing, headers: Headers, of: Callable[[FrameHeader], V]) -> tuple[V, str]:
@@ -173,8 +182,15 @@ def _frames(listing: Listing, headers: Headers) -> list[tuple[Listed, Path, Fram
     ]
 
 
-def _fault(listing: Listing, listed: Listed, frame: Path, fact: str) -> Fault:
-    return Fault(str(listing.file), listed.place, f"{_shown(listing, frame)} {fact}")
+def _faults(listing: Listing, unfit: Sequence[Unfit]) -> list[Fault]:
+    """Return one fault for what is alike in frames, with the first of them."""
+    alike: dict[str, list[Fault]] = defaultdict(list)
+    for listed, frame, fact in unfit:
+        says = f"{_shown(listing, frame)} {fact}"
+        # Libraries repeat the path in their complaints.
+        kind = fact.replace(str(frame), "")
+        alike[kind].append(Fault(str(listing.file), listed.place, says))
+    return [fault for faults in alike.values() for fault in counted(faults, "such frames")]
 
 
 def _shown(listing: Listing, frame: Path) -> str:

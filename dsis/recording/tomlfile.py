@@ -1,7 +1,9 @@
 """`recording.toml`: what lies in a folder of raw frames."""
 
 import glob
-from collections.abc import Iterator, Mapping
+import re
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -11,11 +13,12 @@ from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 from dsis.errors import Fault
 from dsis.imagefile import natural_order
 from dsis.model import Model, attempt, read_toml
-from dsis.recording.listing import Listed, Listing, absolute
+from dsis.recording.listing import Listed, Listing, absolute, counted
 from dsis.recording.model import ExposurePlan, Kind, RecordedExposure, Sensor
 
 RECORDING = "recording.toml"
 SCHEMA: Literal["dsis-recording/1"] = "dsis-recording/1"
+_NAMED = 3  # missing frames of an exposure that are named one by one
 
 
 def _listed(value: object) -> object:
@@ -63,7 +66,8 @@ class RecordingFile(Model):
 def read_listing(path: Path) -> Listing:
     """Return what `recording.toml` lists; raise `InputError` only where it is no TOML at all."""
     values = read_toml(path)
-    file, faults = attempt(RecordingFile, values, str(path))
+    file, found = attempt(RecordingFile, values, str(path))
+    faults = _said_once(found)
     if isinstance(file, RecordingFile):
         sensor, entries = file.sensor, list(enumerate(file.exposure))
     else:
@@ -104,9 +108,17 @@ def _sound_entries(values: Mapping[str, Any]) -> Iterator[tuple[int, Entry]]:
             yield number, found
 
 
+def _said_once(faults: Sequence[Fault]) -> list[Fault]:
+    """Return faults of which many exposures have the same, a misspelt key say, once."""
+    alike: dict[tuple[str, str], list[Fault]] = defaultdict(list)
+    for fault in faults:
+        alike[re.sub(r"^exposure\[\d+\]", "exposure", fault.key), fault.fact].append(fault)
+    return [fault for same in alike.values() for fault in counted(same, "such exposures")]
+
+
 def _frames(file: Path, entry: Entry, key: str) -> tuple[tuple[Path, ...], list[Fault]]:
     """Return the files of an entry, each glob in natural order, and what is missing."""
-    folder, found, faults = file.parent, [], []
+    folder, found, faults, missing = file.parent, [], [], []
     for name in entry.frames:
         path = absolute(folder, name)
         if path.is_file():
@@ -118,5 +130,5 @@ def _frames(file: Path, entry: Entry, key: str) -> tuple[tuple[Path, ...], list[
             if not paths:
                 faults.append(Fault(str(file), key, f"{name!r} matches no file"))
         else:
-            faults.append(Fault(str(file), key, f"{name!r} is missing"))
-    return tuple(found), faults
+            missing.append(Fault(str(file), key, f"{name!r} is missing"))
+    return tuple(found), [*faults, *counted(missing, "missing frames", _NAMED)]

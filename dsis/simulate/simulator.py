@@ -124,6 +124,7 @@ def simulated_frames(
     """Yield the codes of every frame, exposure after exposure: uint16 (row, column).
 
     One sensor serves the whole recording; each exposure has temporal noise of its own, by name.
+    Raises `InputError` where a frame would hold no numbers.
     """
     draws = Draw(seed) if draw is None else draw
     sensor = draws.within("sensor")
@@ -136,6 +137,10 @@ def simulated_frames(
         image = camera.expose(
             clean, temporal, sensor, frame, grid, exposure_time_s=shot.plan.exposure_time_s
         )
+        if np.isnan(image).any():  # they have no code
+            where = f"camera {camera.name!r}", f"exposure {shot.plan.name}"
+            fact = f"signals of {shot.plan.exposure_time_s:g} s are too large to be computed"
+            raise InputError.of(*where, fact)
         return (image + offset).astype(np.uint16)
 
     return in_order(expose, _work(shots, grid), 0 if jobs <= 1 else jobs)

@@ -77,7 +77,7 @@ mean_dn_per_s = 1e300
     with pytest.raises(InputError) as refused:
         read_camera(path)
     (says,) = str(refused.value).splitlines()
-    assert "effect[0].mean_dn_per_s: is 1e+300, must be less than or equal to 1000000000" in says
+    assert "effect[0].mean_dn_per_s: is 1e+300, must be less than or equal to 1000000000000" in says
 
 
 def test_no_frame_without_numbers_is_written(tmp_path: Path) -> None:

@@ -34,7 +34,7 @@ from dsis.model import Model
 from dsis.noise import Segments
 
 Image = NDArray[np.float32]
-MOST_DN = 1e9
+MOST_DN = 1e12
 """Largest size of an effect, DN or DN/s: beyond every code, and single precision holds it."""
 
 

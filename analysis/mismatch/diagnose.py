@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from analysis.mismatch.apart import wrong_spread
 from analysis.mismatch.candidates import CANDIDATES
 from analysis.mismatch.confirmed import proven, undenied_by_all, undenied_by_many
+from analysis.mismatch.description import remarks_on_description
 from analysis.mismatch.evidence import Evidence
 from analysis.mismatch.explain import because, changes, explained
 from analysis.mismatch.finding import (
@@ -120,6 +121,7 @@ def _found(
     split = split.without(development.keys() - {e.name for e in layout.exposures})
     album, frames_of = Album(layout), partial(_frames_of, source, numbers)
     seen = observe(layout, frames_of, album, keep=True, threads=how[1])
+    remarks += remarks_on_description(taken.whole, layout, seen, source)
     large = layout.large
     setting = Setting.of(layout, seen, split.interpolated, *how)
     setting = replace(setting, given=len(camera.effect), asked_again=not large)

@@ -37,6 +37,7 @@ from analysis.photon_transfer.remarks import (
     UNREACHED,
     remark_on_fit,
     remarks_on_clipped_darks,
+    remarks_on_description,
     remarks_on_patterns,
 )
 from analysis.photon_transfer.segments import SegmentFit, fit_segments, lines_between
@@ -225,6 +226,7 @@ def fit_camera(
         for name in names
     }
     remarks += remarks_on_clipped_darks(measured, recording.sensor.black_level)
+    remarks += remarks_on_description(measured, recording.sensor.black_level)
     remark_on_fit(found, alike, darks, levels, remarks, full_well_means=full_means)
     remarks += remarks_on_patterns(patterns)
     return Fit(

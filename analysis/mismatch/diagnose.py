@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from analysis.mismatch.apart import wrong_spread
 from analysis.mismatch.candidates import CANDIDATES
 from analysis.mismatch.confirmed import proven, undenied_by_all, undenied_by_many
+from analysis.mismatch.description import remarks_on_description
 from analysis.mismatch.evidence import Evidence
 from analysis.mismatch.explain import because, changes, explained
 from analysis.mismatch.finding import (
@@ -33,21 +34,20 @@ from analysis.mismatch.own import wrong_sizes
 from analysis.mismatch.parameters import parameter_errors
 from analysis.mismatch.phase import WholeFrames
 from analysis.mismatch.pictures import Album, evidence_of
+from analysis.mismatch.reading import read
 from analysis.mismatch.recalibrate import Calibrated
-from analysis.mismatch.remarks import remark_on_sizes, remarks_on
+from analysis.mismatch.remarks import remark_on_sizes, remarks_on, remarks_on_words
 from analysis.mismatch.rowtold import EITHER, SINGLE_ROWS, as_likely, beside_undecided
 from analysis.mismatch.segments import as_settled, second_path
 from analysis.mismatch.settle import would_settle
 from analysis.mismatch.source import Source
-from analysis.mismatch.spikes import Spikes, left_dn4, told_besides, with_spikes, without_spikes
+from analysis.mismatch.spikes import left_dn4, told_besides, with_spikes
 from analysis.mismatch.split import Split
 from analysis.mismatch.state import SUREST, Setting, State
-from analysis.mismatch.steadylight import with_steady_light
 from analysis.mismatch.taking import layout_of
 from analysis.mismatch.thinned import stages, with_all_frames
 from analysis.mismatch.trial import Trial
 from analysis.mismatch.unsettled import told_beside, unsettled, with_first_frames, without
-from analysis.mismatch.wholecells import whole_cells
 from dsis.blas import one_thread
 from dsis.camera import Camera
 from dsis.effects.rts import Rts
@@ -57,7 +57,6 @@ from dsis.recording import Recording
 Progress = Callable[[int, int, str], None]
 VOCABULARY = frozenset({*CANDIDATES, "dual_gain"})
 _NEAR = 8.0  # of log-likelihood: a rival worth naming a recording that would decide
-_LOCATED = "No physics was looked for: it is only said where recording and model differ."
 _SMALL = 1e6  # samples
 
 
@@ -106,18 +105,23 @@ def _found(
     step: Callable[[], None],
 ) -> Finding:
     """Return the finding; `how` is the seed and the number of processes."""
-    stored, asked = whole_cells(recording), words
-    recording, source, spikes = _read(stored, camera)
+    asked, taken = words, read(recording, camera)
+    stored, recording, source, spikes = taken.stored, taken.recording, taken.source, taken.spikes
     first = unsettled(recording, source)
     words = told_besides(told_beside(words, first), spikes)
     split, layout = _taken(recording, source, without(Split.of(recording), first))
     development = split.development
     numbers = {e.name: e.numbers for e in layout.exposures}
-    remarks = (*remarks_on(stored, development, layout), *(() if asked else (_LOCATED,)))
+    remarks = (
+        *taken.remarks,
+        *remarks_on(taken.whole, layout),
+        *remarks_on_words(asked, VOCABULARY),
+    )
     # What is left out proves nothing either: copies of a frame are told from any simulation.
     split = split.without(development.keys() - {e.name for e in layout.exposures})
     album, frames_of = Album(layout), partial(_frames_of, source, numbers)
     seen = observe(layout, frames_of, album, keep=True, threads=how[1])
+    remarks += remarks_on_description(taken.whole, layout, seen, source)
     large = layout.large
     setting = Setting.of(layout, seen, split.interpolated, *how)
     setting = replace(setting, given=len(camera.effect), asked_again=not large)
@@ -182,12 +186,6 @@ def _found(
     return _said(found, remarks, evidence, asked)
 
 
-def _read(stored: Recording, camera: Camera) -> tuple[Recording, Source, Spikes | None]:
-    """Return the recording without spikes, its source, and these; with light where levels tell."""
-    recording, source, spikes = without_spikes(stored, camera)
-    return with_steady_light(recording, source), source, spikes
-
-
 def _taken(recording: Recording, source: Source, split: Split) -> tuple[Split, Layout]:
     """Return the split without scenes that move, and the layout of what may be looked at."""
     # What moves in a locked frame only is no static scene either.
@@ -202,7 +200,8 @@ def _said(
 ) -> Finding:
     """Return a finding with what is to be remarked and shown."""
     said = (*remarks, *found.remarks)
-    return replace(found, remarks=said, searched=bool(words), evidence=evidence)
+    without = tuple(sorted(VOCABULARY - words)) if words else ()
+    return replace(found, remarks=said, searched=bool(words), without=without, evidence=evidence)
 
 
 def _of_all_frames(setting: Setting, trial: Trial) -> Setting:

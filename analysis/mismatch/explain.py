@@ -49,7 +49,7 @@ def explained(
             found[mismatch.statistic] = of_frames(mismatch, changes, final)
             continue
         z = base.departures[which]
-        left = max((abs(after.get(base.null.keys[i], 0.0)) for i in which), default=0.0)
+        left = max((after.get(base.null.keys[i], 0.0) for i in which), key=abs, default=0.0)
         still = any(m.statistic == mismatch.statistic for m in final.mismatches)
         score = {
             kind: float((np.clip(change[which] / z, -1, 1) * np.abs(z)).sum() / np.abs(z).sum())
@@ -57,7 +57,7 @@ def explained(
         }
         best = max(score, key=lambda kind: score[kind], default=None)
         top = float(np.abs(z).max())
-        clear = best is not None and score[best] > 0 and (not still or left < _LEFT * top)
+        clear = best is not None and score[best] > 0 and (not still or abs(left) < _LEFT * top)
         found[mismatch.statistic] = (best if clear else None, left)
     return found
 

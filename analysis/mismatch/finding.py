@@ -67,7 +67,8 @@ class Mismatch:
     explained_by
         The effect that explains it; None: nothing does.
     z_after
-        The departure from the final model; nan where nothing was named, or frames alone would say.
+        The largest departure from the final model, of either sign as `z`; nan where nothing was
+        named, or frames alone would say.
     """
 
     statistic: str
@@ -180,6 +181,8 @@ class Finding:
         What limits the result, in sentences.
     searched
         Whether physics was looked for.
+    without
+        Effects that were not allowed to be named, where it was.
     evidence
         What the report draws: `analysis.mismatch.evidence.Evidence`; no part of the JSON.
     """
@@ -194,6 +197,7 @@ class Finding:
     camera: Camera
     remarks: tuple[str, ...] = ()
     searched: bool = True
+    without: tuple[str, ...] = ()
     evidence: Any = field(default=None, compare=False, repr=False)
 
     def values(self) -> dict[str, Any]:

@@ -70,6 +70,8 @@ class Layout:
         not show.
     unseen
         Rows and columns of the frames beyond the last ones that are looked at.
+    left_out
+        Why an exposure is, by its name; scenes that move have a list of their own.
     """
 
     exposures: tuple[Taken, ...]
@@ -85,6 +87,7 @@ class Layout:
     still: frozenset[Place] = frozenset()
     full: frozenset[Place] = frozenset()
     unseen: tuple[int, int] = (0, 0)
+    left_out: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def grid(self) -> PixelGrid:

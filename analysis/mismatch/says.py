@@ -45,8 +45,8 @@ _WORDS = {
     "code_spacing": "not every code occurs: codes come in steps",
     "code_imbalance": "codes are not equally frequent",
     "fixed_pixel_variance": "every pixel has a fixed deviation of its own",
-    "fixed_row_variance": "rows have fixed deviations",
-    "fixed_column_variance": "columns have fixed deviations",
+    "fixed_row_variance": "the mean frames differ from row to row",
+    "fixed_column_variance": "the mean frames differ from column to column",
     "fixed_smooth_variance": "the mean frame has a smooth fixed surface",
     "fixed_smooth_tilt": "the mean frame leans to one side",
     "fixed_smooth_falloff": "the mean frame falls or rises towards its corners",
@@ -87,6 +87,8 @@ def sentence(statistic: str, key: Key, z: float, where: Where) -> str:
     if key.detail and key.scope == SCENE and where.signal_dn is not None:
         how += " (between {:.3g} and {:.3g} DN)".format(*where.signal_dn)
     places = ", ".join(where.exposures[:4]) + (" ..." if len(where.exposures) > 4 else "")
+    if how in _SCOPES.values() and how and len(where.exposures) == 1:
+        places = f"clearest in {places}"  # it is said of maps that all exposures tell
     channel = f" in channel {where.channel}" if where.channel not in (None, "MONO") else ""
     sign = "more" if z > 0 else "less"
     text = f"{what}{how}: {sign} than the model at {abs(z):.3g} standard errors"

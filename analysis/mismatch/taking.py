@@ -11,9 +11,14 @@ from analysis.mismatch.scenes import SCENE
 from analysis.mismatch.staging import with_scenes
 from analysis.mismatch.wholecells import unseen
 from dsis.cfa import Cfa
+from dsis.effects import Image
 from dsis.errors import InputError
-from dsis.recording import Recording
+from dsis.recording import Recording, Sensor
 
+SINGLE = "of a single frame that may be looked at"
+CLIPPED = "clipped at the white level"
+ALIKE = "their frames are byte-identical"
+STILL = "they hold code"
 _LEAST_FRAMES = 2
 _LEAST_LINES = 4  # rows, and columns
 _CUT = 0.25  # of the largest variance at less light: what is less, a full well has cut
@@ -39,6 +44,7 @@ def layout_of(
     """
     sensor = recording.sensor
     taken = []
+    left_out: dict[str, str] = {}
     means: dict[Place, float] = {}
     still: set[Place] = set()
     variances: dict[Place, float] = {}
@@ -51,14 +57,12 @@ def layout_of(
     for recorded in recording.exposures:
         own = tuple(numbers.get(recorded.name, ()))
         if len(own) < _LEAST_FRAMES:
+            left_out |= dict.fromkeys([recorded.name] if own else [], SINGLE)
             continue
         e = Taken(recorded.name, recorded.kind, recorded.exposure_time_s, recorded.light, own)
         a, b = (np.asarray(f, np.float32) for f in first(e.name, own[:2]))
-        clipped = [
-            float((a[y::step, x::step] >= sensor.white_level).mean())
-            for y, x in sites(sensor.cfa).values()
-        ]
-        if max(clipped) > CLIPPED_SHARE or (a == b).all():
+        if why := _unfit(a, b, sensor):
+            left_out[e.name] = why
             continue
         taken.append(e)
         for channel, (y, x) in sites(sensor.cfa).items():
@@ -94,8 +98,23 @@ def layout_of(
         still=frozenset(still),
         full=_full(taken, signal, plain),
         unseen=unseen(recording),
+        left_out=left_out,
     )
     return with_scenes(layout, means, first)
+
+
+def _unfit(a: Image, b: Image, sensor: Sensor) -> str:
+    """Return why an exposure is of no use, by two of its frames; empty where it is of use."""
+    step = 1 if sensor.cfa is Cfa.MONO else 2
+    clipped = [
+        float((a[y::step, x::step] >= sensor.white_level).mean())
+        for y, x in sites(sensor.cfa).values()
+    ]
+    if max(clipped) > CLIPPED_SHARE:
+        return CLIPPED
+    if not (a == b).all():
+        return ""
+    return f"{STILL} {a[0, 0]:g} only" if (a == a[0, 0]).all() else ALIKE
 
 
 def _full(

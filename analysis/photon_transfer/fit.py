@@ -37,6 +37,7 @@ from analysis.photon_transfer.remarks import (
     UNREACHED,
     remark_on_fit,
     remarks_on_clipped_darks,
+    remarks_on_description,
     remarks_on_patterns,
     remarks_on_unknown,
 )
@@ -226,6 +227,7 @@ def fit_camera(
         for name in names
     }
     remarks += remarks_on_clipped_darks(measured, recording.sensor.black_level)
+    remarks += remarks_on_description(measured, recording.sensor.black_level)
     remark_on_fit(found, alike, darks, levels, remarks, full_well_means=full_means)
     remarks += remarks_on_patterns(patterns)
     remarks += remarks_on_unknown({name: channel.figures for name, channel in channels.items()})

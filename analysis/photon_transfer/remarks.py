@@ -6,7 +6,8 @@ import numpy as np
 from scipy import stats
 
 from analysis.photon_transfer.black import DarkLine
-from analysis.photon_transfer.levels import WANDER_P, FittedLevel
+from analysis.photon_transfer.described import Described, contradictions
+from analysis.photon_transfer.levels import WANDER_P, FittedLevel, useless
 from analysis.photon_transfer.parts import P_SEEN
 from analysis.photon_transfer.patterns import LEAST_GAIN, FixedPatterns
 from analysis.photon_transfer.projections import OUTLIER_SD
@@ -82,6 +83,27 @@ def remarks_on_clipped_darks(measured: Sequence[LevelStatistics], nominal_dn: fl
                 f"{nominal_dn:g} DN is wrong{current}, and every intercept with it."
             )
     return remarks
+
+
+def remarks_on_description(measured: Sequence[LevelStatistics], nominal_dn: float) -> list[str]:
+    """Return what of a recording's description the levels of its darks and flats contradict."""
+    by: dict[str, list[LevelStatistics]] = {}
+    for s in measured:
+        by.setdefault(s.exposure, []).append(s)
+    told = [
+        Described(
+            name,
+            own[0].kind,
+            own[0].exposure_time_s,
+            own[0].light,
+            float(np.mean([s.level_dn for s in own])),
+            float(np.mean([s.level_se_dn for s in own])),
+            float(np.mean([s.variance_dn2 for s in own])),
+        )
+        for name, own in by.items()
+        if not any(useless(s) for s in own)
+    ]
+    return list(contradictions(told, nominal_dn))
 
 
 def remarks_on_patterns(patterns: FixedPatterns) -> list[str]:

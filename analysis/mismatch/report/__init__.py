@@ -11,7 +11,7 @@ import numpy as np
 from analysis.mismatch.evidence import Evidence
 from analysis.mismatch.finding import Finding, Mismatch
 from analysis.mismatch.model import apart
-from analysis.mismatch.remarks import NO_FLATS
+from analysis.mismatch.remarks import NO_FLATS, as_far_as
 from analysis.mismatch.report.figures import Picture, ladder_picture, pictures, save
 from analysis.mismatch.report.numbers import interval, measured, plain
 from analysis.mismatch.report.sentences import (
@@ -23,6 +23,7 @@ from analysis.mismatch.report.sentences import (
     numbers_in_short,
     parameters,
     strongest,
+    tie,
     verdict,
 )
 from analysis.mismatch.words import (
@@ -59,6 +60,9 @@ def headline(finding: Finding) -> str:
         return LOCATED
     if NO_FLATS in finding.remarks and finding.verdict in IN_DARKS:
         return IN_DARKS[finding.verdict]
+    limit = as_far_as(finding.remarks) if finding.verdict == "match" else ""
+    if limit:
+        return f"{HEADLINES['match']} {limit}"
     return HEADLINES[finding.verdict]
 
 
@@ -109,6 +113,7 @@ def render(
         "unit": unit,
         "place": place,
         "because": because,
+        "tie": tie,
     }
     evidence = finding.evidence if isinstance(finding.evidence, Evidence) else Evidence()
     differences = _differences(finding)

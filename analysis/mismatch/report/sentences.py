@@ -15,7 +15,7 @@ from analysis.mismatch.finding import (
     OmittedEffect,
     ParameterError,
 )
-from analysis.mismatch.remarks import NO_FLATS
+from analysis.mismatch.remarks import NO_FLATS, as_far_as
 from analysis.mismatch.report.numbers import interval, measured, plain
 from analysis.mismatch.words import effect_words, place, statistic_words, unit
 
@@ -27,6 +27,7 @@ _OFF_IN_DARKS = (
 )
 _NAMED = 3
 _TOGETHER = "all that is named, together"
+_LISTED = 6  # effects that were not allowed
 _IN_FULL = 4  # effects that one sentence can hold with their numbers
 
 
@@ -34,14 +35,14 @@ def verdict(finding: Finding) -> tuple[str, ...]:
     """Return the verdict in a sentence, then what is wrong, left over and not decided."""
     match finding.verdict:
         case "match":
-            said = [_IN_DARKS if NO_FLATS in finding.remarks else _AGREE]
+            said = [_agrees(finding)]
         case "parameters":
             said = [_OFF_IN_DARKS if NO_FLATS in finding.remarks else _OFF]
         case "omitted_physics":
             names = _in_short(finding.omitted_physics)
             said = [f"The camera model leaves out {names}.", *unproven(finding)]
         case "unexplained":
-            said = ["Something differs, and no effect of the vocabulary is proven to explain it."]
+            said = [_unknown(finding.without)]
             if not finding.searched:
                 said = ["Something differs; which physics that is was not asked."]
     if finding.parameter_errors:
@@ -61,6 +62,22 @@ def verdict(finding: Finding) -> tuple[str, ...]:
         names = joined((effect_words(a.effect) for a in finding.undecided), "or")
         said.append(f"Not decided: {names}.")
     return tuple(said)
+
+
+def _agrees(finding: Finding) -> str:
+    """Return that nothing differs, and how little was tested where that is so."""
+    if NO_FLATS in finding.remarks:
+        return _IN_DARKS
+    limit = as_far_as(finding.remarks)
+    return f"{limit.capitalize()}, {_AGREE[0].lower()}{_AGREE[1:]}" if limit else _AGREE
+
+
+def _unknown(without: Sequence[str]) -> str:
+    """Return that what differs has no name, among those that were allowed."""
+    names = [effect_words(kind) for kind in without[:_LISTED]]
+    names += [f"{len(without) - _LISTED} more"] if len(without) > _LISTED else []
+    allowed = f" that was allowed (without {joined(names)})" if names else ""
+    return f"Something differs, and no effect of the vocabulary{allowed} is proven to explain it."
 
 
 def _wrong_numbers(errors: tuple[ParameterError, ...], *, sure: bool) -> str:
@@ -196,6 +213,13 @@ def considered(finding: Finding) -> list[tuple[str, Alternative]]:
     """Return what was considered and not named, with the effect in whose place it stood."""
     beside = [(e.effect, a) for e in finding.omitted_physics for a in e.alternatives]
     return beside + [("", a) for a in finding.undecided]
+
+
+def tie(alternative: Alternative) -> str:
+    """Return why an effect is not decided, and what would settle it."""
+    why, settles = alternative.why_not.removesuffix("."), alternative.would_settle
+    said = f"{effect_words(alternative.effect)}: {why}."
+    return f"{said} What would settle it: {settles.removesuffix('.')}." if settles else said
 
 
 def joined(items: Iterable[str], last: str = "and") -> str:

@@ -10,9 +10,10 @@ from analysis.mismatch.report.sentences import (
     gain,
     parameters,
     strongest,
+    tie,
     verdict,
 )
-from analysis.mismatch.words import effect_words, place, statistic_words
+from analysis.mismatch.words import place, statistic_words
 
 _SHOWN = 8
 
@@ -26,7 +27,7 @@ def summary(finding: Finding) -> str:
     for effect in finding.omitted_physics:
         lines.append(f"| {effect.effect} | {parameters(effect)} | {gain(effect.heldout_gain)} |")
     ties = [a for of, a in considered(finding) if not of or a.would_settle]
-    lines += [f"- {effect_words(a.effect)}: {a.why_not} {a.would_settle}".rstrip() for a in ties]
+    lines += [f"- {tie(a)}" for a in ties]
     after = ("z after", "explained by") if finding.searched else ()
     if finding.mismatches:
         head = ("differs", "where", "z", *after)

@@ -1,0 +1,101 @@
+"""Frames that lie in a recording twice, byte for byte: noise cannot repeat itself."""
+
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from analysis.mismatch.source import Source
+from dsis.errors import InputError
+from dsis.recording import Recording
+from dsis.recording.model import Codes
+
+Place = tuple[str, int]
+"""Exposure and number of a frame."""
+# Pixels in which unequal frames that follow each other differ at least, where noise moves them:
+# that none differs has a chance of exp(-40). Codes that hardly move may well be equal.
+_MOVED = 40
+_SHOWN = 8
+_FEW = 3  # pairs of equal frames that are told one by one
+
+
+def copies_of(recording: Recording, source: Source) -> tuple[tuple[Place, ...], ...]:
+    """Return the places of each frame that lies in a recording as stored more than once.
+
+    Frames of one code, and of exposures whose codes hardly move, may be equal: none of these.
+    """
+    for exposure in recording.exposures:
+        numbers = range(len(exposure.frames))
+        unread = [n for n in numbers if (exposure.name, n) not in source.checksums]
+        for _ in source.frames(exposure.name, unread):
+            pass
+    alike = defaultdict(list)
+    for place, checksum in sorted(source.checksums.items()):
+        alike[checksum].append(place)
+    equal = [same for some in alike.values() if len(some) > 1 for same in _equal(recording, some)]
+    moving = {name: _moving(recording, name) for name in {n for same in equal for n, _ in same}}
+    return tuple(same for same in equal if any(moving[name] for name, _ in same))
+
+
+def without_copies(recording: Recording, copies: Sequence[Sequence[Place]]) -> Recording:
+    """Return a recording without the exposures that hold copies, as `dsis camera fit` does.
+
+    Raises
+    ------
+    InputError
+        No dark or flat is left.
+    """
+    names = {name for same in copies for name, _ in same}
+    left = tuple(e for e in recording.exposures if e.name not in names)
+    if all(e.kind == "scene" for e in left):
+        fact = "hold byte-identical frames in every dark and flat, and noise cannot repeat itself"
+        raise InputError.of(recording.folder, "exposures", f"{fact}: {_places(copies)}")
+    return replace(recording, exposures=left)
+
+
+def remark_on_copies(copies: Sequence[Sequence[Place]]) -> str:
+    """Return which exposures are left out for their copies."""
+    return (
+        "Exposures left out, noise cannot repeat itself and frames of them are byte-identical: "
+        f"{_places(copies)}."
+    )
+
+
+def _equal(recording: Recording, some: Sequence[Place]) -> list[tuple[Place, ...]]:
+    """Return those of frames of one checksum that are equal, and hold more than one code."""
+    first = _frame(recording, some[0])
+    if first.min() == first.max():
+        return []
+    rest = [place for place in some[1:] if np.array_equal(first, _frame(recording, place))]
+    return [(some[0], *rest)] if rest else []
+
+
+def _moving(recording: Recording, name: str) -> bool:
+    """Return whether unequal frames of an exposure differ in many pixels."""
+    exposure = recording.exposure(name)
+    moved = [int((a != b).sum()) for a, b in pairwise(recording.frames(exposure))]
+    return min((n for n in moved if n), default=0) >= _MOVED
+
+
+def _frame(recording: Recording, place: Place) -> Codes:
+    return recording.frame(recording.exposure(place[0]), place[1])
+
+
+def _places(copies: Sequence[Sequence[Place]]) -> str:
+    """Return where copies lie: `flat-1 (frames 1 = 2, 4 = 5), dark and flat-2 (8 frames)`."""
+    by: dict[tuple[str, ...], list[Sequence[Place]]] = defaultdict(list)
+    for same in copies:
+        by[tuple(dict.fromkeys(name for name, _ in same))].append(same)
+    said = []
+    for names, groups in by.items():
+        if len(names) == 1 and len(groups) <= _FEW:
+            pairs = ", ".join(" = ".join(str(number) for _, number in same) for same in groups)
+            said.append(f"{names[0]} (frames {pairs})")
+        else:
+            times = "more than once" if len(names) == 1 else "in common"
+            frames = "1 frame" if len(groups) == 1 else f"{len(groups)} frames"
+            said.append(f"{' and '.join(names)} ({frames} {times})")
+    more = f" and {len(said) - _SHOWN} more" if len(said) > _SHOWN else ""
+    return ", ".join(said[:_SHOWN]) + more

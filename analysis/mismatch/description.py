@@ -1,0 +1,70 @@
+"""What of a recording's description its frames contradict: black level, kind, light, colours."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.mismatch.layout import Layout
+from analysis.mismatch.observe import Observation
+from analysis.mismatch.source import Source
+from analysis.photon_transfer.described import Described, contradictions
+from dsis.cfa import Cfa
+from dsis.recording import Recording
+from dsis.recording.hygiene import CLIPPED_SHARE
+
+_GREENS = 0.02  # of their mean, by which two greens differ at most
+_FILTERED = 0.1  # of it, by which another colour differs at least: no amplifiers are so unequal
+
+
+def remarks_on_description(
+    recording: Recording, layout: Layout, seen: Observation, source: Source
+) -> tuple[str, ...]:
+    """Return what the frames that are looked at contradict, in sentences."""
+    told = [
+        Described(
+            e.name,
+            e.kind,
+            e.exposure_time_s,
+            recording.exposure(e.name).light,
+            layout.black_dn + float(np.mean([one.level_dn for one in levels])),
+            float(np.mean([one.level_error_dn for one in levels])),
+            float(np.mean([one.variance_dn2 for one in levels])),
+        )
+        for e in layout.uniform
+        for levels in [[seen.levels[e.name, channel] for channel in layout.channels]]
+        if max(max(one.clipped_low, one.clipped_high) for one in levels) <= CLIPPED_SHARE
+    ]
+    return (*contradictions(told, layout.black_dn), *_on_colours(layout, told, source))
+
+
+def _on_colours(layout: Layout, told: list[Described], source: Source) -> list[str]:
+    """Return that a flat of a sensor without colours looks as behind colour filters.
+
+    Two pixels of each 2 x 2 cell on one diagonal are alike, as greens are, and the two others are
+    unlike each other, and one of them is unlike greens: columns, rows and checkers are not so.
+    """
+    flats = [e for e in told if e.kind == "flat"]
+    if layout.cfa is not Cfa.MONO or not flats:
+        return []
+    brightest = max(flats, key=lambda e: e.level_dn)
+    darkest = min(told, key=lambda e: e.level_dn)
+    black = _cell(layout, darkest.name, source) if darkest.kind == "dark" else layout.black_dn
+    cell = _cell(layout, brightest.name, source) - black
+    for greens, others in (
+        ((cell[0, 0], cell[1, 1]), (cell[0, 1], cell[1, 0])),
+        ((cell[0, 1], cell[1, 0]), (cell[0, 0], cell[1, 1])),
+    ):
+        green = sum(greens) / 2
+        apart = max(abs(one / green - 1) for one in others) if green > 0 else 0.0
+        alike = [abs(one - other) <= _GREENS * green for one, other in (greens, others)]
+        if alike == [True, False] and apart > _FILTERED:
+            shares = " : ".join(f"{value / green:.2f}" for value in cell.reshape(-1))
+            says = f"cfa is given as MONO, but the pixels of 2 x 2 cells are as {shares} in "
+            return [f"{says}{brightest.name}: that is a mosaic of colour filters."]
+    return []
+
+
+def _cell(layout: Layout, name: str, source: Source) -> NDArray[np.float64]:
+    """Return the means of the four pixels of 2 x 2 cells in one frame: (2, 2)."""
+    numbers = next(e.numbers for e in layout.uniform if e.name == name)
+    (frame,) = source.frames(name, numbers[:1])
+    return np.array([[float(frame[y::2, x::2].mean()) for x in (0, 1)] for y in (0, 1)])

@@ -35,6 +35,7 @@ Its first line names the work; a command that can resume adds lines of its own.
 
 
 _NAMED = 5
+_OF_SYSTEMS = frozenset({".DS_Store", "Thumbs.db", "desktop.ini"})  # made again by themselves
 
 
 def listed(names: Sequence[str]) -> str | None:
@@ -42,6 +43,7 @@ def listed(names: Sequence[str]) -> str | None:
 
     What `keep` of a `result_folder` says of files that dsis did not write.
     """
+    names = [name for name in names if name.rpartition("/")[2] not in _OF_SYSTEMS]
     more = len(names) - _NAMED
     return ", ".join(names[:_NAMED]) + (f" and {more} more" if more > 0 else "") or None
 
@@ -52,13 +54,15 @@ def said_of(out: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
+        if error.errno is None:
+            raise
         raise OSError(error.errno, error.strerror, str(out)) from None
 
 
 def check_parents(out: Path) -> None:
     """Refuse a place below a file: no folder can be made there."""
-    there = next(path for path in out.absolute().parents if path.exists())
-    if not there.is_dir():
+    there = next((path for path in out.absolute().parents if path.exists()), None)
+    if there is not None and not there.is_dir():
         raise InputError.of(out, "", f"lies below {there}, which is a file: give another place")
 
 

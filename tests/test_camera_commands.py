@@ -73,7 +73,9 @@ def test_the_description_of_a_recording_is_not_overwritten_by_a_fit(
     before = every_byte(made)
     assert main(["camera", "fit", str(made), "-o", str(made / "recording.toml")]) == 2
     said = capsys.readouterr().err
-    assert said.startswith(f"dsis: {made / 'recording.toml'}: was not written by dsis, or ")
+    assert said.startswith(
+        f"dsis: {made / 'recording.toml'}: has no checksum of dsis (of another hand, "
+    )
     assert every_byte(made) == before
 
 

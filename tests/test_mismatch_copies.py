@@ -9,6 +9,7 @@ from analysis.mismatch.copied import copies_of
 from analysis.mismatch.diagnose import find_mismatch
 from analysis.mismatch.finding import Finding
 from analysis.mismatch.reading import read
+from analysis.mismatch.report.sentences import verdict
 from analysis.mismatch.source import Source
 from dsis.errors import InputError
 from mismatch_recordings import InMemory, camera, recorded
@@ -85,3 +86,30 @@ def test_frames_whose_codes_hardly_move_may_be_equal() -> None:
     assert sum(equal) > len(made.stacks["dark-0"])  # more than each with itself
     assert copies_of(made, Source(made)) == ()
     assert read(made, camera()).stored is made
+
+
+def _quiet(moved: np.ndarray) -> InMemory:
+    """Return a recording whose first dark has noise of 0.05 DN, what moves it, and a hot pixel."""
+    made = _recording()
+    assert made.stacks is not None
+    dark = made.stacks["dark-0"]
+    noise = np.random.default_rng(3).normal(0, 0.05, dark.shape)
+    dark[:] = np.rint(64 + noise + moved).astype(np.uint16)
+    dark[:, 5, 7] = 300
+    assert any((a == b).all() for k, a in enumerate(dark) for b in dark[:k])
+    return made
+
+
+def test_what_moves_whole_frames_or_patterns_may_make_frames_equal() -> None:
+    """A black level that drifts by codes, and a pattern of two phases, beside little noise."""
+    drift = np.array([0.1, 1.0, 0.0, -1.1, 0.0, 1.9, 0.1, 1.0])[:, np.newaxis, np.newaxis]
+    rows, columns = np.indices(_recording().frame(_recording().exposures[0], 0).shape)
+    signs = np.array([1, -1, 1, 1, -1, -1, 1, -1])[:, np.newaxis, np.newaxis]
+    for moved in (drift, 2.0 * signs * (-1.0) ** (rows + columns)):
+        made = _quiet(moved)
+        assert copies_of(made, Source(made)) == ()
+
+
+def test_a_match_says_that_copies_were_left_out() -> None:
+    found = _found(_copied(flat_1=(("flat-1", 0), 3)))
+    assert verdict(found)[0].startswith("As far as exposures without copies can show, simulation")

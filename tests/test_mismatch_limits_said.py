@@ -76,3 +76,13 @@ def test_more_levels_or_a_dark_are_enough() -> None:
         found = _found(_only(_recording(), *names))
         assert not _said(found, "There is one level of light"), names
         assert verdict(found)[0].startswith(AGREE)
+
+
+def test_coloured_light_gives_a_mosaic_several_levels() -> None:
+    recording = _only(recorded(camera(cfa="RGGB"), 4, levels=LEVELS), "flat-1")
+    assert recording.stacks is not None
+    mosaic = camera(cfa="RGGB")
+    assert _said(find_mismatch(mosaic, recording, vocabulary=frozenset()), "There is one")
+    red = recording.stacks["flat-1"][:, ::2, ::2]
+    red[:] = 64 + (red - 64) // 2
+    assert not _said(find_mismatch(mosaic, recording, vocabulary=frozenset()), "There is one")

@@ -35,13 +35,13 @@ def _changed(name: str, **values: float | None) -> list[Described]:
     return [replace(e, **values) if e.name == name else e for e in _sound()]  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("black_dn", [0.0, 200.0])
+@pytest.mark.parametrize("black_dn", [20.0, 200.0])
 def test_a_black_level_that_is_not_that_of_darks(black_dn: float) -> None:
     (says,) = contradictions(_sound(), black_dn)
     assert says.startswith(f"black_level is given as {black_dn:g} DN, but d0 is at 64 DN")
 
 
-@pytest.mark.parametrize("black_dn", [60.0, 64.0, 68.0])
+@pytest.mark.parametrize("black_dn", [0.0, 60.0, 64.0, 68.0])  # 0: not stated
 @pytest.mark.parametrize("response", [0.1, 1.0])
 def test_a_sound_description_has_no_remark(black_dn: float, response: float) -> None:
     assert contradictions(_sound(response=response), black_dn) == ()
@@ -108,4 +108,18 @@ def test_amplifiers_and_checkers_are_no_colour_filters(cell: list[list[float]]) 
     assert made.stacks is not None
     whole = np.tile(cell, (made.rows // 2, made.columns // 2))
     made.stacks["flat-0"][:] = np.rint(BLACK + whole * (made.stacks["flat-0"] - BLACK))
+    assert not any("MONO" in one for one in _remarks(made, camera()))
+
+
+def test_dark_current_of_a_long_faint_flat_is_no_wrong_light() -> None:
+    """500 DN/s: a flat of a second beside darks of its time and of a hundredth of that."""
+    faint = _exposure("f9", 600.0, light=100.0, time_s=1.0)
+    darks = [_exposure("d0", 5.0), _exposure("d1", 500.0, time_s=1.0)]
+    assert contradictions([*darks, *_sound()[1:], faint], BLACK) == ()
+    assert contradictions([darks[0], *_sound()[1:], faint], BLACK) == ()
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_faint_flats_look_like_no_mosaic_by_chance(seed: int) -> None:
+    made = recorded(camera(), seed, rows=16, columns=16, frames=2, levels=(1.0,))
     assert not any("MONO" in one for one in _remarks(made, camera()))

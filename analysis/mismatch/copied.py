@@ -3,7 +3,7 @@
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import pairwise
+from itertools import combinations, islice
 
 import numpy as np
 
@@ -14,9 +14,13 @@ from dsis.recording.model import Codes
 
 Place = tuple[str, int]
 """Exposure and number of a frame."""
-# Pixels in which unequal frames that follow each other differ at least, where noise moves them:
-# that none differs has a chance of exp(-40). Codes that hardly move may well be equal.
-_MOVED = 40
+# Pixels in which unequal frames differ at least beyond what moves rows, columns and frames, where
+# noise moves each for itself: that none differs has a chance of exp(-40). Codes that hardly move
+# may well be equal; so may those that a pattern moves, by few sizes.
+_MOVED, _SIZES = 40, 3
+_SOME = 0.02  # of all pixels, that have a size
+_DISTINCT = 3  # frames: a pattern of two phases makes two
+_LOOKED_AT = 8  # frames of an exposure that are told from one another
 _SHOWN = 8
 _FEW = 3  # pairs of equal frames that are told one by one
 
@@ -73,10 +77,22 @@ def _equal(recording: Recording, some: Sequence[Place]) -> list[tuple[Place, ...
 
 
 def _moving(recording: Recording, name: str) -> bool:
-    """Return whether unequal frames of an exposure differ in many pixels."""
-    exposure = recording.exposure(name)
-    moved = [int((a != b).sum()) for a, b in pairwise(recording.frames(exposure))]
-    return min((n for n in moved if n), default=0) >= _MOVED
+    """Return whether noise of single pixels makes unequal frames of an exposure unequal."""
+    first = list(islice(recording.frames(recording.exposure(name)), _LOOKED_AT))
+    pairs = [(a, b) for a, b in combinations(first, 2) if not np.array_equal(a, b)]
+    if len({frame.tobytes() for frame in first}) < _DISTINCT:
+        return False
+    return min(_moved(a, b) for a, b in pairs) >= _MOVED
+
+
+def _moved(one: Codes, other: Codes) -> int:
+    """Return how many pixels of two frames differ beyond their rows and columns, by many sizes."""
+    change = one.astype(np.int32) - other
+    for axis in (1, 0):
+        change -= np.median(change, axis, keepdims=True).astype(np.int32)
+    _, pixels = np.unique(np.abs(change), return_counts=True)
+    sizes = int((pixels > _SOME * change.size).sum())
+    return int(np.count_nonzero(change)) if sizes >= _SIZES else 0
 
 
 def _frame(recording: Recording, place: Place) -> Codes:

@@ -1,5 +1,7 @@
 """What of a recording's description its frames contradict: black level, kind, light, colours."""
 
+from math import sqrt
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,6 +13,7 @@ from dsis.cfa import Cfa
 from dsis.recording import Recording
 from dsis.recording.hygiene import CLIPPED_SHARE
 
+_SURE = 5.0  # standard errors
 _GREENS = 0.02  # of their mean, by which two greens differ at most
 _FILTERED = 0.1  # of it, by which another colour differs at least: no amplifiers are so unequal
 
@@ -47,24 +50,34 @@ def _on_colours(layout: Layout, told: list[Described], source: Source) -> list[s
         return []
     brightest = max(flats, key=lambda e: e.level_dn)
     darkest = min(told, key=lambda e: e.level_dn)
-    black = _cell(layout, darkest.name, source) if darkest.kind == "dark" else layout.black_dn
-    cell = _cell(layout, brightest.name, source) - black
+    cell, variance = _cell(layout, brightest, source)
+    if darkest.kind == "dark":
+        black, more = _cell(layout, darkest, source)
+        cell, variance = cell - black, variance + more
+    else:
+        cell = cell - layout.black_dn
+    unsure = _SURE * sqrt(2 * variance)
     for greens, others in (
         ((cell[0, 0], cell[1, 1]), (cell[0, 1], cell[1, 0])),
         ((cell[0, 1], cell[1, 0]), (cell[0, 0], cell[1, 1])),
     ):
         green = sum(greens) / 2
-        apart = max(abs(one / green - 1) for one in others) if green > 0 else 0.0
-        alike = [abs(one - other) <= _GREENS * green for one, other in (greens, others)]
-        if alike == [True, False] and apart > _FILTERED:
+        apart = max(abs(one - green) for one in others)
+        alike = abs(greens[0] - greens[1]) <= _GREENS * green
+        unlike = abs(others[0] - others[1]) - unsure > _GREENS * green
+        if green > 0 and alike and unlike and apart - unsure > _FILTERED * green:
             shares = " : ".join(f"{value / green:.2f}" for value in cell.reshape(-1))
             says = f"cfa is given as MONO, but the pixels of 2 x 2 cells are as {shares} in "
-            return [f"{says}{brightest.name}: that is a mosaic of colour filters."]
+            return [f"{says}{brightest.name}, as of a mosaic of colour filters."]
     return []
 
 
-def _cell(layout: Layout, name: str, source: Source) -> NDArray[np.float64]:
-    """Return the means of the four pixels of 2 x 2 cells in one frame: (2, 2)."""
-    numbers = next(e.numbers for e in layout.uniform if e.name == name)
-    (frame,) = source.frames(name, numbers[:1])
-    return np.array([[float(frame[y::2, x::2].mean()) for x in (0, 1)] for y in (0, 1)])
+def _cell(layout: Layout, e: Described, source: Source) -> tuple[NDArray[np.float64], float]:
+    """Return the means of the four pixels of 2 x 2 cells, (2, 2), and the variance of one."""
+    numbers = next(one.numbers for one in layout.uniform if one.name == e.name)
+    frames = [
+        [[float(frame[y::2, x::2].mean()) for x in (0, 1)] for y in (0, 1)]
+        for frame in source.frames(e.name, numbers)
+    ]
+    samples = layout.rows * layout.columns / 4 * len(frames)
+    return np.mean(frames, 0), e.variance_dn2 / samples

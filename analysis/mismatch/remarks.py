@@ -16,6 +16,7 @@ ONE_LEVEL = (
     "noise cannot be told apart, and the response is unknown."
 )
 _LOCATED = "No physics was looked for: it is only said where recording and model differ."
+COPIES = "noise cannot repeat itself"
 _STOPPED = "Flats stand still below the white level"
 _SHOWN = 8
 _ALIKE = 1.05  # times another level: no line is told by levels so near
@@ -73,6 +74,8 @@ def as_far_as(remarks: Sequence[str]) -> str:
         return "in darks"
     if ONE_LEVEL in remarks:
         return "as far as one level of light without a dark can show"
+    if any(COPIES in remark for remark in remarks):
+        return "as far as exposures without copies can show"
     if any(remark.startswith(_STOPPED) for remark in remarks):
         return "as far as levels below those that stand still can show"
     return ""
@@ -99,11 +102,9 @@ def _reason(recording: Recording, layout: Layout, name: str, why: str) -> str:
 
 
 def _one_level(layout: Layout) -> bool:
-    """Return whether all flats are of one level, in each channel."""
-    by: dict[str, list[float]] = defaultdict(list)
-    for (_, channel), signal in layout.signal_dn.items():
-        by[channel].append(signal)
-    return all(max(levels) <= _ALIKE * min(levels) for levels in by.values())
+    """Return whether all flats are of one level; in coloured light channels have their own."""
+    levels = layout.signal_dn.values()
+    return max(levels) <= _ALIKE * min(levels)
 
 
 def remark_on_sizes(users: Sequence[Mismatch]) -> str:

@@ -20,7 +20,7 @@ def with_checksum(text: str) -> str:
 def unchanged(path: Path) -> bool:
     """Tell whether a file is as dsis wrote it, whatever ends its lines."""
     try:
-        above, _, digest = path.read_text(encoding="utf-8").rpartition(_SAYS)
+        above, _, digest = path.read_text(encoding="utf-8-sig").rpartition(_SAYS)
     except UnicodeDecodeError:
         return False
     return digest.strip() == _digest(above)
@@ -32,8 +32,11 @@ def check_camera_file(path: Path) -> None:
         raise InputError.of(path, "", "must end in .toml: the camera model is written to it")
     if path.is_dir():
         raise InputError.of(path, "", "is a folder, must be the name of a file")
-    if path.exists() and not unchanged(path):
-        fact = "was not written by dsis, or was changed since, and would be lost: give another name"
+    if path.exists() and path.stat().st_size and not unchanged(path):
+        fact = (
+            "has no checksum of dsis (of another hand, or of an earlier version), or was changed "
+            "since, and would be lost: give another name"
+        )
         raise InputError.of(path, "", fact)
 
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import hypot, sqrt
+from math import hypot, isclose, sqrt
 
 import numpy as np
 
@@ -70,7 +70,7 @@ def _darker(darks: Sequence[Described], flats: Sequence[Described]) -> list[str]
 
 def _on_black(darks: Sequence[Described], flats: Sequence[Described], black_dn: float) -> list[str]:
     """Return that darks are not at the nominal black level, nor brought there by dark current."""
-    if not darks:
+    if not darks or not black_dn:  # 0: not stated, as by descriptors
         return []
     dark = min(darks, key=lambda e: e.exposure_time_s)
     over = dark.level_dn - black_dn
@@ -90,10 +90,10 @@ def _on_black(darks: Sequence[Described], flats: Sequence[Described], black_dn: 
 
 def _on_light(darks: Sequence[Described], flats: Sequence[Described], black_dn: float) -> list[str]:
     """Return that the light of one flat is not what its level asks for, by all others."""
-    black = min((e.level_dn for e in darks), default=black_dn)
     lit = [
         (e, e.light, e.level_dn - black)
         for e in flats
+        for black in _black_of(e, darks, black_dn)
         if e.light and e.level_dn - black > _SURE * e.error_dn
     ]
     for flat, light, level in lit:
@@ -110,3 +110,11 @@ def _on_light(darks: Sequence[Described], flats: Sequence[Described], black_dn: 
             says = f"The light of {flat.name} is given as {light:g}; by its level, and the light "
             return [f"{says}of the other flats, it is {asked:.3g}."]
     return []
+
+
+def _black_of(flat: Described, darks: Sequence[Described], black_dn: float) -> list[float]:
+    """Return the level without light at a flat's exposure time; none where no dark tells it."""
+    if not darks:
+        return [black_dn]
+    alike = [dark.level_dn for dark in darks if isclose(dark.exposure_time_s, flat.exposure_time_s)]
+    return [float(np.mean(alike))] if alike else []

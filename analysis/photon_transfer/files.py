@@ -16,7 +16,7 @@ from analysis.photon_transfer.fit import Fit
 from analysis.photon_transfer.quantity import Quantity
 from dsis.camera import Camera, camera_values
 from dsis.outdir import check_parents, said_of
-from dsis.simulate.maps import MAPS, check_maps_file, owner_of, write_maps
+from dsis.simulate.maps import MAPS, check_maps_file, kept_for, owner_of, write_maps
 
 SCHEMA = "dsis-camera-fit/1"
 
@@ -30,8 +30,8 @@ def write_fit(fit: Fit, out_toml: Path, origin: str = "") -> tuple[Path, ...]:
         The fit; raises `InputError` where it is no possible camera.
     out_toml
         Where the camera model goes; the other names start with its stem. Raises `InputError` where
-        a file lies there that was not written by dsis or was changed since, or beside it the maps
-        of another camera.
+        a file lies there that was not written by dsis or was changed since. Maps of another
+        camera model that lie beside it are kept, and these are not written.
     origin
         A comment that says what was recorded: source, copyright, licence.
 
@@ -60,7 +60,7 @@ def _written(fit: Fit, out_toml: Path, text: str) -> tuple[Path, ...]:
     if fit.distribution is not None:
         written.append(draw_distribution(fit, fit.distribution, beside("-distribution.png")))
     maps = out_toml.parent / MAPS
-    if fit.maps is not None:
+    if fit.maps is not None and kept_for(out_toml) is None:
         write_maps(fit.maps, out_toml)
         written.append(maps)
     elif owner_of(maps) == out_toml.name:

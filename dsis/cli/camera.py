@@ -63,6 +63,7 @@ def camera_fit(options: argparse.Namespace) -> None:
     from analysis.photon_transfer import fit_camera, summary, write_fit
     from analysis.photon_transfer.checksum import check_camera_file
     from dsis.recording import read_recording
+    from dsis.simulate.maps import MAPS, kept_for
 
     recording = read_recording(options.recording)
     check_camera_file(options.out)  # before the work, not after
@@ -72,6 +73,12 @@ def camera_fit(options: argparse.Namespace) -> None:
         write_fit(fit, options.out)
     print(summary(fit))
     print(f"camera model in {options.out}")
+    other = kept_for(options.out)
+    if fit.maps is not None and other is not None:
+        print(
+            f"{options.out.parent / MAPS} keeps the fixed patterns of {other}: those of "
+            f"{options.out.name} were not written, fit into another folder for them"
+        )
 
 
 def camera_simulate(options: argparse.Namespace) -> None:

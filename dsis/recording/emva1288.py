@@ -11,11 +11,10 @@ from pathlib import Path
 
 from dsis.cfa import Cfa
 from dsis.errors import Fault, InputError
-from dsis.recording.listing import Listed, Listing, absolute, counted
+from dsis.recording.listing import NAMED, Listed, Listing, absolute, counted
 from dsis.recording.model import Kind, RecordedExposure, Sensor
 
 _NS_PER_S = 1e9
-_NAMED = 3  # missing frames that are named one by one
 _ALLOWED = "v release, n bits width height, b exposure photons, d exposure, i path"
 
 
@@ -140,7 +139,7 @@ def read_descriptor(path: Path) -> Listing:
         parser.line(number, line)
     sensor, exposures = parser.sensor(), parser.exposures()
     size = None if parser.format is None else parser.format[1:]
-    faults = [*parser.faults, *counted(parser.missing, "missing frames", _NAMED)]
+    faults = [*parser.faults, *counted(parser.missing, "missing frames", NAMED)]
     return Listing(path, sensor, exposures, size, tuple(faults))
 
 

@@ -47,6 +47,9 @@ def absolute(folder: Path, name: str) -> Path:
     return Path(os.path.normpath(folder.absolute() / Path(name).expanduser()))
 
 
+NAMED = 3  # faults of one kind that are told one by one
+
+
 def counted(faults: Sequence[Fault], what: str, named: int = 1) -> list[Fault]:
     """Return up to `named` faults of one kind as they are, of more the first and their number."""
     if len(faults) <= named:

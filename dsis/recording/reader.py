@@ -10,7 +10,7 @@ from dsis.errors import Fault, InputError
 from dsis.recording.cameraraw import RAW_SUFFIXES, raw_header
 from dsis.recording.emva1288 import read_descriptor
 from dsis.recording.frameformat import FrameHeader, read_header
-from dsis.recording.listing import Listed, Listing, counted
+from dsis.recording.listing import NAMED, Listed, Listing, counted
 from dsis.recording.model import RecordedExposure, Recording, Sensor
 from dsis.recording.tomlfile import RECORDING, read_listing
 
@@ -190,7 +190,7 @@ def _faults(listing: Listing, unfit: Sequence[Unfit]) -> list[Fault]:
         # Libraries repeat the path in their complaints.
         kind = fact.replace(str(frame), "")
         alike[kind].append(Fault(str(listing.file), listed.place, says))
-    return [fault for faults in alike.values() for fault in counted(faults, "such frames")]
+    return [fault for faults in alike.values() for fault in counted(faults, "such frames", NAMED)]
 
 
 def _shown(listing: Listing, frame: Path) -> str:

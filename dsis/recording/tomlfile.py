@@ -13,12 +13,11 @@ from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 from dsis.errors import Fault
 from dsis.imagefile import natural_order
 from dsis.model import Model, attempt, read_toml
-from dsis.recording.listing import Listed, Listing, absolute, counted
+from dsis.recording.listing import NAMED, Listed, Listing, absolute, counted
 from dsis.recording.model import ExposurePlan, Kind, RecordedExposure, Sensor
 
 RECORDING = "recording.toml"
 SCHEMA: Literal["dsis-recording/1"] = "dsis-recording/1"
-_NAMED = 3  # missing frames of an exposure that are named one by one
 
 
 def _listed(value: object) -> object:
@@ -131,4 +130,4 @@ def _frames(file: Path, entry: Entry, key: str) -> tuple[tuple[Path, ...], list[
                 faults.append(Fault(str(file), key, f"{name!r} matches no file"))
         else:
             missing.append(Fault(str(file), key, f"{name!r} is missing"))
-    return tuple(found), [*faults, *counted(missing, "missing frames", _NAMED)]
+    return tuple(found), [*faults, *counted(missing, "missing frames", NAMED)]

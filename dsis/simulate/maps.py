@@ -126,16 +126,20 @@ def owner_of(maps_file: Path) -> str | None:
 
 
 def check_maps_file(camera_file: Path) -> None:
-    """Refuse to write the maps of a camera over those of another, or over what is no such file."""
+    """Refuse to write the maps of a camera over what does not say that it is such a file."""
     path = camera_file.parent / MAPS
     if not path.exists():
         return
-    owner = owner_of(path)
-    if owner is None:
+    if owner_of(path) is None:
         fact = "does not say whose patterns it holds, and would be lost: fit into another folder"
         raise InputError.of(path, "camera", fact)
-    if owner != camera_file.name and (camera_file.parent / owner).exists():
-        raise _of_another(path, owner, camera_file)
+
+
+def kept_for(camera_file: Path) -> str | None:
+    """Return the other camera model, still there, whose maps lie beside a camera model."""
+    owner = owner_of(camera_file.parent / MAPS)
+    others = owner is not None and owner != camera_file.name
+    return owner if others and (camera_file.parent / str(owner)).exists() else None
 
 
 def _of_another(path: Path, owner: str, camera_file: Path) -> InputError:

@@ -10,10 +10,11 @@ import numpy as np
 from analysis.mismatch.source import Source
 from dsis.errors import InputError
 from dsis.recording import Recording
+from dsis.recording.hygiene import Place
 from dsis.recording.model import Codes
 
-Place = tuple[str, int]
-"""Exposure and number of a frame."""
+COPIES = "noise cannot repeat itself"
+"""What is said of all that is left out for its copies."""
 # Pixels in which unequal frames differ at least beyond what moves rows, columns and frames, where
 # noise moves each for itself: that none differs has a chance of exp(-40). Codes that hardly move
 # may well be equal; so may those that a pattern moves, by few sizes.
@@ -54,17 +55,14 @@ def without_copies(recording: Recording, copies: Sequence[Sequence[Place]]) -> R
     names = {name for same in copies for name, _ in same}
     left = tuple(e for e in recording.exposures if e.name not in names)
     if all(e.kind == "scene" for e in left):
-        fact = "hold byte-identical frames in every dark and flat, and noise cannot repeat itself"
+        fact = f"hold byte-identical frames in every dark and flat, and {COPIES}"
         raise InputError.of(recording.folder, "exposures", f"{fact}: {_places(copies)}")
     return replace(recording, exposures=left)
 
 
 def remark_on_copies(copies: Sequence[Sequence[Place]]) -> str:
     """Return which exposures are left out for their copies."""
-    return (
-        "Exposures left out, noise cannot repeat itself and frames of them are byte-identical: "
-        f"{_places(copies)}."
-    )
+    return f"Exposures left out, {COPIES} and frames of them are byte-identical: {_places(copies)}."
 
 
 def _equal(recording: Recording, some: Sequence[Place]) -> list[tuple[Place, ...]]:

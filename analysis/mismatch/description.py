@@ -23,14 +23,12 @@ def remarks_on_description(
 ) -> tuple[str, ...]:
     """Return what the frames that are looked at contradict, in sentences."""
     told = [
-        Described(
+        Described.of(
             e.name,
             e.kind,
             e.exposure_time_s,
             recording.exposure(e.name).light,
-            layout.black_dn + float(np.mean([one.level_dn for one in levels])),
-            float(np.mean([one.level_error_dn for one in levels])),
-            float(np.mean([one.variance_dn2 for one in levels])),
+            [(layout.black_dn + v.level_dn, v.level_error_dn, v.variance_dn2) for v in levels],
         )
         for e in layout.uniform
         for levels in [[seen.levels[e.name, channel] for channel in layout.channels]]

@@ -3,6 +3,7 @@
 from collections import defaultdict
 from collections.abc import Sequence
 
+from analysis.mismatch.copied import COPIES
 from analysis.mismatch.finding import Mismatch
 from analysis.mismatch.layout import Layout
 from analysis.mismatch.taking import STILL
@@ -16,7 +17,6 @@ ONE_LEVEL = (
     "noise cannot be told apart, and the response is unknown."
 )
 _LOCATED = "No physics was looked for: it is only said where recording and model differ."
-COPIES = "noise cannot repeat itself"
 _STOPPED = "Flats stand still below the white level"
 _SHOWN = 8
 _ALIKE = 1.05  # times another level: no line is told by levels so near

@@ -38,6 +38,19 @@ class Described:
     error_dn: float
     variance_dn2: float
 
+    @classmethod
+    def of(
+        cls,
+        name: str,
+        kind: str,
+        exposure_time_s: float,
+        light: float | None,
+        channels: Sequence[tuple[float, float, float]],
+    ) -> "Described":
+        """Return an exposure of which each channel has a level, its error, and a variance."""
+        level, error, variance = np.mean(channels, 0).tolist()
+        return cls(name, kind, exposure_time_s, light, level, error, variance)
+
 
 def contradictions(exposures: Sequence[Described], black_dn: float) -> tuple[str, ...]:
     """Return what of a description cannot be, in sentences; of a sound recording nothing.

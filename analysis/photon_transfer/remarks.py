@@ -91,14 +91,12 @@ def remarks_on_description(measured: Sequence[LevelStatistics], nominal_dn: floa
     for s in measured:
         by.setdefault(s.exposure, []).append(s)
     told = [
-        Described(
+        Described.of(
             name,
             own[0].kind,
             own[0].exposure_time_s,
             own[0].light,
-            float(np.mean([s.level_dn for s in own])),
-            float(np.mean([s.level_se_dn for s in own])),
-            float(np.mean([s.variance_dn2 for s in own])),
+            [(s.level_dn, s.level_se_dn, s.variance_dn2) for s in own],
         )
         for name, own in by.items()
         if not any(useless(s) for s in own)

@@ -76,7 +76,10 @@ def read_maps(camera_file: Path) -> SensorMaps:
         raise InputError.of(path, "", f"is damaged: {str(error).splitlines()[0]}") from None
     owner = str(arrays.pop("camera", camera_file.name))
     if owner != camera_file.name:
-        raise _of_another(path, owner, camera_file)
+        fact = (
+            f"holds the patterns of {owner}, must be those of {camera_file.name}: a folder holds "
+        )
+        raise InputError.of(path, "camera", f"{fact}the maps of one camera; fit into another")
     noise = {name: arrays.pop(name, np.float64(0)) for name in ("dsnu_noise_dn", "prnu_noise")}
     faults = [
         Fault(str(path), name, f"is {value}, must be a number >= 0")
@@ -140,11 +143,6 @@ def kept_for(camera_file: Path) -> str | None:
     owner = owner_of(camera_file.parent / MAPS)
     others = owner is not None and owner != camera_file.name
     return owner if others and (camera_file.parent / str(owner)).exists() else None
-
-
-def _of_another(path: Path, owner: str, camera_file: Path) -> InputError:
-    fact = f"holds the patterns of {owner}, must be those of {camera_file.name}: a folder holds "
-    return InputError.of(path, "camera", f"{fact}the maps of one camera; fit into another")
 
 
 def write_maps(maps: SensorMaps, camera_file: Path) -> None:

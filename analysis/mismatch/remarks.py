@@ -3,13 +3,13 @@
 from collections import defaultdict
 from collections.abc import Sequence
 
-from analysis.mismatch.copied import COPIES
 from analysis.mismatch.finding import Mismatch
 from analysis.mismatch.layout import Layout
 from analysis.mismatch.taking import STILL
 from analysis.mismatch.wholecells import Cropped
 from analysis.mismatch.words import effect_words, statistic_words
 from dsis.recording import Recording
+from dsis.recording.copies import COPIES
 
 NO_FLATS = "No flat could be judged: noise that grows with light, and the response, are unknown."
 ONE_LEVEL = (

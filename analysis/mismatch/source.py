@@ -1,12 +1,12 @@
 """Frames of a recording, kept in memory where they fit."""
 
-import zlib
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dsis.recording import Recording
+from dsis.recording.copies import Identity, Place, identity_of
 
 _MOST_BYTES = 1_200_000_000
 
@@ -14,15 +14,15 @@ _MOST_BYTES = 1_200_000_000
 class Source:
     """Gives the frames of exposures by number; small recordings are read once.
 
-    `checksums` are CRC-32 of the frames that were read, by exposure and number.
+    `identities` are those of the frames that were read, by exposure and number.
     """
 
     def __init__(self, recording: Recording) -> None:
         self.recording = recording
         count = sum(len(e.frames) for e in recording.exposures)
         self.keeps = count * recording.rows * recording.columns * 2 <= _MOST_BYTES
-        self.kept: dict[tuple[str, int], NDArray[np.uint16]] = {}
-        self.checksums: dict[tuple[str, int], int] = {}
+        self.kept: dict[Place, NDArray[np.uint16]] = {}
+        self.identities: dict[Place, Identity | None] = {}
 
     def frames(self, exposure: str, numbers: Sequence[int]) -> Iterator[NDArray[np.uint16]]:
         """Yield frames (row, column) of an exposure in the order of `numbers`."""
@@ -47,6 +47,6 @@ class Source:
         """Return frames (frame, row, column) of an exposure."""
         return np.stack(list(self.frames(exposure, numbers)))
 
-    def _look(self, key: tuple[str, int], frame: NDArray[np.uint16]) -> None:
-        if key not in self.checksums:
-            self.checksums[key] = zlib.crc32(np.ascontiguousarray(frame).data)
+    def _look(self, key: Place, frame: NDArray[np.uint16]) -> None:
+        if key not in self.identities:
+            self.identities[key] = identity_of(frame)

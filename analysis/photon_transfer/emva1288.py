@@ -53,7 +53,7 @@ def figures_of_merit(levels: Sequence[LevelStatistics], step_dn: int = 1) -> tup
     step_dn
         Step between codes: rounding adds its square over 12.
     """
-    known = [s for s in levels if s.frames > 1 and not (s.repeated_frames or s.copied_frames)]
+    known = [s for s in levels if s.frames > 1 and not s.copies]
     darks = [s for s in known if s.kind == "dark"]
     flats = sorted((s for s in known if s.kind == "flat"), key=lambda s: s.level_dn)
     if not darks or not flats:

@@ -46,6 +46,7 @@ from analysis.photon_transfer.statistics import LevelStatistics, expose_statisti
 from dsis.camera import BaseNoise, Camera, Segment
 from dsis.cfa import Cfa
 from dsis.errors import InputError
+from dsis.recording.copies import Same, copied_exposures
 from dsis.recording.hygiene import CLIPPED_SHARE, Inspection
 from dsis.simulate.maps import SensorMaps
 
@@ -196,8 +197,11 @@ def fit_camera(
     """
     remarks: list[str] = []
     measured, inspection, sums = _measured(recording, threads, progress)
+    copies = inspection.copies(recording)
+    copied = copied_exposures(copies)
+    measured = [replace(s, copied_frames=s.exposure in copied) for s in measured]
     step, phase = inspection.step_dn(), inspection.phase_dn()
-    remarks += _remarks_on_frames(recording, inspection, step)
+    remarks += _remarks_on_frames(recording, inspection, copies, step)
     names = list(dict.fromkeys(np.ravel(channel_names(recording.sensor.cfa)).tolist()))
     darks = {name: dark_of(measured, name, step, phase) for name in names}
     levels = levels_of(measured, darks, recording.sensor.black_level, step, phase)
@@ -303,15 +307,16 @@ def _pass(
         order = sorted(range(len(exposures)), key=lambda i: -len(exposures[i].frames))
         running = {i: pool.submit(measure, exposures[i]) for i in order}
         parts = [running[i].result() for i in range(len(exposures))]
-    copied = inspection.copied_exposures()
-    measured = [replace(s, copied_frames=s.exposure in copied) for part in parts for s in part]
-    return measured, inspection, sums
+    return [s for part in parts for s in part], inspection, sums
 
 
-def _remarks_on_frames(recording: Recorded, inspection: Inspection, step_dn: int) -> list[str]:
+def _remarks_on_frames(
+    recording: Recorded, inspection: Inspection, copies: Sequence[Same], step_dn: int
+) -> list[str]:
     """Return what the frames show of themselves: copies, clipping, odd codes, scenes."""
     # Levels at the white level are named where they are left out.
-    found = [r for r in inspection.remarks(recording.exposures) if "at the white level" not in r]
+    said = inspection.remarks(recording.exposures, copies)
+    found = [r for r in said if "at the white level" not in r]
     scenes = sum(str(e.kind) not in ("dark", "flat") for e in recording.exposures)
     if scenes:
         found.append(f"{scenes} exposure(s) of kind scene are not used.")

@@ -44,28 +44,33 @@ class FittedLevel:
     z: float
 
 
-def useless(s: LevelStatistics) -> str:
-    """Return why a level cannot be used; empty where it can."""
+def spoiled(s: LevelStatistics) -> str:
+    """Return why a level's mean cannot be used; empty where it can."""
     reasons = (
         (s.frames < 2, "one frame only: no noise to be seen"),
         (s.clipped_high > CLIPPED_SHARE, "more than 0.01 % of its samples are at the white level"),
         (s.clipped_low > CLIPPED_SHARE, "more than 0.01 % of its samples are at code 0"),
-        (s.repeated_frames > 0, "frames equal the frame before bit for bit"),
-        (s.copied_frames, "a frame occurs elsewhere in the recording bit for bit"),
-        (not s.variance_dn2 > 0 or not s.variance_se_dn2 > 0, "its frames do not vary"),
+        (s.copies and s.repeated_frames > 0, "frames equal the frame before bit for bit"),
+        (s.copies, "a frame occurs elsewhere in the recording bit for bit"),
+        (not (s.variance_dn2 > 0 or s.frame_sd_dn > 0), "its frames do not vary"),
     )
     return next((why for holds, why in reasons if holds), "")
+
+
+def useless(s: LevelStatistics) -> str:
+    """Return why a level's noise cannot be used; empty where it can."""
+    if why := spoiled(s):
+        return why
+    if not s.variance_dn2 > 0:
+        return "its frames vary as a whole only"
+    return "" if s.variance_se_dn2 > 0 else "its frames do not vary"
 
 
 def dark_of(
     measured: Sequence[LevelStatistics], channel: str, step_dn: int = 1, phase_dn: int = 0
 ) -> DarkLine | None:
     """Return the black level of one channel, from the darks that are not clipped at code 0."""
-    usable = [
-        s
-        for s in measured
-        if s.kind == "dark" and s.channel == channel and not useless(s) and s.frames > 1
-    ]
+    usable = [s for s in measured if s.kind == "dark" and s.channel == channel and not spoiled(s)]
     if not usable:
         return None
     times, levels, errors, hidden = [], [], [], False
@@ -83,6 +88,8 @@ def dark_of(
         # A frame offset that wanders moves the mean more than the pixels' noise does.
         wanders = stats.f.sf(s.wander, s.frames - 1, 1e6) < WANDER_P
         error = plain.level_se_dn * (np.sqrt(s.wander) if wanders else 1.0)
+        if not s.variance_dn2 > 0:  # the same, where there is nothing but the wander
+            error = s.frame_sd_dn / np.sqrt(s.frames)
         times.append(s.exposure_time_s)
         levels.append(plain.level_dn)
         errors.append(float(error))

@@ -7,7 +7,7 @@ from scipy import stats
 
 from analysis.photon_transfer.black import DarkLine
 from analysis.photon_transfer.described import Described, contradictions
-from analysis.photon_transfer.levels import WANDER_P, FittedLevel, useless
+from analysis.photon_transfer.levels import WANDER_P, FittedLevel, spoiled
 from analysis.photon_transfer.parts import P_SEEN
 from analysis.photon_transfer.patterns import LEAST_GAIN, FixedPatterns
 from analysis.photon_transfer.projections import OUTLIER_SD
@@ -99,7 +99,7 @@ def remarks_on_description(measured: Sequence[LevelStatistics], nominal_dn: floa
             [(s.level_dn, s.level_se_dn, s.variance_dn2) for s in own],
         )
         for name, own in by.items()
-        if not any(useless(s) for s in own)
+        if not any(spoiled(s) for s in own)
     ]
     return list(contradictions(told, nominal_dn))
 

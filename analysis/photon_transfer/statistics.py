@@ -72,7 +72,7 @@ class LevelStatistics:
     row_variance_dn2, column_variance_dn2
         Variance of fresh offsets of rows and columns; 0 where chance explains them.
     copied_frames
-        Whether a frame occurs elsewhere in the recording bit for bit.
+        Whether a frame occurs elsewhere in the recording bit for bit, although noise moves pixels.
     """
 
     exposure: str
@@ -106,6 +106,11 @@ class LevelStatistics:
         """Number of pixels of the plane."""
         return self.rows * self.columns
 
+    @property
+    def copies(self) -> bool:
+        """Whether frames of it are no frames of their own: copies, or all of them one picture."""
+        return self.copied_frames or 0 < self.repeated_frames == self.frames - 1
+
 
 def expose_statistics(
     recording: Recorded,
@@ -116,9 +121,9 @@ def expose_statistics(
     """Return the statistics of each CFA channel of one exposure; empty where it has no frames.
 
     `inspection` sees every frame in passing, and says which code is white; `patterns` is given the
-    sum of the frames where none is repeated and no more than `CLIPPED_SHARE` of the samples are
-    clipped. Raises `InputError` where a channel has a single pixel or none: its noise is no other
-    than a change of the light.
+    sum of the frames where no more than `CLIPPED_SHARE` of the samples are clipped. Raises
+    `InputError` where a channel has a single pixel or none: its noise is no other than a change of
+    the light.
     """
     white = int(inspection.white_level if inspection else recording.sensor.white_level)
     sums: Sums | None = None
@@ -149,8 +154,7 @@ def expose_statistics(
     pattern = np.zeros((2, sums.total.shape[1]), np.int64)
     square_total(sums.total, pattern)
     samples = sums.total.size * len(sums.rows)
-    sound = not sums.repeats and int(sums.clipped.sum()) <= CLIPPED_SHARE * samples
-    if patterns is not None and sound:
+    if patterns is not None and int(sums.clipped.sum()) <= CLIPPED_SHARE * samples:
         patterns.add(exposure, sums.total + np.int64(sums.reference * len(sums.rows)))
     names = channel_names(recording.sensor.cfa)
     found = dict.fromkeys(names[i][j] for i, j in product((0, 1), (0, 1)))

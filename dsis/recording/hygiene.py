@@ -6,9 +6,8 @@ Nothing here refuses a recording; each remark states a limit of what it can show
 import math
 import zlib
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from threading import Lock
 from typing import Protocol
 
@@ -16,14 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsis.compiled import kernel
+from dsis.recording.copies import Identity, Same, Streamed, copies_of, remarks_on_copies
 
 CLIPPED_SHARE = 1e-4
 """Share of clipped pixels above which mean and variance of an exposure are biased noticeably."""
 
 _FIRST = 4096  # samples of a frame, which tell that codes are ordinary
 _LEAST_STEPS = 4  # that all codes reach over: of fewer no step is told
-
-Place = tuple[str, int]  # exposure, and number of the frame
 
 
 class Planned(Protocol):
@@ -41,9 +39,8 @@ class Planned(Protocol):
 class FrameSummary:
     """One frame in a few numbers: code sum, least and largest code, clipped counts, common step.
 
-    `checksum` is CRC-32 of the codes: with the sum, which alone spreads over thousands of values,
-    1000 frames of noise hold two that only seem alike once in ten million recordings. `step` is the
-    greatest that all differences of codes are multiples of; 0 where there is one code.
+    `checksum` is CRC-32 of the codes. `step` is the greatest that all differences of codes are
+    multiples of; 0 where there is one code.
     """
 
     total: int
@@ -61,9 +58,9 @@ class FrameSummary:
         return self.least == self.largest
 
     @property
-    def identity(self) -> tuple[int, int, int]:
-        """Return what byte-identical frames share, and hardly any others."""
-        return self.checksum, self.total, self.size
+    def identity(self) -> Identity | None:
+        """`identity_of` the frame."""
+        return None if self.constant else (self.checksum, self.total, self.size)
 
 
 class Inspection:
@@ -84,16 +81,24 @@ class Inspection:
         with self._lock:
             self._seen[exposure][index] = summary
 
-    def remarks(self, exposures: Sequence[Planned]) -> tuple[str, ...]:
-        """Return the remarks on the exposures that were looked at, in their order."""
+    def copies(self, recording: Streamed) -> tuple[Same, ...]:
+        """Return the places of frames of a recording that occur twice in what was looked at.
+
+        See `dsis.recording.copies.copies_of`; where there may be some, frames are read again.
+        """
+        seen = {(n, i): f.identity for n, frames in self._seen.items() for i, f in frames.items()}
+        return copies_of(recording, seen)
+
+    def remarks(self, exposures: Sequence[Planned], copies: Sequence[Same]) -> tuple[str, ...]:
+        """Return the remarks on the exposures that were looked at, in their order.
+
+        `copies` are those that `copies` returns.
+        """
         seen = [(e, [self._seen[e.name][i] for i in sorted(self._seen[e.name])])
                 for e in exposures if e.name in self._seen]  # fmt: skip
         found = [remark for e, frames in seen for remark in _on_exposure(e, frames)]
-        return (*found, *self._copies(exposures), *self._on_codes(), *_on_light(seen))
-
-    def copied_exposures(self) -> frozenset[str]:
-        """Return the exposures that hold a frame which occurs twice in what was looked at."""
-        return frozenset(name for same in self._same() for name, _ in same)
+        told = remarks_on_copies(exposures, copies)
+        return (*found, *told, *self._on_codes(), *_on_light(seen))
 
     def step_dn(self) -> int:
         """Return the greatest step that lies between all codes; 1 for ordinary codes, or few."""
@@ -112,30 +117,6 @@ class Inspection:
     def _frames(self) -> list[FrameSummary]:
         return [frame for frames in self._seen.values() for frame in frames.values()]
 
-    def _same(self) -> list[list[Place]]:
-        """Return the places (exposure, frame) of every frame that occurs more than once."""
-        places: dict[tuple[int, int, int], list[Place]] = defaultdict(list)
-        for name, frames in self._seen.items():
-            for index, frame in sorted(frames.items()):
-                if not frame.constant:  # these have a remark of their own
-                    places[frame.identity].append((name, index))
-        return [same for same in places.values() if len(same) > 1]
-
-    def _copies(self, exposures: Sequence[Planned]) -> list[str]:
-        """Return a remark for the exposures that share frames, with the first of these frames."""
-        files, rank = _files_of(exposures), {e.name: i for i, e in enumerate(exposures)}
-
-        def order(place: Place) -> tuple[int, int]:
-            return rank.get(place[0], len(rank)), place[1]
-
-        groups: dict[tuple[bool, tuple[str, ...]], list[list[Place]]] = defaultdict(list)
-        found = [sorted(same, key=order) for same in self._same()]
-        for same in sorted(found, key=lambda same: order(same[0])):
-            held = {files.get(place) for place in same}
-            once = len(held) == 1 and None not in held
-            groups[once, tuple(dict.fromkeys(name for name, _ in same))].append(same)
-        return [_on_copies(groups[key], key, files) for key in groups]
-
     def _on_codes(self) -> list[str]:
         step, phase = self.step_dn(), self.phase_dn()
         if step <= 1:
@@ -146,36 +127,17 @@ class Inspection:
         return [f"{says} Codes must be right-aligned"]
 
 
-def _files_of(exposures: Sequence[Planned]) -> dict[Place, Path]:
-    """Return the file of each frame that has one."""
-    return {
-        (e.name, index): file
-        for e in exposures
-        if isinstance(e.frames, tuple)
-        for index, file in enumerate(e.frames)
-        if isinstance(file, Path)
-    }
-
-
-def _on_copies(
-    groups: list[list[Place]], shared: tuple[bool, tuple[str, ...]], files: Mapping[Place, Path]
-) -> str:
-    once, names = shared
-    frames = ", ".join(f"{name} frame {index}" for name, index in groups[0])
-    more = f" (the first of {len(groups)} in {', '.join(names)})" if len(groups) > 1 else ""
-    if once:
-        file = files[groups[0][0]]
-        return f"the same file is listed more than once: {file.name} is {frames}{more}"
-    return f"byte-identical frames, noise cannot repeat itself: {frames}{more}"
-
-
 def _on_exposure(exposure: Planned, frames: list[FrameSummary]) -> list[str]:
     name, pixels = exposure.name, sum(f.size for f in frames)
     at_white = sum(f.at_white for f in frames) / pixels
     at_zero = sum(f.at_zero for f in frames) / pixels
+    constant = sum(f.constant for f in frames)
     found = []
     if len(frames) == 1:
         found.append(f"{name}: one frame only, temporal noise cannot be measured")
+    if len(frames) > 1 and len({f.identity for f in frames}) == 1 and not constant:
+        many = f"its {len(frames)} frames are byte-identical"
+        found.append(f"{name}: {many}, temporal noise cannot be measured")
     if at_white == 1:
         found.append(f"{name}: saturated, every pixel is at the white level")
     elif at_white > CLIPPED_SHARE:
@@ -184,7 +146,6 @@ def _on_exposure(exposure: Planned, frames: list[FrameSummary]) -> list[str]:
         found.append(f"{name}: empty, every pixel is 0")
     elif at_zero > CLIPPED_SHARE:
         found.append(f"{name}: {at_zero:.2%} of the pixels are at code 0, its mean is biased")
-    constant = sum(f.constant for f in frames)
     if constant and at_white < 1 and at_zero < 1:
         found.append(f"{name}: {constant} of {len(frames)} frames hold one code only")
     return found

@@ -199,10 +199,11 @@ class Recording:
 
         Byte-identical, constant and saturated frames, clipped exposures, single frames, flats as
         dark as the darks, codes that share a factor: nothing of it is refused, all of it limits
-        what the recording can show. See `dsis.recording.hygiene`.
+        what the recording can show. Frames of exposures that seem to hold copies are read once
+        more. See `dsis.recording.hygiene`.
         """
         inspection = Inspection(self.sensor.white_level)
         for exposure in self.exposures:
             for _ in self.frames(exposure, ahead=threads, inspection=inspection):
                 pass
-        return inspection.remarks(self.exposures)
+        return inspection.remarks(self.exposures, inspection.copies(self))

@@ -69,6 +69,6 @@ def without_spikes(recording: Recording, camera: Camera) -> tuple[Recording, Sou
         return recording, source, None
     own = cleaned(recording, spikes.replaced)
     made = Source(own)
-    made.checksums = source.checksums  # of what lies on disk
+    made.identities = source.identities  # of what lies on disk
     made.kept = {key: own.patched(key, frame) for key, frame in source.kept.items()}
     return own, made, spikes

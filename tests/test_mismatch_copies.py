@@ -1,17 +1,22 @@
 """Promise: frames that lie in a recording twice are told, and nothing is fitted to them."""
 
 from dataclasses import replace
+from weakref import ref
 
 import numpy as np
 import pytest
 
+from analysis.mismatch import reading
 from analysis.mismatch.copied import copies_of
 from analysis.mismatch.diagnose import find_mismatch
 from analysis.mismatch.finding import Finding
 from analysis.mismatch.reading import read
 from analysis.mismatch.report.sentences import verdict
 from analysis.mismatch.source import Source
+from analysis.mismatch.spikes import Spikes, without_spikes
+from dsis.camera import Camera
 from dsis.errors import InputError
+from dsis.recording import Recording
 from mismatch_recordings import InMemory, camera, recorded
 
 LEVELS = (100.0, 500.0, 1600.0)
@@ -65,6 +70,31 @@ def test_a_recording_of_copies_is_refused_in_one_line() -> None:
     with pytest.raises(InputError, match=r"identical .*dark-0 \(frames 1 = 2\)") as said:
         read(_copied(**copies), camera())
     assert len(said.value.faults) == 1
+
+
+def test_a_recording_of_scenes_is_not_said_to_have_darks_and_flats() -> None:
+    made = _recording()
+    assert made.stacks is not None
+    made.stacks["flat-1"][3] = made.stacks["flat-1"][0]
+    scene = replace(made.exposure("flat-1"), kind="scene")
+    with pytest.raises(InputError, match="holds no dark or flat of two different frames"):
+        _found(replace(made, exposures=(scene,)))
+
+
+def test_frames_are_not_held_twice_while_they_are_read_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    held: list[ref[Source]] = []
+
+    def watched(recording: Recording, model: Camera) -> tuple[Recording, Source, Spikes | None]:
+        assert all(source() is None for source in held)
+        found = without_spikes(recording, model)
+        held.append(ref(found[1]))
+        return found
+
+    monkeypatch.setattr(reading, "without_spikes", watched)
+    read(_copied(flat_1=(("flat-1", 0), 3)), camera())
+    assert len(held) == 2
 
 
 def test_without_copies_nothing_is_read_anew_or_left_out() -> None:

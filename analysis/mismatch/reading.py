@@ -46,5 +46,6 @@ def read(recorded: Recording, camera: Camera) -> Read:
     if copies:  # spikes are told by how many frames have one: those of copies do not count
         remarks = (remark_on_copies(copies),)
         stored = without_copies(stored, copies)
+        del recording, source, spikes  # no frame is held twice
         recording, source, spikes = without_spikes(stored, camera)
     return Read(whole, stored, with_steady_light(recording, source), source, spikes, remarks)

@@ -53,6 +53,18 @@ def test_dark_current_is_no_wrong_black_level_and_no_exchange() -> None:
     assert contradictions(warm, BLACK) == ()
 
 
+def test_dark_current_below_a_switch_is_no_wrong_black_level() -> None:
+    """A dark of a minute lies in the first read-out path, all brighter flats in a second.
+
+    There noise grows four times as fast as where the dark is. Flats of less time are darker.
+    """
+    flats = [
+        replace(e, variance_dn2=4 * e.variance_dn2) if e.level_dn > 1000.0 else e
+        for e in _sound()[1:]
+    ]
+    assert contradictions([_exposure("d0", 900.0, time_s=60.0), *flats], BLACK) == ()
+
+
 def test_frames_of_a_dark_and_a_flat_that_are_exchanged() -> None:
     made = _sound()
     dark, bright = made[0], made[-1]

@@ -88,6 +88,8 @@ def _on_black(darks: Sequence[Described], flats: Sequence[Described], black_dn: 
     dark = min(darks, key=lambda e: e.exposure_time_s)
     over = dark.level_dn - black_dn
     room = _NOISES * sqrt(max(dark.variance_dn2, 0.0)) + _CODE + _SURE * dark.error_dn
+    if any(flat.level_dn + room + _SURE * flat.error_dn < dark.level_dn for flat in flats):
+        return []  # a current, for a flat of less time is darker: `_darker` says which are not
     # What a current of that size would have for noise, by what light has.
     slopes = [
         (flat.variance_dn2 - dark.variance_dn2) / (flat.level_dn - dark.level_dn)

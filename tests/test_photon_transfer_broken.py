@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.photon_transfer import fit_camera
+from analysis.photon_transfer import fit_camera, summary
 from dsis.cfa import Cfa
 from dsis.errors import InputError
 from planted_camera import ONE, Z_MAX, Recording, camera, misses, record
@@ -136,6 +136,30 @@ class TestBroken:
             assert len(says) == bool(unknown)
             assert all(f"{name} (MONO)" in says[0] for name in unknown)
         assert any("No value (-) of DSNU1288" in r for fit in fits for r in fit.remarks)
+
+    def test_a_pattern_of_darks_that_hides_that_of_flats(self) -> None:
+        """It is not too weak to be seen: DSNU1288 is measured, PRNU1288 is lost beside it."""
+        offsets = np.random.default_rng(0).normal(
+            0, 20.0, self.recording.exposures[1].stack.shape[1:]
+        )
+        own = tuple(
+            replace(e, stack=np.rint(e.stack + offsets).astype(np.uint16))
+            if e.name == "dark-01"
+            else e
+            for e in self.recording.exposures
+        )
+        fit = fit_camera(replace(self.recording, exposures=own))
+        (says,) = [r for r in fit.remarks if r.startswith("No value (-) of ")]
+        assert "PRNU1288 (MONO): beside noise, flats have no stronger" in says
+        assert "too weak" not in says
+
+    def test_one_dark_and_one_flat_tell_no_errors_of_lines(self) -> None:
+        fit = fit_camera(self.recording.where(lambda e: e.name in ("dark-00", "flat-08")))
+        errors = {q.name: q.standard_error for q in fit.channels["MONO"].figures}
+        assert errors["K"] is None
+        assert errors["sigma_y.dark"] is not None
+        assert not any(one is not None and np.isnan(one) for one in errors.values())
+        assert "nan" not in summary(fit)
 
     def test_too_many_segments(self) -> None:
         with pytest.raises(InputError, match="--segments 7"):

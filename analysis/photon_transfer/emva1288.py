@@ -7,7 +7,7 @@ high-pass. They describe what was measured; the camera model is fitted apart fro
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -86,7 +86,15 @@ def figures_of_merit(levels: Sequence[LevelStatistics], step_dn: int = 1) -> tup
     found += _linearity(response)
     found += _non_uniformity(flats, darks, response, gain)
     found += _dark_current(darks, gain)
-    return tuple(found)
+    return tuple(_with_known_error(quantity) for quantity in found)
+
+
+def _with_known_error(quantity: Quantity) -> Quantity:
+    """Return a figure whose error is None where one level, or noise of nought, tells none."""
+    error = quantity.standard_error
+    return (
+        quantity if error is None or np.isfinite(error) else replace(quantity, standard_error=None)
+    )
 
 
 def _response(flats: Sequence[LevelStatistics], darks: Sequence[LevelStatistics]) -> _Response:

@@ -20,6 +20,9 @@ SATURATED = "saturation over the highest slope"
 CONVERTER = "the converter clips first: lower limit of the full well"
 UNREACHED = "at least: none saturates"
 
+_WEAK = "the fixed pattern is too weak to be seen beside the noise of these frames"
+_WHY = {"PRNU1288": "beside noise, flats have no stronger a fixed pattern than darks have"}
+
 DIFFERENT_P = 1e-3  # channels that differ more than chance does so often differ
 
 
@@ -141,15 +144,17 @@ def remarks_on_patterns(patterns: FixedPatterns) -> list[str]:
 
 def remarks_on_unknown(figures: Mapping[str, Sequence[Quantity]]) -> list[str]:
     """Return why tables have no value for some figures; `figures` of each channel."""
-    channels: dict[str, dict[str, None]] = {}
+    channels: dict[str, dict[str, dict[str, None]]] = {}
     for channel, own in figures.items():
         for name in (q.name for q in own if q.value is None):
-            channels.setdefault(name, {})[channel] = None
+            channels.setdefault(_WHY.get(name, _WEAK), {}).setdefault(name, {})[channel] = None
     if not channels:
         return []
-    names = ", ".join(f"{name} ({', '.join(of)})" for name, of in channels.items())
-    why = "the fixed pattern is too weak to be seen beside the noise of these frames"
-    return [f"No value (-) of {names}: {why}."]
+    said = []
+    for why, names in channels.items():
+        told = ", ".join(f"{name} ({', '.join(of)})" for name, of in names.items())
+        said.append(f"of {told}: {why}")
+    return [f"No value (-) {'; '.join(said)}."]
 
 
 def _remarks_on_lines(levels: Sequence[FittedLevel]) -> list[str]:

@@ -43,6 +43,7 @@ from analysis.mismatch.rivalled import rivalled
 from analysis.mismatch.standout import first_maps, side_by_side
 from analysis.mismatch.state import State
 from analysis.mismatch.unequal import unequal
+from analysis.mismatch.unequalframes import unequally_noisy
 from analysis.mismatch.uneven import uneven
 from analysis.mismatch.warmspots import warm_spots
 from analysis.mismatch.waved import waved
@@ -113,6 +114,7 @@ def of_another(state: State, effect: Effect, without: Array) -> Denial | None:
         or interpolated(state, kind)
         or timed(state, kind, without)
         or persisting(state, kind, without)
+        or unequally_noisy(state, kind, without)
         or carried(state, effect)
         or no_field(state, effect)
         or displaced(state, kind, state.null.mean, without)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from analysis.mismatch.burst import Bursts, bursts_of
+from analysis.mismatch.columncodes import ColumnCodes, column_codes
 from analysis.mismatch.jumping import LEAST, Jumping
 from analysis.mismatch.layout import Layout
 from analysis.mismatch.paired import Pairs, pairs_of
@@ -100,6 +101,11 @@ class FramesAsked:
     def bursts(self) -> Bursts:
         """How much of their tails lies in single lines."""
         return bursts_of(self.layout, self.frames_of)
+
+    @cached_property
+    def column_codes(self) -> ColumnCodes | None:
+        """Whether columns share which of their codes are uneven; None: they do not tell."""
+        return column_codes(self.layout, self.frames_of)
 
     @cached_property
     def ring(self) -> Ring:

@@ -136,7 +136,7 @@ def beside_undecided(
 
 
 def _of_frames(state: State, frames: WholeFrames, best: Ranked) -> Denial | None:
-    """Return how frames deny what lasts, tails, or offsets that are fixed; None: they do not.
+    """Return how frames deny what lasts, tails, codes, or offsets that are fixed; None: not.
 
     Of offsets nothing is said beside lines, which may last as long as an exposure does.
     """
@@ -145,6 +145,8 @@ def _of_frames(state: State, frames: WholeFrames, best: Ranked) -> Denial | None
         return frames.pairs.denial(kind)
     if kind in SHARED:
         return frames.sided.denial(kind)
+    if kind == "adc_dnl":
+        return None if frames.column_codes is None else frames.column_codes.denial()
     if kind in TAILS:
         there = frozenset(own.kind for own in state.camera.effect)
         if frames.located is not None:

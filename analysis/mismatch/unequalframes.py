@@ -21,10 +21,10 @@ def unequally_noisy(state: State, kind: str, without: Array) -> Denial | None:
     """Return how tails, or pixels that differ in noise, are denied by frames that do; None: not.
 
     Samples of frames whose variances have a relative variance f are as far out as ones of an excess
-    kurtosis of 3 f, and no sample has tails; variances over n such frames scatter by 1 + f (n - 2) /
-    (n - 1) times as much, and no pixel is noisier than others. Where that frames differ is left
-    unexplained, and makes half of what the effect would explain, there may be none; unless the same
-    pixels are noisier in all exposures, by half of what is claimed.
+    kurtosis of 3 f, and no sample has tails; variances over n such frames scatter by
+    1 + f (n - 2) / (n - 1) times as much, and no pixel is noisier than others. Where that frames
+    differ is left unexplained, and makes half of what the effect would explain, there may be none;
+    unless the same pixels are noisier in all exposures, by half of what is claimed.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def unequally_noisy(state: State, kind: str, without: Array) -> Denial | None:
 
 
 def _apart(state: State) -> dict[Place, float]:
-    """Return the relative variance of frames' variances, where it is left open and beyond chance."""
+    """Return the relative variance of frames' variances beyond chance, where it is left open."""
     layout = state.setting.layout
     step = 1 + (len(layout.sites) > 1)
     free = (layout.rows // step - 1) * (layout.columns // step - 1)
@@ -75,7 +75,7 @@ def _apart(state: State) -> dict[Place, float]:
 
 
 def _persists(state: State, without: Array) -> bool:
-    """Return whether pixels are noisy in every exposure as the effect has it, surely and by half."""
+    """Return whether pixels are noisy in every exposure as an effect has it, surely, by half."""
     own = np.array([key.statistic == _PERSISTENT for key in state.vector.keys])
     own &= state.null.known & np.isfinite(without)
     change = (state.null.mean - without)[own] / state.null.sd[own]

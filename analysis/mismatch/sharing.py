@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from enum import StrEnum
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,7 @@ Left = dict[tuple[str, str], list[tuple[Place, float, float]]]
 _BESIDE = frozenset({"correlation_0_1", "correlation_1_0"})
 _PAIRS = _BESIDE | {"correlation_0_2", "correlation_2_0"}
 _GRAINS = "noise that is added as the square of the signal"
+_READ = "noise of the read-out alone"
 _ROUNDING = 1 / 12  # of a step between codes, squared: noise that comes after any filter
 
 
@@ -43,7 +45,8 @@ def shared_otherwise(state: State, kind: str, without: Array) -> Denial | None:
     Where another law is likelier at odds of 20, whatever follows it, word or none, is there
     instead. What charge takes from variances counts, for or against it, where these are left
     unexplained and the model's lie on a line; noise in grains is asked of where they bend upwards.
-    `without` are the numbers predicted without the effect.
+    Of a filter, which smooths all noise, whether it is that of the read-out alone: a pattern of
+    blocks, a wander of the supply. `without` are the numbers predicted without the effect.
     """
     own = _LAWS.get(kind)
     if own is None:
@@ -60,6 +63,10 @@ def shared_otherwise(state: State, kind: str, without: Array) -> Denial | None:
         if upwards(state):
             grains = _grains(state.clues())
             said[_GRAINS] = sum(_fitted(one, grains)[1] for one in left.values())
+    if own == Law.ALL:
+        said[_READ] = sum(
+            _fitted(one, partial(_read_share, state.clues()))[1] for one in left.values()
+        )
     said |= {law.value: gain for law, gain in found.items()}
     best = max(said, key=lambda law: said[law])
     behind = said[best] - found[own]
@@ -160,6 +167,11 @@ def _unrounded(clues: Clues, place: Place) -> float:
     """Return the share of a variance that was there before codes were rounded."""
     total = max(clues.seen.levels[place].variance_dn2, 1e-9)
     return max(1 - _ROUNDING * code_step(clues.camera) ** 2 / total, 0.0)
+
+
+def _read_share(clues: Clues, place: Place) -> float:
+    """Return the share of a variance that is read noise."""
+    return max(_unrounded(clues, place) - clues.shot_share(place), 0.0)
 
 
 def left_by(state: State, without: Array, statistics: frozenset[str]) -> Left:

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from analysis.mismatch import find_mismatch
 from analysis.mismatch.sharing import shared_otherwise
 from dsis.effects.spatial_filtering import SpatialFiltering
 from mismatch_recordings import TWO_LEVELS, InMemory, camera, recorded, state_of
@@ -44,10 +43,3 @@ def test_a_filter_is_not_taken_for_them(cfa: str, fraction: float) -> None:
     recording = recorded(true, 1, levels=TWO_LEVELS)
     without = state_of(recording, camera(cfa=cfa)).null.mean
     assert shared_otherwise(state_of(recording, true), FILTER.kind, without) is None
-
-
-def test_blocks_are_left_open() -> None:
-    recording = _blocks(recorded(camera(cfa="RGGB"), 2, levels=TWO_LEVELS), 4)
-    found = find_mismatch(camera(cfa="RGGB"), recording, seed=1)
-    assert "spatial_filtering" not in {own.effect.kind for own in found.omitted_physics}
-    assert {"correlation_0_1", "correlation_1_0"} & {m.statistic for m in found.unexplained}

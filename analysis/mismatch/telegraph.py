@@ -84,8 +84,8 @@ class Telegraph:
 
     @property
     def few(self) -> bool:
-        """Whether the pixels that jump are few in the mean, so that their sizes are known."""
-        return self.share <= _MANY
+        """Whether the pixels that jump are few in the mean, or alike, so that sizes are known."""
+        return self.equal or self.share <= _MANY
 
     @property
     def values(self) -> Mapping[str, object]:
@@ -278,7 +278,7 @@ def _fitted(jumps: Array, others: _Others, weight: Array, heights: Array) -> Tel
     equal = _of_shares(one, laws[single][0], weight, _PARTS)
     more = _mean(equal) - _mean(sizes)
     if more > TOLD_APART:
-        told = _told(equal, amplitudes, (gain + more, gains[1], gains[2]))
+        told = _told(equal, amplitudes, (gain + more, gains[1], gains[2]), _PARTS[-2])
         if told is not None and told.amplitude_dn > _APART * heights[0] / _HEIGHTS[0]:
             return replace(told, equal=True)
     return _told(sizes, amplitudes, gains)
@@ -300,7 +300,9 @@ def _of_shares(own: Array, beside: Array, weight: Array, parts: Array) -> Array:
     return out
 
 
-def _told(likely: Array, amplitudes: Array, gains: tuple[float, float, float]) -> Telegraph | None:
+def _told(
+    likely: Array, amplitudes: Array, gains: tuple[float, float, float], most: float = _MANY
+) -> Telegraph | None:
     """Return the mean telegraph, from log-likelihoods (switching, amplitude, share).
 
     All three are as likely beforehand in their logarithms, and so are means. Errors are the root
@@ -311,7 +313,7 @@ def _told(likely: Array, amplitudes: Array, gains: tuple[float, float, float]) -
     if not isfinite(gain):
         return None
     chance = np.exp(likely - logsumexp(likely))
-    many = chance[:, :, _PARTS > _MANY].sum() > _SURELY
+    many = chance[:, :, _PARTS > most].sum() > _SURELY
     found = []
     for axis, places in enumerate((_SWITCHING, amplitudes, _PARTS)):
         end = _SWITCHING[-1] if axis == 0 else inf  # no frames switch oftener

@@ -60,7 +60,22 @@ def test_halves_that_move_are_no_bands(seed: int) -> None:
     assert said.share < 0.05
 
 
-@pytest.mark.parametrize("length", [2.0, 8.0, 24.0])
+@pytest.mark.parametrize("grows", [True, False])
+@pytest.mark.parametrize("seed", range(5))
+def test_frames_that_lean_have_no_bands(seed: int, *, grows: bool) -> None:
+    """By more in each frame, as a sensor that warms at one side, or by chance."""
+    frames = iter(np.tile(np.linspace(0, 1, FRAMES), 3))
+
+    def leaning(rng: np.random.Generator) -> Array:
+        size = next(frames) if grows else 0.5 * rng.normal()
+        return np.asarray(size * np.linspace(-1, 1, ROWS) + 0.2 * rng.normal())
+
+    said = halved(_state(leaning, seed), BANDS)
+    assert said is not None
+    assert "lean" in said.why
+
+
+@pytest.mark.parametrize("length", [2.0, 8.0, 24.0, 48.0])
 @pytest.mark.parametrize("seed", range(5))
 def test_bands_are_believed_however_long(length: float, seed: int) -> None:
     assert halved(_state(_bands(length), seed), BANDS) is None

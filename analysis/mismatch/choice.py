@@ -125,8 +125,7 @@ class Choice(Fitted):
             rivals = (*rivals, ("dual_gain", best.gain - path.gain))
         proposal = replace(best.proposal, effect=best.polished.effects[0])
         errors = best.polished.errors[0]
-        known = None if self.measuring is None else self.measuring.measured(proposal.effect)
-        known = known or self._jumps(state, proposal.effect)
+        known = self._measured(state, proposal.effect)
         if known is not None:  # better than from the heights of peaks, or sums over pixels
             proposal = measured(proposal, *known)
             errors = dict(proposal.errors)
@@ -137,6 +136,16 @@ class Choice(Fitted):
             camera = both or camera
         named = Named(best.kind, proposal, errors, best.gain, rivals)
         return None if camera is None else (named, camera)
+
+    def _measured(self, state: State, effect: Effect) -> Measured | None:
+        """Return what frames tell of a line, bands or pixels that jump; None: numbers know more."""
+        known = None if self.measuring is None else self.measuring.measured(effect)
+        return known or self._jumps(state, effect)
+
+    def _sized_jumps(self, state: State, effect: Rts) -> Rts:
+        """Return pixels that jump by what frames show, where they tell."""
+        known = self._measured(state, effect)
+        return effect if known is None else effect.model_copy(update=dict(known[0]))
 
     def _second(self) -> list[Named]:
         """Return what must be taken in with the best, if anything."""
@@ -219,7 +228,7 @@ class Choice(Fitted):
                 continue  # a line was refused: behind it another may be
             before = len(self.doubted)
             fitted = as_shown(state, self.lines, plainest(state, fitted))
-            fitted = in_form(state, self.camera, fitted)
+            fitted = in_form(state, self.camera, fitted, partial(self._sized_jumps, state))
             fitted = self._undoubted(state, fitted, left)
             if len(self.doubted) > before:
                 continue  # all that was fitted of a kind is denied: others were too far behind it

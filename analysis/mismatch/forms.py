@@ -1,6 +1,6 @@
 """Effects of one kind that come in forms: what a memory keeps, about what level pixels jump."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from analysis.mismatch.basenumbers import HOLD, WRONG, beside, chance
@@ -16,7 +16,9 @@ _MOST = 0.5  # of the signal; of the noise, less: beyond it there is no other fo
 OTHER_LEVELS = ("above", "either")
 
 
-def in_form(state: State, users: Camera, fitted: Sequence[Ranked]) -> list[Ranked]:
+def in_form(
+    state: State, users: Camera, fitted: Sequence[Ranked], jumps: Callable[[Rts], Rts] = lambda e: e
+) -> list[Ranked]:
     """Return ranked effects, each in the form that the recording shows.
 
     What a memory keeps of the noise alone adds to variances; a share of the signal that takes the
@@ -27,9 +29,11 @@ def in_form(state: State, users: Camera, fitted: Sequence[Ranked]) -> list[Ranke
 
     Pixels that jump do so about the signal unless fixed patterns show, at odds of 20, that those
     which rest are as any other. Of two ways to do so that patterns do not tell apart it is that
-    beside which the black level is nearer the user's. One that is not the best keeps its gain.
+    beside which the black level is nearer the user's. `jumps` gives them the sizes that frames
+    show: by others that are as likely by sums they would be of another form. One that is not the
+    best keeps its gain.
     """
-    found = [_jumping(state, users, _remembered(state, users.noise, one)) for one in fitted]
+    found = [_jumping(state, users, _remembered(state, users.noise, one), jumps) for one in fitted]
     behind = zip(found[1:], fitted[1:], strict=True)
     return found[:1] + [own if one is own else replace(one, gain=own.gain) for one, own in behind]
 
@@ -80,12 +84,14 @@ def _camera(state: State, ranked: Ranked) -> Camera:
     return state.camera if camera is None else camera
 
 
-def _jumping(state: State, users: Camera, ranked: Ranked) -> Ranked:
+def _jumping(state: State, users: Camera, ranked: Ranked, jumps: Callable[[Rts], Rts]) -> Ranked:
     effect, *others = ranked.polished.effects
     if not isinstance(effect, Rts) or effect.levels != "about":
         return ranked
     predictor = state.predictor(replicates_for(state.setting, [effect]))
-    before = predictor.gain(predictor.mean(_camera(state, ranked)))
+    effect = jumps(effect)
+    as_shown = replace(ranked, polished=replace(ranked.polished, effects=(effect, *others)))
+    before = predictor.gain(predictor.mean(_camera(state, as_shown)))
     found: list[tuple[float, Ranked]] = []
     for levels in OTHER_LEVELS:
         effects = (effect.model_copy(update={"levels": levels}), *others)

@@ -1,4 +1,4 @@
-"""Bands of rows or halves of a frame that move: which of them the parts of frames show."""
+"""Bands of rows, or halves and leans that move: which of them the parts of frames show."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -9,6 +9,7 @@ from scipy.linalg import helmert
 
 from analysis.mismatch.bank.linemeans import PARTS
 from analysis.mismatch.contradicted import Denial, rival
+from analysis.mismatch.rank import TOLD_APART
 from analysis.mismatch.state import State
 from dsis.effects import Effect
 from dsis.effects.row_banding import RowBanding
@@ -37,7 +38,8 @@ def halved(state: State, effect: Effect) -> Denial | None:
     Where two amplifiers read a frame, or one that is reset in its middle, rows are as alike as in a
     band that lasts for half of a frame, but for the step between them. Asked are the means of parts
     of each frame less that of the frame, by the likelihood of normal ones: where halves that move,
-    each as a whole, are as likely as bands of any length, there may be none.
+    each as a whole, are as likely as bands of any length, there may be none. Nor where frames that
+    lean, one more than another, are likelier at odds of 20: of long bands most is a lean as well.
     """
     if not isinstance(effect, RowBanding):
         return None
@@ -48,7 +50,11 @@ def halved(state: State, effect: Effect) -> Denial | None:
     half = np.where(np.arange(PARTS) < PARTS / 2, 1.0, -1.0)
     apart = np.abs(np.subtract.outer(np.arange(PARTS), np.arange(PARTS))) / PARTS
     halves = _likeliest(moved, unit, [np.outer(half, half)])
+    lean = np.linspace(-1, 1, PARTS)
     bands = _likeliest(moved, unit, [np.exp(-apart / length) for length in _LENGTHS])
+    leans = _likeliest(moved, unit, [np.outer(lean, lean)])
+    if leans - max(bands, halves) > TOLD_APART:
+        return rival(leans - bands, "frames lean, one more than another, and have no bands")
     return rival(halves - bands, "halves of a frame move against each other as wholes")
 
 

@@ -313,7 +313,7 @@ def _told(
     if not isfinite(gain):
         return None
     chance = np.exp(likely - logsumexp(likely))
-    many = chance[:, :, _PARTS > most].sum() > _SURELY
+    many = chance[:, :, most < _PARTS].sum() > _SURELY
     found = []
     for axis, places in enumerate((_SWITCHING, amplitudes, _PARTS)):
         end = _SWITCHING[-1] if axis == 0 else inf  # no frames switch oftener

@@ -1,9 +1,12 @@
 """Levels that bend, or step where another path takes over: one sum shows what single ones hide."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from analysis.mismatch.bank.home import BENT, STEPPED
+from analysis.mismatch.displaced import displaced
 from analysis.mismatch.observe import observe
 from analysis.mismatch.source import Source
 from analysis.mismatch.state import Setting, State
@@ -103,3 +106,31 @@ def test_chance_bends_no_level_more_often_than_it_should() -> None:
     assert len(seen) >= 24
     assert 0.4 < np.std(seen) < 1.4
     assert np.abs(seen).max() < 4
+
+
+def _toned(seed: int, most: float, *, straight: bool) -> InMemory:
+    """Return numpy's own recording of a gain that falls by a share with what is around a pixel.
+
+    `straight`: of noise alone, as a second read-out path scales it.
+    """
+    rng, recording = np.random.default_rng(seed), recorded(camera(), seed)
+    stacks, levels = {}, dict(zip((f"flat-{i}" for i in range(len(LEVELS))), LEVELS, strict=True))
+    for name, frames in (recording.stacks or {}).items():
+        level = levels.get(name, 0.0)
+        gain = 1 - most * level / TOP
+        noise = np.sqrt(SLOPE * level) * gain * rng.standard_normal(frames.shape)
+        noise += np.sqrt(INTERCEPT) * rng.standard_normal(frames.shape)
+        codes = 64 + level * (1 if straight else gain) + noise
+        stacks[name] = np.rint(codes).clip(0, 4095).astype(np.uint16)
+    return replace(recording, stacks=stacks)
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_noise_that_bends_as_levels_do_is_no_second_path(seed: int) -> None:
+    """Levels of a path lie on a line, and its noise alone does not."""
+    toned = state_of(_toned(seed, 0.15, straight=False))
+    denial = displaced(toned, "dual_gain", toned.null.mean)
+    assert denial is not None
+    assert "levels bend" in denial.why
+    straight = state_of(_toned(seed, 0.15, straight=True))
+    assert displaced(straight, "dual_gain", straight.null.mean) is None

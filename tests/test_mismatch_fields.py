@@ -42,9 +42,25 @@ def test_every_second_line_of_less_noise_is_interpolated(axis: int, left: str, s
 
 
 @pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(("axis", "left"), [(1, "row"), (2, "column")])
+def test_some_lines_of_far_less_noise_are_corrected(axis: int, left: str, seed: int) -> None:
+    """A mean of both neighbours has half of their noise, and is alike to both."""
+    rng = np.random.default_rng(seed)
+    frames = np.moveaxis(rng.normal(0, 1, (FRAMES, ROWS, COLUMNS)), axis, 1)
+    for line in rng.choice(np.arange(2, frames.shape[1] - 2, 4), 5, replace=False).tolist():
+        frames[:, line] = (frames[:, line - 1] + frames[:, line + 1]) / 2
+    state = _state(np.moveaxis(frames, 1, axis), f"{left}_variance_spread")
+    denial = interpolated(state, "spatial_filtering")
+    assert denial is not None
+    assert f"some {left}s" in denial.why
+
+
+@pytest.mark.parametrize("seed", range(3))
 def test_lines_that_differ_anyhow_and_white_noise_are_not(seed: int) -> None:
     rng = np.random.default_rng(seed)
     noise = rng.normal(0, 1, (FRAMES, ROWS, COLUMNS))
     assert interpolated(_state(noise), "spatial_filtering") is None
     other = noise * np.exp(rng.normal(0, 0.3, (1, ROWS, 1)))
     assert interpolated(_state(other), "spatial_filtering") is None
+    noise[:, 5::12] *= 1.5
+    assert interpolated(_state(noise), "spatial_filtering") is None

@@ -38,7 +38,8 @@ from analysis.mismatch.wholelines import of_parts
 from dsis.effects.readout_memory import ReadoutMemory
 
 Array = NDArray[np.float64]
-_BENDS = frozenset({"nonlinearity", "dual_gain", "dual_gain_mismatch"})
+_PATH = "dual_gain"
+_BENDS = frozenset({"nonlinearity", _PATH, "dual_gain_mismatch"})
 _ADJACENT = ("correlation_0_1", "correlation_1_0")
 _GREENS = frozenset({"channel_imbalance", "tap_mismatch"})
 _MIXES = "crosstalk"  # which makes neighbours alike, and by that the greens differ
@@ -54,16 +55,16 @@ def displaced(state: State, kind: str, mean: Array, without: Array | None = None
 
     Of bends of the photon transfer curve, asked is whether variances lie on a line once they are
     what they would be without: by covariances that neighbours have instead, or by what is cut off
-    of noise that leans. Where that leaves half of the misfit or less, there may be no bend; nor
-    where variances scatter no more than codes that are not equally wide make them, or are those of
-    codes that come in steps. Of a bend that levels show is asked whether it is smooth, or begins
-    where a read-out path does. Of filters, crosstalk and charge that repels charge, how alike
-    neighbours are at each level; of counted photons and amplifiers of greens, by how much levels
-    show them; of noise of whole lines, how alike samples along them are; of greens that differ,
-    what other colours share with them; of frames that move as a whole, whether their parts do so
-    alike. Of widths of codes, whether it is codes that never occur which make them differ; of lag,
-    whether darks are alike; of memory, whether samples are alike at other lags as well; of pixels,
-    whether those side by side do alike.
+    of noise that leans, or by levels that bend. Where that leaves half of the misfit or less, there
+    may be no bend; nor where variances scatter no more than codes that are not equally wide make
+    them, or are those of codes that come in steps. Of a bend that levels show is asked whether it
+    is smooth, or begins where a read-out path does. Of filters, crosstalk and charge that repels
+    charge, how alike neighbours are at each level; of counted photons and amplifiers of greens, by
+    how much levels show them; of noise of whole lines, how alike samples along them are; of greens
+    that differ, what other colours share with them; of frames that move as a whole, whether their
+    parts do so alike. Of widths of codes, whether it is codes that never occur which make them
+    differ; of lag, whether darks are alike; of memory, whether samples are alike at other lags as
+    well; of pixels, whether those side by side do alike.
 
     Parameters
     ----------
@@ -82,7 +83,7 @@ def displaced(state: State, kind: str, mean: Array, without: Array | None = None
         if denial is None and not seen:
             denial = of_neighbours(state, mean) or of_frames(state) or _of_limits(state)
             denial = denial or _of_codes(state) or _of_steps(state)
-        return denial
+        return denial or (_of_levels(state) if kind == _PATH else None)
     if kind in LINES:
         denial = of_few_lines(state, kind, without) or of_parts(state, kind)
         return denial or moving_lines(state, kind, without)
@@ -118,6 +119,31 @@ def _of_limits(state: State) -> Denial | None:
     }
     why = "noise leans to one side for another reason, and what cuts it off lessens variances"
     return straightened(state, cut.get, why) if cut else None
+
+
+def _of_levels(state: State) -> Denial | None:
+    """Return how a second path is denied by levels that bend, and their noise with them; None: not.
+
+    What is by a share off the light has its noise as far off, and the variance twice: a gain that
+    falls with the signal, or with what is around a pixel. A path that leaves levels on a line
+    scales noise alone.
+    """
+    signals = state.calibrated.fit.signal_dn
+    gains = {
+        place: 1 + rest / signals[place]
+        for (place, _), (rest, _) in left_open(state, ("level",)).items()
+        if signals.get(place, 0.0) > abs(rest)
+    }
+    before = after = 0.0
+    for signal, variance, weight, places in curves(state, beside=True):
+        own = np.array([gains.get(at, 1.0) for at in places])
+        chance = signal.size - _OF_A_LINE
+        before += misfit(signal, variance, weight) - chance
+        after += misfit(signal / own, variance / own**2, weight) - chance
+    if not gains or before <= 0 or after > _MOST * before:
+        return None
+    why = "levels bend for another reason, and noise as much"
+    return Denial(max(after / before, 0.0), why)
 
 
 def _of_codes(state: State) -> Denial | None:

@@ -1,4 +1,4 @@
-"""Every second line less noisy than the others: lines that were made of their neighbours."""
+"""Every second line less noisy than the others, or some: lines made of their neighbours."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +25,8 @@ def interpolated(state: State, kind: str) -> Denial | None:
     them means of neighbours: alike to these, of half their noise, and of codes between codes. No
     filter, no charge and no converter treats every second line otherwise. Where lines differ in
     noise far beyond the model, and half of that is even and odd ones, surely, samples are alike for
-    that.
+    that. So are they where half of it is of some that are far quieter than the many: a camera that
+    corrects them puts a mean of others there.
     """
     left = {m.statistic: m.z for m in state.mismatches}
     if kind not in _ALIKE:
@@ -33,7 +34,23 @@ def interpolated(state: State, kind: str) -> Denial | None:
     for statistic, (line, axis) in _LINES.items():
         if left.get(statistic, 0.0) > FAR_OFF and _alternate(state, axis):
             return Denial(0.0, f"every second {line} is less noisy, as if made of its neighbours")
+        if left.get(statistic, 0.0) > FAR_OFF and _quiet(state, axis):
+            return Denial(0.0, f"some {line}s are far less noisy, as if made of their neighbours")
     return None
+
+
+def _quiet(state: State, axis: int) -> bool:
+    """Return whether lines far quieter than the many make most of how much noise differs."""
+    whole = quiet = 0.0
+    for (_, name), (image, noise) in state.setting.seen.images.items():
+        if name != "variance":
+            continue
+        means = image.mean(axis) / noise
+        own = means - np.median(means)
+        chance = 1 / image.shape[axis]
+        whole += float((own**2 - chance).sum())
+        quiet += float((own[own < -FAR_OFF * chance**0.5] ** 2).sum())
+    return quiet > _MOST * whole > 0
 
 
 def _alternate(state: State, axis: int) -> bool:

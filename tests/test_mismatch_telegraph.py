@@ -164,6 +164,23 @@ def test_a_population_that_jumps_is_told_with_its_numbers(seed: int) -> None:
     assert told.jumping > SURE
 
 
+@pytest.mark.parametrize("seed", range(2))
+def test_jumps_of_one_height_that_stand_apart_need_not_be_few(seed: int) -> None:
+    """Frames show each of them, where of as many exponential ones most are small."""
+    how = {"share": 0.035, "amplitude": 25.0, "switching": 0.25}
+    told = _recorded(seed, "equal", **how)
+    assert told is not None
+    assert told.equal
+    assert told.few
+    assert told.gain > 100
+    assert abs(told.share - how["share"]) < 3.5 * told.share_error
+    assert abs(told.amplitude_dn - how["amplitude"]) < 3.5 * told.amplitude_error_dn
+    drawn = _recorded(seed, "telegraph", **how)
+    assert drawn is not None
+    assert not drawn.equal
+    assert not drawn.gain > 0
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_jumps_of_one_height_are_told_from_exponential_ones(seed: int) -> None:
     """Numbers of the other law would be three times the share, and half the height."""

@@ -27,8 +27,10 @@ LEANING = _effect("shading", falloff_percent=0.0, tilt_down_percent=3.0, tilt_ri
 UNEVEN = _effect("column_fpn", sigma_dn=6.0)
 
 
-def _recorded(*effects: Effect, cfa: str = "MONO", seed: int = 1) -> InMemory:
-    true = camera(*effects, cfa=cfa)
+def _recorded(
+    *effects: Effect, cfa: str = "MONO", seed: int = 1, read_dn2: float = 20.0
+) -> InMemory:
+    true = camera(*effects, cfa=cfa, segments=((0.5, read_dn2, None),))
     return recorded(true, seed, rows=ROWS, columns=COLUMNS, frames=FRAMES, levels=FEW_LEVELS)
 
 
@@ -62,9 +64,33 @@ def test_widths_of_one_converter_are_shared(cfa: str, beside: tuple[Effect, ...]
     assert found.denial() is None
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_codes_of_equal_width_show_nothing(seed: int) -> None:
-    found = _found(_recorded(UNEVEN, seed=seed))
+@pytest.mark.parametrize("sigma_dn", [1.0, 2.0, 6.0])
+def test_so_are_they_in_noise_of_two_codes(sigma_dn: float) -> None:
+    """Of which histograms are hardly smooth over nine."""
+    uneven = _effect("column_fpn", sigma_dn=sigma_dn)
+    found = _found(_recorded(DNL, uneven, read_dn2=4.5))
+    assert found.own > 4 * found.own_error
+    assert found.denial() is None
+
+
+@pytest.mark.parametrize("parts", [2, 4])
+def test_two_converters_in_turn_are_not_denied_and_more_are(parts: int) -> None:
+    """Of two taps each column is like half of the others, of four like a fourth."""
+    taps = [_recorded(_effect("adc_dnl", rms_lsb=0.2), seed=seed) for seed in range(parts)]
+    mixed = dict(taps[0].stacks or {})
+    for i, tap in enumerate(taps):
+        for name, frames in (tap.stacks or {}).items():
+            mixed[name] = mixed[name].copy()
+            mixed[name][:, :, i::parts] = frames[:, :, i::parts]
+    found = _found(replace(taps[0], stacks=mixed))
+    assert found.shared / found.own == pytest.approx(1 / parts, rel=0.25)
+    assert (found.denial() is None) == (parts == 2)
+
+
+@pytest.mark.parametrize("read_dn2", [4.5, 9.0, 20.0])
+@pytest.mark.parametrize("seed", range(2))
+def test_codes_of_equal_width_show_nothing(seed: int, read_dn2: float) -> None:
+    found = _found(_recorded(UNEVEN, seed=seed, read_dn2=read_dn2))
     assert abs(found.own) < 4 * found.own_error
     assert abs(found.shared) < 4 * found.shared_error
     assert found.denial() is None

@@ -64,3 +64,15 @@ def test_lines_that_differ_anyhow_and_white_noise_are_not(seed: int) -> None:
     assert interpolated(_state(other), "spatial_filtering") is None
     noise[:, 5::12] *= 1.5
     assert interpolated(_state(noise), "spatial_filtering") is None
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_light_that_falls_off_and_edges_that_are_dark_are_not(seed: int) -> None:
+    """Lines of less shot noise, side by side, are made of no neighbours."""
+    rng, lines = np.random.default_rng(seed), np.linspace(-1, 1, ROWS)
+    noise = rng.normal(0, 1, (FRAMES, ROWS, COLUMNS))
+    fallen = noise * np.sqrt(1 - 0.5 * lines**2)[:, np.newaxis]
+    fallen[:, 7::13] *= 1.1
+    assert interpolated(_state(fallen), "adc_dnl") is None
+    noise[:, :4] *= 0.7
+    assert interpolated(_state(noise), "adc_dnl") is None

@@ -175,6 +175,9 @@ def test_jumps_of_one_height_that_stand_apart_need_not_be_few(seed: int) -> None
     assert told.gain > 100
     assert abs(told.share - how["share"]) < 3.5 * told.share_error
     assert abs(told.amplitude_dn - how["amplitude"]) < 3.5 * told.amplitude_error_dn
+    many = _recorded(seed, "equal", **{**how, "share": 0.1})
+    assert many is not None
+    assert not many.few
     drawn = _recorded(seed, "telegraph", **how)
     assert drawn is not None
     assert not drawn.equal

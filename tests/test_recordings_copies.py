@@ -66,6 +66,16 @@ def test_quiet_darks_that_drift_by_codes_tell_the_black_level() -> None:
         assert not any(TELLS in one or "bit for bit" in one for one in remarks)
 
 
+def test_a_black_level_within_their_drift_is_not_contradicted() -> None:
+    """Their mean is known as well as frames that move as a whole tell it, not as pixels do."""
+    made = _quiet()
+    stated = BLACK + DRIFT.mean() - 2 * DRIFT.std(ddof=1) / DRIFT.size**0.5 - HALF_A_CODE
+    near = made.sensor.model_copy(update={"black_level": float(stated)})
+    for remarks in _asked(replace(made, sensor=near)):
+        assert not any("black_level is given as" in one for one in remarks)
+    assert any("black_level is given as" in one for one in fit_camera(made).remarks)
+
+
 @pytest.mark.parametrize("name", ["dark-0", "flat-0", "flat-2"])
 @pytest.mark.parametrize("frames", [[0, 1, 2, 3, 1], [0, 1, 0, 1]])
 def test_a_copy_is_told_by_all_that_ask(name: str, frames: list[int]) -> None:

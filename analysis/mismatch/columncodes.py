@@ -1,6 +1,6 @@
 """Whether all columns meet the same uneven codes, as one converter makes them."""
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,12 +12,13 @@ from analysis.mismatch.layout import Layout
 from analysis.mismatch.projections import FramesOf
 
 Array = NDArray[np.float64]
-_WINDOW, _DEGREE = 9, 3  # of codes, over which a histogram is smooth
-_SMOOTH = 2.0  # codes: of less noise histograms are not smooth over so many
+_WINDOW, _DEGREE = 9, 5  # of codes, over which a histogram of noise is smooth
+_SMOOTH = 2.0  # codes: of less noise it is not, beyond the 1.5 % that are hardly seen
 _WIDEST = 4096  # codes that the samples of an exposure reach over
 _SURE = 4.0  # standard errors
 _LIKELY = 2.0
-_MOST = 0.5  # of what columns show, that all of them must share
+_MET = 1.0  # products of different columns at the same codes, beside squares of single ones
+_MOST = 0.4  # of what columns show, that others share: of two converters half of them do
 
 
 @dataclass(frozen=True)
@@ -52,7 +53,7 @@ def column_codes(layout: Layout, frames_of: FramesOf) -> ColumnCodes | None:
     A column's histogram of codes less a smooth one (Savitzky & Golay, 1964) is what its codes'
     widths make of it, and chance, which is independent. Each is compared with the others' at the
     same code, whatever the columns' offsets. Rows of one parity of a mosaic by themselves. None
-    where noise covers too few codes, and of a large recording.
+    where noise covers too few codes, or columns share too few, and of a large recording.
     """
     if layout.large:
         return None
@@ -64,36 +65,41 @@ def column_codes(layout: Layout, frames_of: FramesOf) -> ColumnCodes | None:
         narrowest = min(layout.variance_dn2[exposure.name, c] for c in layout.channels)
         if narrowest < _SMOOTH**2:
             continue
+        frames = [np.asarray(frame) for frame in frames_of(exposure.name)]
         for y, x in layout.sites.values():
-            planes = (np.asarray(f)[y::step, x::step] for f in frames_of(exposure.name))
+            planes = [frame[y::step, x::step] for frame in frames]
             counts = _histograms(planes, layout.white_dn)
             if counts is not None:
                 sums += _of_columns(counts, kernel)
     own, own_expected, own_square, shared, shared_expected, shared_square = sums
-    if own_expected <= 0 or shared_expected <= 0:
+    if not own_expected > 0 or shared_expected < _MET * own_expected:
         return None
     return ColumnCodes(
         own / own_expected,
         float(np.sqrt(2 * own_square)) / own_expected,
         shared / shared_expected,
-        float(np.sqrt(2 * shared_square)) / shared_expected,
+        float(np.sqrt(2 * max(shared_square, 0.0))) / shared_expected,
     )
 
 
-def _histograms(planes: Iterable[NDArray[np.generic]], white_dn: float) -> Array | None:
-    """Return how often each code occurs in each column: (column, code); None: too many, or ends.
+def _histograms(planes: Sequence[NDArray[np.generic]], white_dn: float) -> Array | None:
+    """Return how often each code occurs in each column of planes (row, column): (column, code).
 
-    Codes are those that may occur, where they come in steps.
+    Codes are those that may occur, where they come in steps. None where they reach over too many,
+    too few, or to an end of the range.
     """
-    samples = np.stack([np.asarray(plane, np.int64) for plane in planes])
-    low, high = int(samples.min()), int(samples.max())
-    step = max(int(np.gcd.reduce((samples - low).ravel())), 1)
+    codes = np.unique(np.concatenate([np.unique(plane) for plane in planes])).astype(np.int64)
+    low, high = int(codes[0]), int(codes[-1])
+    step = max(int(np.gcd.reduce(codes - low)), 1)
     size = (high - low) // step + 1
     if size > _WIDEST or size <= _WINDOW or low <= 0 or high >= white_dn:
         return None
-    columns = samples.shape[2]
-    place = (samples - low) // step + size * np.arange(columns)
-    counts = np.bincount(place.ravel(), minlength=columns * size)
+    columns = planes[0].shape[1]
+    first = size * np.arange(columns)
+    counts = np.zeros(columns * size, np.int64)
+    for plane in planes:
+        place = (plane.astype(np.int64) - low) // step + first
+        counts += np.bincount(place.ravel(), minlength=counts.size)
     return counts.reshape(columns, size).astype(np.float64)
 
 

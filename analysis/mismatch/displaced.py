@@ -130,14 +130,16 @@ def _of_levels(state: State) -> Denial | None:
     """
     signals = state.calibrated.fit.signal_dn
     gains = {
-        place: 1 + rest / signals[place]
+        place: signals[place] / (signals[place] - rest)
         for (place, _), (rest, _) in left_open(state, ("level",)).items()
-        if signals.get(place, 0.0) > abs(rest)
+        if signals.get(place, 0.0) > max(rest, 0.0)
     }
     before = after = 0.0
-    for signal, variance, weight, places in curves(state, beside=True):
-        own = np.array([gains.get(at, 1.0) for at in places])
-        chance = signal.size - _OF_A_LINE
+    for *curve, places in curves(state, beside=True):
+        told = np.array([at in gains or x <= 0 for at, x in zip(places, curve[0], strict=True)])
+        own = np.array([gains.get(at, 1.0) for at in places])[told]
+        signal, variance, weight = (values[told] for values in curve)
+        chance = max(signal.size - _OF_A_LINE, 0)
         before += misfit(signal, variance, weight) - chance
         after += misfit(signal / own, variance / own**2, weight) - chance
     if not gains or before <= 0 or after > _MOST * before:

@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.mismatch.bank.seams import beyond_smooth
 from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.resolved import FAR_OFF
 from analysis.mismatch.state import State
@@ -25,8 +26,8 @@ def interpolated(state: State, kind: str) -> Denial | None:
     them means of neighbours: alike to these, of half their noise, and of codes between codes. No
     filter, no charge and no converter treats every second line otherwise. Where lines differ in
     noise far beyond the model, and half of that is even and odd ones, surely, samples are alike for
-    that. So are they where half of it is of some that are far quieter than the many: a camera that
-    corrects them puts a mean of others there.
+    that. So are they where half of it is of single ones that are far quieter than the many, beyond
+    what is smooth across lines: a camera that corrects them puts a mean of others there.
     """
     left = {m.statistic: m.z for m in state.mismatches}
     if kind not in _ALIKE:
@@ -40,16 +41,21 @@ def interpolated(state: State, kind: str) -> Denial | None:
 
 
 def _quiet(state: State, axis: int) -> bool:
-    """Return whether lines far quieter than the many make most of how much noise differs."""
+    """Return whether single lines far quieter than the many make most of how much noise differs.
+
+    Both neighbours, of which such a line is made, are none of them.
+    """
     whole = quiet = 0.0
     for (_, name), (image, noise) in state.setting.seen.images.items():
         if name != "variance":
             continue
-        means = image.mean(axis) / noise
-        own = means - np.median(means)
+        rest = beyond_smooth(image.mean(axis) / noise)
+        own = rest - np.median(rest)
         chance = 1 / image.shape[axis]
+        low = own < -FAR_OFF * chance**0.5
+        beside = np.pad(low, 1)
         whole += float((own**2 - chance).sum())
-        quiet += float((own[own < -FAR_OFF * chance**0.5] ** 2).sum())
+        quiet += float((own[low & ~beside[:-2] & ~beside[2:]] ** 2).sum())
     return quiet > _MOST * whole > 0
 
 

@@ -85,7 +85,7 @@ class Telegraph:
     @property
     def few(self) -> bool:
         """Whether the pixels that jump are few in the mean, or alike, so that sizes are known."""
-        return self.equal or self.share <= _MANY
+        return self.share <= _MANY or (self.equal and isfinite(self.gain))
 
     @property
     def values(self) -> Mapping[str, object]:

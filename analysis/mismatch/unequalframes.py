@@ -22,8 +22,9 @@ def unequally_noisy(state: State, kind: str, without: Array) -> Denial | None:
 
     Samples of frames whose variances have a relative variance f are as far out as ones of an excess
     kurtosis of 3 f, and no sample has tails; variances over n such frames scatter by
-    1 + f (n - 2) / (n - 1) times as much, and no pixel is noisier than others. Where that frames
-    differ is left unexplained, and makes half of what the effect would explain, there may be none;
+    1 + f (n - 2) / (n - 1) times as much, and no pixel is noisier than others. Told is f of pairs
+    of frames: of a slow change as much, of single noisy frames half. Where that frames differ is
+    left unexplained, and makes half of what the effect would explain, there may be none;
     unless the same pixels are noisier in all exposures, by half of what is claimed.
 
     Parameters
@@ -47,7 +48,8 @@ def unequally_noisy(state: State, kind: str, without: Array) -> Denial | None:
             continue
         if key.place not in state.setting.seen.levels:
             continue
-        f, n = apart.get(key.place, 0.0), frames[key.exposure]
+        n = frames[key.exposure]
+        f = apart.get(key.place, 0.0) * (1 - 1 / max(n // 2, 1))  # of these pairs, not of any
         fake = 3 * f if name == "kurtosis" else float(np.log1p(f * (n - 2) / (n - 1)))
         claimed = float(state.null.mean[i] - without[i]) / float(state.null.sd[i])
         along += claimed * fake / float(state.null.sd[i])
@@ -59,13 +61,13 @@ def unequally_noisy(state: State, kind: str, without: Array) -> Denial | None:
 
 
 def _apart(state: State) -> dict[Place, float]:
-    """Return the relative variance of frames' variances beyond chance, where it is left open."""
+    """Return the relative variance of pairs' variances beyond chance, where it is left open."""
     layout = state.setting.layout
     step = 1 + (len(layout.sites) > 1)
     free = (layout.rows // step - 1) * (layout.columns // step - 1)
     expected = {
         key.place: float(mean)
-        for key, mean in zip(state.vector.keys, state.null.mean, strict=False)
+        for key, mean in zip(state.vector.keys, state.null.mean, strict=True)
         if key.statistic == FRAME_NOISE and key.scope == "exposure"
     }
     return {

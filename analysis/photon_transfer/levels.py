@@ -62,7 +62,8 @@ def useless(s: LevelStatistics) -> str:
     if why := spoiled(s):
         return why
     if not s.variance_dn2 > 0:
-        return "its frames vary as a whole only"
+        used = ", and its mean is used alone" if s.kind == "dark" else ""
+        return f"its frames vary as a whole only{used}"
     return "" if s.variance_se_dn2 > 0 else "its frames do not vary"
 
 

@@ -1,6 +1,7 @@
 """What limits the numbers of a fit, in sentences."""
 
 from collections.abc import Mapping, Sequence
+from math import hypot, sqrt
 
 import numpy as np
 from scipy import stats
@@ -99,12 +100,17 @@ def remarks_on_description(measured: Sequence[LevelStatistics], nominal_dn: floa
             own[0].kind,
             own[0].exposure_time_s,
             own[0].light,
-            [(s.level_dn, s.level_se_dn, s.variance_dn2) for s in own],
+            [(s.level_dn, _error_dn(s), s.variance_dn2) for s in own],
         )
         for name, own in by.items()
         if not any(spoiled(s) for s in own)
     ]
     return list(contradictions(told, nominal_dn))
+
+
+def _error_dn(s: LevelStatistics) -> float:
+    """Return the standard error of a level whose frames may move as a whole, DN."""
+    return hypot(s.level_se_dn, s.frame_sd_dn / sqrt(s.frames))
 
 
 def remarks_on_patterns(patterns: FixedPatterns) -> list[str]:

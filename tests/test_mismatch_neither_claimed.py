@@ -25,6 +25,11 @@ def _ranked(kind: str, gain: float, mean: np.ndarray) -> Any:
     )
 
 
+def _listed(asked: object) -> bool:
+    """Return whether an argument is the list of ranked effects."""
+    return isinstance(asked, list)
+
+
 @pytest.mark.parametrize(
     ("why", "left"),
     [(f"{AS_WELL} 1/f noise", "black_level_drift"), ("of another", "periodic_noise")],
@@ -51,7 +56,7 @@ def test_a_stand_in_is_not_claimed_for_two_that_frames_show_alike(
     for told in ("refuted", "displaced", "twin"):
         monkeypatch.setattr(choice, told, lambda *_: None)
     for order in ("as_shown", "in_form", "plainest"):
-        monkeypatch.setattr(choice, order, lambda *asked: list(asked[-1]))
+        monkeypatch.setattr(choice, order, lambda *asked: next(filter(_listed, asked)))
     search: Any = object.__new__(choice.Choice)
     search.__dict__.update(
         vocabulary=frozenset(one.kind for one in found), named=[], refused={}, settled=[], tied={},

@@ -199,7 +199,7 @@ def placed(state: State, kind: str, without: Array) -> Denial | None:
         return None
     own = np.array([key.statistic == "kurtosis_within_pixels" for key in state.vector.keys])
     own &= state.null.known & np.isfinite(without)
-    size, shown = _shown(state, without, own)
+    size, shown = seen_along(state, without, own)
     if size < CLEAR:
         few = Denial(0.0, "lines differ in noise, and what is far out may be noise of these")
         return few if lines and kind == "impulse" and not _tall(state) else None
@@ -243,7 +243,7 @@ def timed(state: State, kind: str, without: Array) -> Denial | None:
     short = own & np.array([darks.get(key.exposure, np.inf) <= shortest for key in keys])
     if not short.any():
         return None
-    size, shown = _shown(state, without, short)
+    size, shown = seen_along(state, without, short)
     if size < CLEAR:
         off = np.where(own, (state.vector.values - without) / state.vector.errors, 0.0)
         none = off[short].max() < CLEAR and off.max() > FAR_OFF
@@ -298,15 +298,18 @@ def clamped(state: State, kind: str, without: Array) -> Denial | None:
         ]
     )
     own &= state.null.known & np.isfinite(without)
-    size, shown = _shown(state, without, own)
+    size, shown = seen_along(state, without, own)
     if shown >= max(CLEAR, _MOST * size):
         return None
     where = "would hardly show" if size < CLEAR else "shows none"
     return Denial(0.0, f"noise is cut off at a code, and {where} where it is not")
 
 
-def _shown(state: State, without: Array, own: NDArray[np.bool_]) -> tuple[float, float]:
-    """Return what an effect changes some numbers by, and how far they go along, in errors."""
+def seen_along(state: State, without: Array, own: NDArray[np.bool_]) -> tuple[float, float]:
+    """Return what an effect changes some numbers by, and how far they go along, in errors.
+
+    `own` are those asked: (number,), that are known with it and `without`.
+    """
     change = (state.null.mean - without)[own] / state.null.sd[own]
     seen = (state.vector.values - without)[own] / state.null.sd[own]
     size = float(np.linalg.norm(change))

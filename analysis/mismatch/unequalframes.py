@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 from analysis.mismatch.bank.framenoise import NAME as FRAME_NOISE
 from analysis.mismatch.burst import TAILS
 from analysis.mismatch.contradicted import Denial
+from analysis.mismatch.feignedtails import seen_along
 from analysis.mismatch.layout import Place
 from analysis.mismatch.leftopen import left_open
 from analysis.mismatch.resolved import CLEAR
@@ -80,7 +81,5 @@ def _persists(state: State, without: Array) -> bool:
     """Return whether pixels are noisy in every exposure as an effect has it, surely, by half."""
     own = np.array([key.statistic == _PERSISTENT for key in state.vector.keys])
     own &= state.null.known & np.isfinite(without)
-    change = (state.null.mean - without)[own] / state.null.sd[own]
-    seen = (state.vector.values - without)[own] / state.null.sd[own]
-    size = float(np.linalg.norm(change))
-    return size > 0 and float(change @ seen) / size >= max(CLEAR, _MOST * size)
+    size, along = seen_along(state, without, own)
+    return size > 0 and along >= max(CLEAR, _MOST * size)

@@ -48,6 +48,7 @@ from analysis.mismatch.taking import layout_of
 from analysis.mismatch.thinned import stages, with_all_frames
 from analysis.mismatch.trial import Trial
 from analysis.mismatch.unsettled import told_beside, unsettled, with_first_frames, without
+from analysis.mismatch.words import effect_words
 from dsis.blas import one_thread
 from dsis.camera import Camera
 from dsis.effects.rts import Rts
@@ -339,7 +340,7 @@ def _finding(
         Alternative(
             kind_of(name),
             None,
-            f"explains the recording no better than {other}",
+            f"explains the recording no better than {effect_words(other)}",
             would_settle(kind_of(name), other),
         )
         for name, other in tied.items()

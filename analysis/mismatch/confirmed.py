@@ -219,7 +219,7 @@ def unsized(search: Search, everything: State) -> tuple[Named, str] | None:
 
 def _unsized(search: Search, state: State, named: Named) -> str:
     """Return why an effect has no clear size, where much is left; empty: it has, or little is."""
-    if named.kind in LINES or named.measured or not (why := vague(named, APART)):
+    if named.kind in LINES or named.measured or not (why := vague(named, APART, unknown=True)):
         return ""
     much = _much_left(search, state, named)
     return f"{why}, and much is left unexplained beside it" if much else ""

@@ -175,8 +175,11 @@ def camera_without(camera: Camera, effects: Sequence[Effect], given: Camera) -> 
     return camera.model_copy(update={"effect": tuple(left)})
 
 
-def vague(named: Named, errors: float = 1.0) -> str:
-    """Return why an effect that draws at random has no size; empty: one exceeds so many errors."""
+def vague(named: Named, errors: float = 1.0, *, unknown: bool = False) -> str:
+    """Return why an effect that draws at random has no size; empty: one exceeds so many errors.
+
+    Where the error of one is not known nothing is said, unless what is `unknown` counts as none.
+    """
     effect = named.effect
     if named.proposal is None or effect is None:
         return ""
@@ -185,7 +188,10 @@ def vague(named: Named, errors: float = 1.0) -> str:
         for name in named.proposal.free
         if name not in SHAPES
     }
-    if not sizes or any(not isfinite(e) or abs(value) >= errors * e for value, e in sizes.values()):
+    if not sizes or any(
+        abs(value) >= errors * error if isfinite(error) else not unknown
+        for value, error in sizes.values()
+    ):
         return ""
     times = "" if errors == 1 else f"{errors:g} times "
     return f"no size of it exceeds {times}its standard error ({_said(sizes)})"

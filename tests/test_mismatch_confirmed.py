@@ -328,6 +328,8 @@ def test_what_no_frames_show_has_a_size_beyond_its_error(
         (0.81, 5.0, False),
         (0.81, 0.0, False),  # all else is explained
         (0.4, 6.6, False),  # known by its size
+        (np.inf, 6.6, True),  # frames gain, and no number says by what size
+        (np.inf, 5.0, False),
     ],
 )
 def test_an_effect_of_no_clear_size_leaves_little(error: float, left: float, refused: bool) -> None:
@@ -352,5 +354,5 @@ def test_an_effect_of_no_clear_size_leaves_little(error: float, left: float, ref
     assert (found is not None) == refused
     if found is not None:
         assert found[0] is named
-        assert "sigma dn 0.99 ± 0.81" in found[1]
+        assert f"sigma dn 0.99 ± {error:g}" in found[1]
         assert "1.96 times" in found[1]

@@ -29,13 +29,18 @@ WORDS = frozenset({"dark_current", "hot_pixels", "dsnu", "rts", "poisson_shot_no
 
 
 @lru_cache(maxsize=4)
-def recording(sigma: float, hot: float) -> InMemory:
-    """Return electrons of light and of log-normal dark currents, some of which are far brighter."""
+def recording(sigma: float, hot: float, glow: float = 0.0) -> InMemory:
+    """Return electrons of light and of log-normal dark currents, some of which are far brighter.
+
+    `glow`, DN/s, is added at the last row and column, and falls by e over 0.3 of a row.
+    """
     like = recorded(camera(), 1, rows=ROWS, columns=COLUMNS, levels=(250.0, 900.0, 2600.0))
     law = np.random.default_rng(21)
     shape = ROWS, COLUMNS
     rate = law.lognormal(np.log(MEAN) - sigma**2 / 2, sigma, shape)
     rate += np.where(law.random(shape) < hot, law.exponential(8000, shape), 0)
+    away = np.hypot(*np.mgrid[ROWS - 1 : -1 : -1, COLUMNS - 1 : -1 : -1])
+    rate += glow * np.exp(-away / (0.3 * COLUMNS))
     stacks = {}
     for exposure in like.exposures:
         signal = (exposure.light or 0.0) + rate * exposure.exposure_time_s
@@ -91,6 +96,19 @@ def test_equal_dark_currents_have_no_spread() -> None:
     found = numbers(find_mismatch(camera(), recording(0.0, 0.004), vocabulary=WORDS))
     assert "log_sigma" not in found["dark_current"]
     assert "hot_pixels" in found
+
+
+def test_a_glow_beside_a_spread_leaves_it_its_mean() -> None:
+    """What levels show of both is parted: pixels stay as far apart while the mean is fitted."""
+    planted = {"dark_current": ("dn_per_s", MEAN), "amp_glow": ("dn_per_s", 700.0)}
+    words = frozenset({"dark_current", "amp_glow", "poisson_shot_noise"})
+    found = find_mismatch(camera(), recording(SIGMA, 0.0, 700.0), vocabulary=words)
+    own = numbers(found)
+    assert own.keys() - {"poisson_shot_noise"} == planted.keys()
+    for kind, (name, true) in planted.items():
+        value, error = own[kind][name]
+        assert abs(value - true) < 4 * error < 0.4 * true
+    assert not found.unexplained
 
 
 @pytest.mark.parametrize("users", [0.0, 0.3])

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.mismatch.apart import Apart, apart_of_users, as_far_apart, with_apart
+from analysis.mismatch.apart import Apart, apart_of_users, with_apart
 from analysis.mismatch.candidates import CANDIDATES, Proposal
 from analysis.mismatch.candidates.patterns import of_any_shape
 from analysis.mismatch.credited import given_back
@@ -165,8 +165,6 @@ class Fitted:
         self, bare: Camera, effects: Sequence[Effect], errors: Sequence[dict[str, float]]
     ) -> Camera | None:
         """Take in what was fitted, and return the camera with it; None: it cannot have them."""
-        mine = [*(own.effect for own in self.own), *(n.effect for n in self.named if n.proposal)]
-        effects = [as_far_apart(b, own) for b, own in zip(mine, effects, strict=True)]
         if with_effects(bare, effects) is None:
             return None
         fitted = iter(zip(effects, errors, strict=True))

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
+from analysis.mismatch.apart import as_far_apart
 from analysis.mismatch.candidates import Proposal
 from analysis.mismatch.predict import Predictor
 from dsis.camera import Camera
@@ -234,7 +235,10 @@ def moved(
     *,
     as_is: bool = False,
 ) -> tuple[tuple[Effect, ...], float] | None:
-    """Return effects with one parameter moved, and by how much in the parameter that is fitted."""
+    """Return effects with one parameter moved, and by how much in the parameter that is fitted.
+
+    How far apart pixels are, in DN, maps say, whatever is fitted.
+    """
     effect = effects[which]
     value = float(getattr(effect, name))
     if signed:
@@ -247,7 +251,7 @@ def moved(
         changed = type(effect)(**{**effect.model_dump(), name: new})
     except ValidationError:
         return None
-    return (*effects[:which], changed, *effects[which + 1 :]), by
+    return (*effects[:which], as_far_apart(effect, changed), *effects[which + 1 :]), by
 
 
 def _size(effect: Effect, name: str) -> float:

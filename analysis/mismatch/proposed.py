@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.mismatch.apart import as_far_apart, known_at_once
+from analysis.mismatch.apart import known_at_once
 from analysis.mismatch.candidates import CANDIDATES, Proposal
 from analysis.mismatch.credited import together
 from analysis.mismatch.memory import Memory
@@ -148,8 +148,4 @@ def _fitted(state: State, which: tuple[Proposal, Polished | None]) -> Polished |
     if before is not None:
         found = zip(starts, before.effects, strict=True)
         starts = [replace(start, effect=effect) for start, effect in found]
-    fitted = polish(own, bare, starts, rounds=rounds)
-    if fitted is None:
-        return None
-    first, *others = fitted.effects
-    return replace(fitted, effects=(as_far_apart(proposal.effect, first), *others))
+    return polish(own, bare, starts, rounds=rounds)

@@ -123,6 +123,17 @@ def test_a_users_other_spread_is_a_wrong_number(users: float) -> None:
     assert {m.statistic for m in found.unexplained} <= {"skewness"}  # of counted photons
 
 
+def test_a_users_other_mean_is_a_wrong_number_and_the_spread_about_it_is_right() -> None:
+    """Pixels are 0.7 apart about the user's mean, and 0.6 about the recorded one, as they say."""
+    model = camera(DarkCurrent(dn_per_s=0.8 * MEAN, log_sigma=SIGMA))
+    words = frozenset({"dark_current", "poisson_shot_noise"})
+    found = find_mismatch(model, recording(SIGMA, 0.0), vocabulary=words)
+    (wrong,) = found.parameter_errors
+    assert wrong.parameter == "effect.dark_current.dn_per_s"
+    assert abs(wrong.recorded - MEAN) < 4 * wrong.standard_error < 0.1 * MEAN
+    assert not found.unexplained
+
+
 def test_dark_currents_far_apart_have_a_median_far_below_their_mean() -> None:
     """Most pixels grow by a quarter of the mean, and that is as the law has it."""
     found = numbers(find_mismatch(camera(), recording(1.6, 0.0), vocabulary=WORDS))

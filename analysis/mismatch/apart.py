@@ -81,9 +81,17 @@ def with_apart(camera: Camera, apart: Apart) -> Camera:
     return camera.model_copy(update={"effect": tuple(effects)})
 
 
-def wrong_spread(apart: Apart | None) -> tuple[ParameterError, ...]:
-    """Return that dark currents are otherwise apart than a user's camera has them."""
+def wrong_spread(apart: Apart | None, camera: Camera) -> tuple[ParameterError, ...]:
+    """Return that dark currents are otherwise apart than a user's camera has them.
+
+    `camera` has them of the mean that was fitted in the end, about which they may be as they were.
+    """
     if apart is None:
         return ()
+    own = camera.effect[apart.place]
+    recorded = own.log_sigma if isinstance(own, DarkCurrent) else apart.recorded
+    error = recorded * apart.error / apart.recorded
+    if abs(recorded - apart.model) <= _CLEAR * error:
+        return ()
     name = "effect.dark_current.log_sigma"
-    return (ParameterError(name, apart.model, apart.recorded, apart.error),)
+    return (ParameterError(name, apart.model, recorded, error),)

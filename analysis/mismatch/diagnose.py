@@ -312,7 +312,7 @@ def _finding(
 ) -> Finding:
     """Return the finding."""
     errors = parameter_errors(camera, final.calibrated, final.setting.layout, final.replicates.fits)
-    errors += wrong_sizes(search.own) + wrong_spread(search.unlike)
+    errors += wrong_sizes(search.own) + wrong_spread(search.unlike, final.camera)
     missing = [named for named in search.named if named.name not in search.changes]
     own = changes(base, final, missing, partial(search.without, final))
     own |= {name: change / base.null.sd for name, change in search.changes.items()}

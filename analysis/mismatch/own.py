@@ -9,6 +9,7 @@ from math import hypot, inf, sqrt
 
 from pydantic import ValidationError
 
+from analysis.mismatch.apart import as_far_apart
 from analysis.mismatch.candidates import CANDIDATES, Proposal
 from analysis.mismatch.finding import Mismatch, ParameterError
 from analysis.mismatch.named import SHAPES
@@ -62,9 +63,9 @@ class Own:
 
     @property
     def users(self) -> "Own":
-        """The effect as the user wrote it."""
+        """The effect as the user wrote it; of dark currents as far apart in DN as they are."""
         effect = _of_size(self.effect, self.name, self.model)
-        return replace(self, effect=effect or self.effect)
+        return replace(self, effect=as_far_apart(self.effect, effect or self.effect))
 
     @property
     def proposal(self) -> Proposal:

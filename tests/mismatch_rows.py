@@ -17,7 +17,6 @@ def diagnosed(
     words: frozenset[str] = WORDS,
     *,
     columns: int = 48,
-    levels: tuple[float, ...] = TWO_LEVELS,
 ) -> Finding:
-    recording = recorded(true, seed, columns=columns, levels=levels)
+    recording = recorded(true, seed, columns=columns, levels=TWO_LEVELS)
     return find_mismatch(base, recording, seed=1, vocabulary=words)

@@ -97,7 +97,7 @@ def test_sensitivity_and_ground_are_no_bend() -> None:
 def test_chance_bends_no_level_more_often_than_it_should() -> None:
     seen = []
     for seed in range(10, 18):
-        state = state_of(recorded(camera(), seed))
+        state = state_of(recorded(camera(), seed, rows=48, columns=64))
         seen += [
             float(z)
             for key, z in zip(state.null.keys, state.departures, strict=True)
@@ -125,12 +125,11 @@ def _toned(seed: int, most: float, *, straight: bool) -> InMemory:
     return replace(recording, stacks=stacks)
 
 
-@pytest.mark.parametrize("seed", range(2))
-def test_noise_that_bends_as_levels_do_is_no_second_path(seed: int) -> None:
+def test_noise_that_bends_as_levels_do_is_no_second_path() -> None:
     """Levels of a path lie on a line, and its noise alone does not."""
-    toned = state_of(_toned(seed, 0.15, straight=False))
+    toned = state_of(_toned(0, 0.15, straight=False))
     denial = displaced(toned, "dual_gain", toned.null.mean)
     assert denial is not None
     assert "levels bend" in denial.why
-    straight = state_of(_toned(seed, 0.15, straight=True))
+    straight = state_of(_toned(0, 0.15, straight=True))
     assert displaced(straight, "dual_gain", straight.null.mean) is None

@@ -5,17 +5,16 @@ import pytest
 from scipy.ndimage import convolve
 
 from analysis.mismatch import find_mismatch
-from mismatch_recordings import InMemory, camera, recorded
+from mismatch_recordings import TWO_LEVELS, InMemory, camera, recorded
 
 pytestmark = pytest.mark.usefixtures("unproven")
 
 SHARE, FRAMES, ROWS, COLUMNS = 0.028, 8, 80, 96
-LEVELS = (250.0, 900.0, 2600.0)
 
 
 def test_a_strong_kernel_of_eight_neighbours_has_diagonals() -> None:
     """Of which each gives 0.028: the pixel keeps 0.78, so that its noise is 0.8 of what it was."""
-    like = recorded(camera(), 1, rows=ROWS, columns=COLUMNS, levels=LEVELS)
+    like = recorded(camera(), 1, rows=ROWS, columns=COLUMNS, levels=TWO_LEVELS)
     rng = np.random.default_rng(4)
     kernel = np.full((3, 3), SHARE)
     kernel[1, 1] = 1 - 8 * SHARE

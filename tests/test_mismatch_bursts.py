@@ -14,7 +14,14 @@ from analysis.mismatch.layout import Layout
 from analysis.mismatch.taking import layout_of
 from dsis.cfa import Cfa
 from dsis.effects import registry
-from mismatch_recordings import FEW_LEVELS, InMemory, camera, recorded, state_of
+from mismatch_recordings import (
+    FEW_LEVELS,
+    TWO_LEVELS,
+    InMemory,
+    camera,
+    recorded,
+    state_of,
+)
 
 pytestmark = pytest.mark.usefixtures("unproven")
 
@@ -96,7 +103,7 @@ def _changed(recording: InMemory, name: str, stack: Array) -> InMemory:
 
 def test_interference_in_short_bursts_is_no_heavy_tailed_noise() -> None:
     """It has no word; what noise its rows have is left open."""
-    rng, recording = np.random.default_rng(5), recorded(camera(), 6, levels=FEW_LEVELS)
+    rng, recording = np.random.default_rng(5), recorded(camera(), 6, levels=TWO_LEVELS)
     assert recording.stacks is not None
     for name, frames in list(recording.stacks.items()):
         stack = frames.astype(np.float64)

@@ -26,7 +26,7 @@ from analysis.mismatch.taking import layout_of
 from dsis.cfa import Cfa
 from dsis.effects import Effect
 from exposing import effect
-from mismatch_recordings import FEW_LEVELS, InMemory, camera, recorded
+from mismatch_recordings import TWO_LEVELS, InMemory, camera, recorded
 
 pytestmark = pytest.mark.usefixtures("unproven")
 
@@ -248,7 +248,7 @@ def test_only_uneven_gains_are_asked_of_the_map() -> None:
 def test_a_decay_without_its_word_is_no_uneven_light() -> None:
     own = {"offset_dn": 0.0, "gain_percent": 0.5, "length_pixels": 4.0, "edge": "bottom"}
     words = frozenset({"shading", "tap_mismatch", "smooth_prnu", "row_prnu", "column_prnu"})
-    true = recorded(camera(effect("line_settling", **own)), 5, columns=64, levels=FEW_LEVELS)
+    true = recorded(camera(effect("line_settling", **own)), 5, columns=64, levels=TWO_LEVELS)
     found = find_mismatch(camera(), true, seed=1, vocabulary=words)
     assert not {"shading", "tap_mismatch"} & {one.effect for one in found.omitted_physics}
     assert found.mismatches

@@ -10,7 +10,7 @@ from analysis.mismatch.bank.periods import Periods, PeriodSums
 from analysis.mismatch.state import State
 from dsis.camera import Camera
 from dsis.effects import registry
-from mismatch_recordings import FEW_LEVELS, camera, recorded, state_of
+from mismatch_recordings import TWO_LEVELS, camera, recorded, state_of
 
 pytestmark = pytest.mark.usefixtures("unproven")
 
@@ -102,7 +102,7 @@ def test_it_is_located_where_no_bin_of_a_spectrum_is() -> None:
 
 def test_a_weak_pattern_of_eight_pixels_is_named_with_its_size() -> None:
     found = find_mismatch(
-        camera(), recorded(_striped(0.21), 12, rows=97, levels=FEW_LEVELS), seed=1
+        camera(), recorded(_striped(0.21), 12, rows=97, levels=TWO_LEVELS), seed=1
     )
     (named,) = found.omitted_physics
     assert named.effect == "bistable_pattern"

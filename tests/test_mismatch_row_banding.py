@@ -25,7 +25,7 @@ from dsis.effects import OperatingPoint, registry
 from dsis.grid import PixelGrid
 from dsis.measures import Accumulator, Channel
 from exposing import apply, effect, flat
-from mismatch_recordings import FEW_LEVELS, camera
+from mismatch_recordings import camera
 from mismatch_rows import diagnosed
 
 pytestmark = pytest.mark.usefixtures("unproven")
@@ -189,7 +189,7 @@ def _has_numbers(named: OmittedEffect, own: dict[str, float]) -> None:
 def test_in_a_mosaic_it_is_named_with_its_numbers() -> None:
     own = {"sigma_dn": 1.13, "length_rows": 3.0}
     true, base = camera(effect("row_banding", **own), cfa="RGGB"), camera(cfa="RGGB")
-    found = diagnosed(true, base, 9, columns=64, levels=FEW_LEVELS)
+    found = diagnosed(true, base, 9, columns=64)
     (named,) = found.omitted_physics
     assert named.effect == "row_banding"
     assert not found.unexplained

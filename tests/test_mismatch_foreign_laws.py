@@ -49,23 +49,6 @@ def test_hot_pixels_whose_heights_are_lognormal_are_hot_pixels() -> None:
     assert _found(_warmed(recording, rate, rng), camera()) == {"hot_pixels"}
 
 
-def test_dark_current_that_differs_from_pixel_to_pixel_is_no_few_hot_pixels() -> None:
-    """Lognormal over all pixels, within a factor of e^0.5: its mean is named, and its spread."""
-    rng, recording = np.random.default_rng(5), _small(camera(), 5)
-    spread = np.exp(0.5 * rng.standard_normal((recording.rows, recording.columns)))
-    rate = 280.0 * spread / spread.mean()
-    found = find_mismatch(camera(), _warmed(recording, rate, rng), seed=1)
-    (named,) = found.omitted_physics
-    assert named.effect == "dark_current"
-    mean = named.parameters["dn_per_s"]
-    assert isinstance(mean.value, float)
-    assert abs(mean.value - 280.0) < 3.5 * mean.standard_error
-    apart = named.parameters["log_sigma"]
-    assert isinstance(apart.value, float)
-    assert abs(apart.value - 0.5) < 3.5 * apart.standard_error
-    assert not found.unexplained
-
-
 def test_a_kink_is_seen_beside_one_flat_below_it() -> None:
     """Five flats above lie on a line that meets that of the one below, and black, at the switch."""
     paths = ((0.5, 20.0, 150.0), (0.5, 60.0, None))

@@ -65,12 +65,12 @@ def _named(found: Finding) -> dict[str, dict[str, tuple[float, float]]]:
     }
 
 
-@pytest.mark.parametrize("cfa", [Cfa.MONO, Cfa.RGGB])
-def test_a_lens_off_the_centre_is_measured_and_hides_no_row_noise(cfa: Cfa) -> None:
+def test_a_lens_off_the_centre_is_measured_and_hides_no_row_noise() -> None:
     """Half of the light is lost in a corner; row noise is two sevenths of the read noise."""
     light = _lens(0.5, (6.0, -15.0))
-    recording = _recording(light, cfa, ROW_NOISE)
-    found = find_mismatch(camera(cfa=cfa.name, segments=PARTS), recording, seed=1, vocabulary=WORDS)
+    recording = _recording(light, Cfa.RGGB, ROW_NOISE)
+    mosaic = camera(cfa="RGGB", segments=PARTS)
+    found = find_mismatch(mosaic, recording, seed=1, vocabulary=WORDS)
     named = _named(found)
     assert sorted(named) == ["row_noise", "shading"]
     value, error = named["row_noise"]["sigma_dn"]

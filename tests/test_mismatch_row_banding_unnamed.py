@@ -12,12 +12,11 @@ ROWS = frozenset({"row_banding", "row_noise", "pink_noise", "black_level_drift"}
 """What moves whole rows: where none of it is there, other words only take time."""
 
 
-@pytest.mark.parametrize("kind", ["row_noise", "crosstalk", "spatial_filtering", "line_flicker"])
+@pytest.mark.parametrize("kind", ["row_noise", "crosstalk", "line_flicker"])
 def test_it_takes_no_place_of_what_has_no_word(kind: str) -> None:
     values: dict[str, dict[str, float]] = {
         "row_noise": {"sigma_dn": 1.3},
         "crosstalk": {"fraction": 0.048},
-        "spatial_filtering": {"fraction": 0.048},
         "line_flicker": {"depth_percent": 0.48, "cycles_per_frame": 2.3},
     }
     found = diagnosed(camera(effect(kind, **values[kind])), camera(), 10, ROWS - {kind})

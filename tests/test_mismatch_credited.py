@@ -58,6 +58,25 @@ def test_rows_of_the_users_own_give_nothing_back() -> None:
     assert [n.proposal.effect for n in kept if n.proposal] == [effect("row_noise", sigma_dn=0.2)]
 
 
+def test_a_glow_and_a_dark_current_have_the_mean_that_the_current_had() -> None:
+    """Levels of darks tell their sum; pixels stay as far apart, in DN, as maps show."""
+    current = effect("dark_current", dn_per_s=80.0, log_sigma=0.5)
+    glow = effect("amp_glow", dn_per_s=150.0, place="top_left", extent=0.3)
+    bare, starts = together(camera(DARK, current), Proposal(glow, ("dn_per_s", "extent")), 1)
+    assert bare.effect == (DARK,)
+    assert [one.free for one in starts] == [("dn_per_s", "extent"), ("dn_per_s",)]
+    left: Any = starts[1].effect
+    y, x = np.mgrid[:96, :128]
+    mean = 150.0 * float(np.exp(-np.hypot(y, x) / (0.3 * 128)).mean())
+    assert left.dn_per_s == pytest.approx(80.0 - mean)
+    apart = [
+        rate * np.sqrt(np.expm1(s**2)) for rate, s in ((80.0, 0.5), (80.0 - mean, left.log_sigma))
+    ]
+    assert apart[0] == pytest.approx(apart[1])
+    (back,) = given_back(camera(left), glow, 0).effect
+    assert back.model_dump() == pytest.approx(current.model_dump())
+
+
 def test_without_bands_white_rows_have_all_the_variance_of_rows() -> None:
     """Simulated: no effect gains what a larger one that is there as well would explain."""
     bands = effect("row_banding", sigma_dn=0.4, length_rows=2.0)

@@ -2,39 +2,42 @@
 
 Offsets that rows share are row noise too. Where white row noise was taken in first it has all of
 their variance: beside it nothing that adds to that fits, until it gives some back. So have a filter
-and charge that neighbours share what the other correlates.
+and charge that neighbours share what the other correlates, and a dark current the mean of a glow.
 """
 
 from collections.abc import Sequence
 from math import hypot, sqrt
 
+from analysis.mismatch.apart import as_far_apart
 from analysis.mismatch.candidates import CANDIDATES, Proposal
+from analysis.mismatch.candidates.patterns import glowing
 from analysis.mismatch.named import Named, renewed
 from analysis.mismatch.polish import with_effects
 from dsis.camera import Camera
 from dsis.effects import Effect
+from dsis.effects.amp_glow import AmpGlow
 
-_SIGMA, _SHARE = "sigma_dn", "fraction"
+_SIGMA, _SHARE, _RATE = "sigma_dn", "fraction", "dn_per_s"
 _MAY = frozenset(kind for own in CANDIDATES.values() for kind in own.credited)
 _KEPT = 0.1  # of its size, that the credited effect keeps at least where a fit starts
+_SENSOR = (96, 128)  # rows and columns, of whose mean that of a glow is much the same
 
 
 def together(camera: Camera, proposal: Proposal, given: int) -> tuple[Camera, list[Proposal]]:
     """Return a camera, and what is fitted in it: a proposal, and what was credited with its part.
 
-    The credited effect leaves the camera, and is proposed again with the variance, or the share,
-    that the other leaves it. Where there is none the camera stays as it is, and so do its first
-    effects, as many as are `given`: they are the user's.
+    The credited effect leaves the camera, and is proposed again with the variance, the share or the
+    mean that the other leaves it. Where there is none the camera stays as it is, and so do its
+    first effects, as many as are `given`: they are the user's.
     """
     place = _credited(camera, proposal.effect, given)
     if place is None:
         return camera, [proposal]
     credited = camera.effect[place]
     name = _size(credited)
-    size, other = (float(getattr(own, name)) for own in (credited, proposal.effect))
+    size, other = float(getattr(credited, name)), _part(proposal.effect, name)
     left = sqrt(max(size**2 - other**2, 0.0)) if name == _SIGMA else size - other
-    least = max(left, _KEPT * size)
-    again = Proposal(type(credited)(**{**credited.model_dump(), name: least}), (name,))
+    again = Proposal(_of_size(credited, name, max(left, _KEPT * size)), (name,))
     return _without(camera, place), [proposal, again]
 
 
@@ -47,15 +50,16 @@ def joined(camera: Camera, effects: Sequence[Effect], given: int) -> Camera | No
 def given_back(camera: Camera, effect: Effect, given: int) -> Camera:
     """Return a camera without an effect in which what was credited has its part again.
 
-    Variances add: no effect is to gain what another would explain without it. Shares do not: of
-    noise of light one has more of it, of all noise the other.
+    Variances add, and means: no effect is to gain what another would explain without it. Shares do
+    not: of noise of light one has more of it, of all noise the other.
     """
     place = _credited(camera, effect, given)
-    if place is None or _size(camera.effect[place]) != _SIGMA:
+    name = _SHARE if place is None else _size(camera.effect[place])
+    if place is None or name == _SHARE:
         return camera
     credited = camera.effect[place]
-    size = hypot(float(getattr(credited, _SIGMA)), float(getattr(effect, _SIGMA)))
-    again = type(credited)(**{**credited.model_dump(), _SIGMA: size})
+    size, other = float(getattr(credited, name)), _part(effect, name)
+    again = _of_size(credited, name, hypot(size, other) if name == _SIGMA else size + other)
     effects = (*camera.effect[:place], again, *camera.effect[place + 1 :])
     return camera.model_copy(update={"effect": effects})
 
@@ -81,7 +85,19 @@ def _credited(camera: Camera, effect: Effect, given: int) -> int | None:
 
 def _size(effect: Effect) -> str:
     """Return the name of the size of which an effect gives some back."""
-    return _SIGMA if hasattr(effect, _SIGMA) else _SHARE
+    return next(name for name in (_SIGMA, _SHARE, _RATE) if hasattr(effect, name))
+
+
+def _part(effect: Effect, name: str) -> float:
+    """Return what an effect has of a size; a glow of a dark current: the mean of the sensor."""
+    size = float(getattr(effect, name))
+    if isinstance(effect, AmpGlow):
+        return size * float(glowing(_SENSOR, effect.place, effect.extent).mean())
+    return size
+
+
+def _of_size(effect: Effect, name: str, value: float) -> Effect:
+    return as_far_apart(effect, type(effect)(**{**effect.model_dump(), name: value}))
 
 
 def _without(camera: Camera, place: int) -> Camera:

@@ -339,5 +339,5 @@ CANDIDATES = (
     Candidate("shading", _SMOOTH, _shading),
     Candidate("tap_mismatch", ("half_seam", "parity", "channel_ratio", *_SMOOTH), _taps),
     Candidate("channel_imbalance", ("channel_ratio",), _imbalance),
-    Candidate("amp_glow", _SMOOTH, _glow, sane=_is_glow),
+    Candidate("amp_glow", _SMOOTH, _glow, sane=_is_glow, credited=frozenset({"dark_current"})),
 )

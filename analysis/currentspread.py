@@ -35,6 +35,7 @@ _PARTS = (np.arange(5) + 0.5) / 5  # of a bin, where a law is asked
 _FARTHEST = 0.5  # of a logarithm, to either side of the likeliest
 _LEAST = 1e-300
 _WIDER = np.linspace(1.0, 1.1, 6)  # noise that is known to a tenth
+_AWAY = 10.0  # times the mean: if it may be farther off, nothing is known
 _INTERVAL = 0.5  # of log-likelihood: a standard error
 
 
@@ -228,7 +229,9 @@ def _measured(asked: _Asked) -> Spread | None:
     law = [own.sharing(best) for own in pixels]
     hot = (1 - best.left) / best.left / sqrt(best.share * _count(pixels) / 2) if best.share else 0.0
     away = 1 + hypot(known, hot, _own(pixels, best.sigma))
+    away = min(away, _AWAY)
     sigmas = best.sigma * np.geomspace(1 / away, away, 2 * _FINE + 1)
+    sigmas = np.minimum(sigmas, max(_SIGMAS[-1], best.sigma))
     brighter = [own.of_mean(own.equal.mean * away) for own in law]
     moved = max((_loglik(brighter, one) for one in sigmas.tolist()), key=lambda fit: fit.nats).sigma
     error = _error(law, best.sigma) * max(_misfit(law, best), 1.0)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from analysis.mismatch import confirmed
+from analysis.mismatch import confirmed, explaining
 from analysis.mismatch.finding import Gain
 from analysis.mismatch.trial import Gained
 from exposing import effect
@@ -191,7 +191,7 @@ def _beside(
     }
     search: Any = Stub(named=some, setting=Stub(large=large))
     first, last = states
-    return confirmed.idle(search, first, last, changes)
+    return explaining.idle(search, first, last, changes)
 
 
 def test_what_explains_nothing_goes_where_all_that_calls_for_it_is_left() -> None:
@@ -199,7 +199,7 @@ def test_what_explains_nothing_goes_where_all_that_calls_for_it_is_left() -> Non
     both = ["level", "pixel_variance"]
     found = _beside(both, nothing)
     assert found is not None
-    assert (found[0].kind, found[1]) == ("nonlinearity", confirmed.IDLE)
+    assert (found[0].kind, found[1]) == ("nonlinearity", explaining.IDLE)
     assert _beside(["spectral_peak"], nothing) is None  # that calls for others
     assert _beside(both, nothing, gain=100.0) is None
     assert _beside(both, nothing, measured=True) is None  # whole frames show it
@@ -212,7 +212,7 @@ def test_what_calls_for_an_effect_may_be_explained_with_a_stronger_one() -> None
     assert _beside(["level"], nothing) is None
     found = _beside(["level"], nothing, large=True)
     assert found is not None
-    assert (found[0].kind, found[1]) == ("nonlinearity", confirmed.SOME_LEFT)
+    assert (found[0].kind, found[1]) == ("nonlinearity", explaining.SOME_LEFT)
     assert _beside(["spectral_peak"], nothing, large=True) is None  # that calls for others
     assert _beside(["level"], nothing, gain=100.0, large=True) is None
 
@@ -240,13 +240,13 @@ def test_what_nothing_calls_for_in_all_frames_must_be_shown_by_locked_ones(
     base: Any = Stub(mismatches=[Stub(statistic=first)])
     trial: Any = None  # nothing more is asked
     told = {first: ("column_prnu" if explains else None, 1.0)}
-    monkeypatch.setattr(confirmed, "changes", lambda *_: {named.name: None})
-    monkeypatch.setattr(confirmed, "explained", lambda *_: told)
+    monkeypatch.setattr(explaining, "changes", lambda *_: {named.name: None})
+    monkeypatch.setattr(explaining, "explained", lambda *_: told)
     gains = {"column_prnu": Gain(0.14, (low, 0.5))}
-    found = confirmed.uncalled(search, base, base, gains, trial)
-    assert found == ((named, confirmed.UNCALLED) if dropped else None)
+    found = explaining.uncalled(search, base, base, gains, trial)
+    assert found == ((named, explaining.UNCALLED) if dropped else None)
     named.measured = True
-    assert confirmed.uncalled(search, base, base, gains, trial) is None
+    assert explaining.uncalled(search, base, base, gains, trial) is None
 
 
 @pytest.mark.parametrize(
@@ -266,12 +266,12 @@ def test_a_line_that_explains_nothing_must_be_sure(
     search: Any = Stub(named=[named], without=lambda *_: None)
     base: Any = Stub(mismatches=[Stub(statistic=first)])
     trial: Any = Stub(lines=Stub(gain=lambda _: odds))
-    monkeypatch.setattr(confirmed, "changes", lambda *_: {named.name: None})
+    monkeypatch.setattr(explaining, "changes", lambda *_: {named.name: None})
     told = {first: ("periodic_noise" if explains else None, 5.0)}
-    monkeypatch.setattr(confirmed, "explained", lambda *_: told)
+    monkeypatch.setattr(explaining, "explained", lambda *_: told)
     gains = {"periodic_noise": Gain(0.3, (0.1, 0.5))}
-    found = confirmed.uncalled(search, base, base, gains, trial)
-    assert found == ((named, confirmed.UNCALLED) if dropped else None)
+    found = explaining.uncalled(search, base, base, gains, trial)
+    assert found == ((named, explaining.UNCALLED) if dropped else None)
 
 
 def test_what_only_hints_at_an_effect_does_not_call_for_it(
@@ -283,11 +283,11 @@ def test_what_only_hints_at_an_effect_does_not_call_for_it(
     search: Any = Stub(named=[named], without=lambda *_: None)
     base: Any = Stub(mismatches=[Stub(statistic="fixed_smooth_variance")])
     trial: Any = None
-    monkeypatch.setattr(confirmed, "changes", lambda *_: {named.name: None})
+    monkeypatch.setattr(explaining, "changes", lambda *_: {named.name: None})
     told = {"fixed_smooth_variance": ("amp_glow", 1.0)}
-    monkeypatch.setattr(confirmed, "explained", lambda *_: told)
+    monkeypatch.setattr(explaining, "explained", lambda *_: told)
     gains = {named.name: Gain(0.13, (-0.2, 0.4))}
-    assert confirmed.uncalled(search, base, base, gains, trial) == (named, confirmed.UNCALLED)
+    assert explaining.uncalled(search, base, base, gains, trial) == (named, explaining.UNCALLED)
 
 
 @pytest.mark.parametrize(
@@ -356,3 +356,27 @@ def test_an_effect_of_no_clear_size_leaves_little(error: float, left: float, ref
         assert found[0] is named
         assert f"sigma dn 0.99 ± {error:g}" in found[1]
         assert "1.96 times" in found[1]
+
+
+@pytest.mark.parametrize(
+    ("kind", "told", "dropped"),
+    [
+        ("adc_dnl", "quantisation", True),
+        ("adc_dnl", "adc_dnl", False),
+        ("nonlinearity", "quantisation", False),  # of which every level says something
+    ],
+)
+def test_what_is_drawn_must_be_put_down_to_something(
+    monkeypatch: pytest.MonkeyPatch, kind: str, told: str, dropped: bool
+) -> None:
+    """Beside coarse codes frames gain by any widths that scatter, and none of that is seen."""
+    size = {"rms_lsb": 0.02} if kind == "adc_dnl" else {"percent_full_scale": 1.0}
+    named: Any = Stub(name=kind, kind=kind, effect=effect(kind, **size), measured=False)
+    monkeypatch.setattr(explaining, "changes", lambda *_: {kind: None})
+    monkeypatch.setattr(explaining, "explained", lambda *_: {"code_imbalance": (told, 0.5)})
+    search: Any = Stub(named=[named], without=lambda *_: None)
+    state: Any = Stub(mismatches=[Stub(statistic="code_imbalance")])
+    found = explaining.hollow(search, state, state)
+    assert found == ((named, explaining.HOLLOW) if dropped else None)
+    hidden: Any = Stub(mismatches=[Stub(statistic="row_variance")])
+    assert explaining.hollow(search, hidden, state) is None

@@ -1,6 +1,6 @@
 """What a search found, confirmed or dropped: by all frames together, and by the locked ones."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from math import isfinite
@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from analysis.mismatch.allframes import shown_by_all
 from analysis.mismatch.candidates import CANDIDATES
-from analysis.mismatch.explain import because, changes, explained
+from analysis.mismatch.explain import changes
+from analysis.mismatch.explaining import DOUBTFUL, hollow, idle, uncalled
 from analysis.mismatch.finding import Gain
 from analysis.mismatch.fixedforetold import FIXED_LINES
 from analysis.mismatch.framebyframe import SIZES
@@ -20,20 +21,15 @@ from analysis.mismatch.locate import FAMILY
 from analysis.mismatch.model import side_by_side
 from analysis.mismatch.name import Search
 from analysis.mismatch.named import APART, Named, unclear, vague
-from analysis.mismatch.rank import SURE_GAIN
 from analysis.mismatch.relit import relit
 from analysis.mismatch.state import State
 from analysis.mismatch.trial import Gained, Trial, denied
 from dsis.camera import Camera
 
 Array = NDArray[np.float64]
-IDLE = "all that called for it is left, and nothing that differed is explained by it alone or best"
-SOME_LEFT = "what calls for it is left, and nothing that differed is explained by it alone or best"
-UNCALLED = "it explains nothing that differs in all frames, and frames leave it open"
 NO_FRAME = "no locked frame can show it: there is none, or code 0 or white cuts off too much"
 _QUARTER = 0.25  # of what an effect explains, that may be left beside one of no clear size
 _LITTLE = 0.3  # of what a number differs by, that an effect changes
-_DOUBTFUL = 30.0  # gain of log-likelihood below which locked frames may not confirm an effect
 
 
 def undenied(search: Search, final: State) -> State:
@@ -53,77 +49,6 @@ def denied_by_rest(search: Search, state: State, base: State) -> tuple[Named, st
     return judge.denied_by_rest(search.named, first)
 
 
-def idle(
-    search: Search, base: State, final: State, known: Mapping[str, Array] | None = None
-) -> tuple[Named, str] | None:
-    """Return an effect to which nothing that differed is put down; None: there is none.
-
-    It gained little, and all that called for it is left: it fits beside something else, that no
-    effect explains. Of a large recording, where the weakest is far above chance and no law is
-    exact, some of it. Lines, and what else is measured, are shown by whole frames: where spectra
-    peak only the strongest is located. `known` is what each effect changes in the numbers of
-    `base`, if that was asked for already.
-    """
-    some, why = (True, SOME_LEFT) if search.setting.large else (False, IDLE)
-    first, left = ({m.statistic for m in own.mismatches} for own in (base, final))
-    asked = [
-        n
-        for n in search.named
-        if n.gain < _DOUBTFUL and n.kind in CANDIDATES and not (n.kind in LINES or n.measured)
-        if (calls := left.intersection(CANDIDATES[n.kind].calls))
-        and (some or calls >= first.intersection(CANDIDATES[n.kind].calls))
-    ]
-    return _explaining_nothing(search, base, final, asked, why, known)
-
-
-def _explaining_nothing(
-    search: Search,
-    base: State,
-    final: State,
-    asked: Sequence[Named],
-    why: str,
-    known: Mapping[str, Array] | None = None,
-) -> tuple[Named, str] | None:
-    """Return the first of some effects to which nothing that differed is put down, and why.
-
-    None: there is none. `known` is as in `idle`.
-    """
-    if not asked:
-        return None
-    if known is None:
-        known = changes(base, final, search.named, partial(search.without, final))
-    told = explained(base, final, {n.name: known[n.name] for n in search.named})
-    nothing = next((n for n in asked if not because(told, n.name)), None)
-    return None if nothing is None else (nothing, why)
-
-
-def uncalled(
-    search: Search, base: State, final: State, gains: Mapping[str, Gain], trial: Trial
-) -> tuple[Named, str] | None:
-    """Return an effect for which nothing calls in all frames, nor do locked ones; None: none is.
-
-    What hides behind another is called for by nothing at first: locked frames must show it then,
-    whatever hinted at it. A line that explains nothing must be shown by all frames, at odds that
-    take an effect in: peaks are many, of one axis or of another's.
-    """
-    first = {m.statistic for m in base.mismatches}
-    asked = [
-        n
-        for n in search.named
-        if n.kind in CANDIDATES and n.name in gains
-        if n.kind in LINES or first.isdisjoint(CANDIDATES[n.kind].calls)
-        if _unshown(n, gains[n.name], trial)
-    ]
-    return _explaining_nothing(search, base, final, asked, UNCALLED)
-
-
-def _unshown(named: Named, gain: Gain, trial: Trial) -> bool:
-    """Return whether frames leave open an effect that explains nothing that differs."""
-    if named.kind in LINES and named.effect is not None:
-        return trial.lines.gain(named.effect) - 1 < SURE_GAIN
-    return not named.measured and gain.ci95[0] <= 0
-
-
 def undenied_by_all(
     search: Search, final: State, gains: dict[str, Gain], trial: Trial, whole: State
 ) -> tuple[State, dict[str, Gain], State | None]:
@@ -136,6 +61,7 @@ def undenied_by_all(
         denied = denied_by_rest(search, everything, whole)
         denied = denied or idle(search, whole, everything)
         denied = denied or uncalled(search, whole, everything, gains, trial)
+        denied = denied or hollow(search, whole, everything)
         denied = denied or unsized(search, everything)
         if denied is None:
             return final, gains, everything
@@ -269,7 +195,7 @@ def _gained(search: Search, final: State, trial: Trial) -> dict[str, Gained]:
     of what else they gain by, if within their error, all frames may show it.
     """
     found: dict[str, Gained] = {}
-    little = [named for named in search.named if named.gain < _DOUBTFUL]
+    little = [named for named in search.named if named.gain < DOUBTFUL]
     for some in (little, [named for named in search.named if named not in little]):
         cameras = _fitted_without(search, final, some)
         told = trial.gains(final, cameras)

@@ -17,6 +17,7 @@ from analysis.mismatch.state import State
 from analysis.mismatch.straight import polynomial
 from analysis.mismatch.vector import expected_dn2, tells_segment
 from dsis.camera import Camera
+from dsis.effects.saturation import Saturation
 
 Array = NDArray[np.float64]
 _NU = 6.0
@@ -92,12 +93,26 @@ def explained(state: State, mean: Array) -> float:
 
 
 def _variances(state: State) -> list[int]:
-    """Return which numbers are the known variances of exposures."""
+    """Return which numbers are known variances of exposures that no limit of the camera cuts."""
+    cut = _cut(state)
     return [
         i
         for i, key in enumerate(state.vector.keys)
         if key.statistic == "pixel_variance" and key.scope == "exposure" and state.null.known[i]
+        if key.place not in cut
     ]
+
+
+def _cut(state: State) -> frozenset[Place]:
+    """Return where a full well that was taken in cuts noise: shape and size tell the well there."""
+    wells = [own.full_well_dn for own in state.camera.effect if isinstance(own, Saturation)]
+    signals, levels = state.calibrated.fit.signal_dn, state.setting.seen.levels
+    least = min(wells, default=inf)
+    return frozenset(
+        at
+        for at, own in levels.items()
+        if signals.get(at, 0.0) + _AROUND * sqrt(max(own.variance_dn2, 0.0)) > least
+    )
 
 
 def spiky(state: State, path: Path | None = None) -> bool:
@@ -115,8 +130,9 @@ def spiky(state: State, path: Path | None = None) -> bool:
 def _departing(state: State, statistics: Container[str]) -> dict[Place, float]:
     """Return by how many standard errors an exposure's numbers depart, at most, by place."""
     found: dict[Place, float] = {}
+    cut = _cut(state)
     for key, z in zip(state.null.keys, np.abs(state.departures), strict=True):
-        if key.scope == "exposure" and key.statistic in statistics:
+        if key.scope == "exposure" and key.statistic in statistics and key.place not in cut:
             found[key.place] = max(found.get(key.place, 0.0), float(z))
     return found
 
@@ -166,7 +182,7 @@ def _path(state: State, low: float, high: float, beside: Array) -> Path | None:
         fit = fit_base(
             layout, levels, (switch,), calibrated.offsets,
             black_dn=calibrated.model.camera.black_level - layout.black_dn,
-            left_out=calibrated.left_out,
+            left_out=calibrated.left_out | {name for name, _ in _cut(state)},
         )  # fmt: skip
     except (ValueError, np.linalg.LinAlgError):
         return None

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import lognorm
 
+from analysis import currentspread
 from analysis.currentlaw import Body, of_all
 from analysis.currentspread import current_spread
 from analysis.photon_transfer import fit_camera
@@ -112,6 +113,21 @@ def test_hot_pixels_alone_are_no_spread_and_beside_one_leave_it(share: float, me
     # About the mean of all: the others' spread is as many DN.
     expected = of_all(0.5, 8.0 / float(image.mean()))
     assert found.log_sigma == pytest.approx(expected, abs=4 * found.error)
+
+
+def test_a_mean_that_may_be_far_off_tells_no_spread_beyond_all_bounds(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Hot pixels and a glow alone: a wide spread of few pixels leaves their mean open."""
+    rng = np.random.default_rng(1)
+    y, x = np.mgrid[:48, :64]
+    rate = (rng.random((48, 64)) < 0.01) * rng.exponential(300, (48, 64))
+    rate += 60 * np.exp(-np.hypot(47 - y, 63 - x) / 13)
+    seen = rate + rng.normal(0, 2.5, (48, 64))
+    monkeypatch.setattr(currentspread, "_own", lambda *_: 60.0)
+    found = current_spread([(seen - seen.mean(), 2.5, np.zeros((48, 64), bool))], 0.1, shot=1.0)
+    assert found is not None
+    assert 1.0 < found.error < np.inf
 
 
 def test_errors_know_that_the_law_is_another() -> None:

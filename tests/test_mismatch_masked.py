@@ -1,9 +1,10 @@
-"""Charge that neighbours share and a second read-out path mask each other in the variances."""
+"""What neighbours share, or a full well, and a second path mask each other in the variances."""
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from analysis.mismatch import find_mismatch
 from analysis.mismatch.contradicted import refuted
 from analysis.mismatch.masked import with_path
 from analysis.mismatch.polish import Polished
@@ -105,3 +106,30 @@ def test_neighbours_that_share_noise_on_top_have_shared_no_charge() -> None:
     """Covariances grow as those of shared charge do, and variances grow instead of falling."""
     denied, still, masked = _asked(_recording(5, share=0.0, path_dn2=PATH, grains=SHARE / 2))
     assert (denied, still, masked) == (True, True, False)
+
+
+@pytest.mark.usefixtures("unproven")
+def test_a_full_well_and_a_second_path_are_both_named() -> None:
+    """One line through all variances lies above some and below others: the well is below that."""
+    levels = (100.0, 350.0, 700.0, 1200.0, 2000.0, 2800.0, 3200.0, 3400.0)
+    rng = np.random.default_rng(8)
+    model = camera(segments=((0.3, 4.0, None),))
+    like = recorded(model, 1, rows=64, columns=64, frames=FRAMES, levels=levels)
+    stacks = {}
+    for exposure in like.exposures:
+        light = exposure.light or 0.0
+        slope, read = (0.3, 4.0) if light < 1000 else (1.1, 7.0)
+        noise = rng.standard_normal((FRAMES, 64, 64)) * np.sqrt(slope * light + read)
+        codes = BLACK + np.minimum(light + noise, 3300.0)
+        stacks[exposure.name] = np.rint(codes).astype(np.uint16)
+    recording = InMemory(like.sensor, like.exposures, 64, 64, like.folder, stacks)
+    words = frozenset({"saturation", "dual_gain", "nonlinearity"})
+    found = find_mismatch(model, recording, vocabulary=words)
+    named = {one.effect: one.parameters for one in found.omitted_physics}
+    assert named.keys() == {"saturation", "dual_gain"}
+    for kind, name, true in (
+        ("saturation", "full_well_dn", 3300),
+        ("dual_gain", "switch_dn", 1000),
+    ):
+        own = named[kind][name]
+        assert abs(float(own.value) - true) < 3 * float(own.standard_error) + 1

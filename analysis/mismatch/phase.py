@@ -46,6 +46,7 @@ _BY_CHANCE = "it would be at a frequency of single pixels by chance only"
 _UNTOLD = "frames do not tell whether its phase is kept"
 _OF_LIGHT = "it grows with the light, as no pattern of the read-out does"
 _SMOOTH = "frames have less than a wave and a half of it, as of any smooth surface that moves"
+_ANY_SIZE = "the pattern's size is another in every frame, and not its sign alone"
 _BROAD = "frequencies beside it are raised as well: it is no line"
 
 
@@ -92,6 +93,10 @@ class WholeFrames(FramesAsked):
 
     def _other_phase(self, seen: "Look", frequency: Frequency, *, kept: bool) -> str | None:
         """Return why a line is none whose phase is kept, or is not; None: it may be."""
+        if kept and seen.kept is not False and seen.line is not None:
+            real = all((2 * f) % 1 == 0 for f in frequency)
+            if seen.line.of_any_size(real=real):
+                return _ANY_SIZE
         if seen.kept is not None:
             kind = "bistable_pattern" if kept else "periodic_noise"
             return None if seen.kept == kept else _PHASE_WORDS[kind]

@@ -7,6 +7,7 @@ import numpy as np
 import scipy.stats
 from numpy.typing import NDArray
 
+from analysis.mismatch.anysize import of_any_size
 from analysis.mismatch.instance import Frequency
 from analysis.mismatch.layout import Layout
 from analysis.mismatch.phaselaw import kept_rather_than_free, strength_of, there
@@ -147,6 +148,11 @@ class Power:
         """
         own = [float(np.sqrt(max(power, 0.0) * w)) for w in self.weights]
         return there([one[:, 0] for one in self.found], own, kept=kept, real=real)
+
+    def of_any_size(self, *, real: bool) -> bool:
+        """Return whether the first pattern's size is another in each frame, not its sign alone."""
+        own = [float(np.sqrt(max(float(self.excess[0]), 0.0) * w)) for w in self.weights]
+        return of_any_size([one[:, 0] for one in self.found], own, real=real) > SURE
 
     def grows(self, layout: Layout, *, real: bool) -> bool:
         """Return whether the first pattern is in proportion to the signal, and not constant.

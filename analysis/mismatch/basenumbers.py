@@ -1,6 +1,6 @@
 """Whether the numbers of a camera's base model hold beside an effect."""
 
-from math import isfinite, nan
+from math import isfinite, nan, sqrt
 
 from scipy.stats import chi2
 
@@ -41,12 +41,22 @@ def beside(state: State, users: BaseNoise, ranked: Ranked) -> float:
 
 def chance(users: BaseNoise, calibrated: Calibrated) -> float:
     """Return the chance that slopes fitted again are farther from the user's."""
+    squares = _squares(users, calibrated)
+    return float(chi2.sf(sum(squares), len(squares))) if squares else nan
+
+
+def far_off(users: BaseNoise, calibrated: Calibrated) -> float:
+    """Return how many standard errors slopes fitted again are from the user's, in all."""
+    return sqrt(sum(_squares(users, calibrated)))
+
+
+def _squares(users: BaseNoise, calibrated: Calibrated) -> list[float]:
+    """Return the squares of differences of slopes over their errors; none: segments are others."""
     pieces = calibrated.fit.pieces
     if len(pieces) != len(users.segment):
-        return nan
-    squares = [
+        return []
+    return [
         (piece.slope - own.slope) ** 2 / (piece.slope_error**2 + (own.slope_se or 0.0) ** 2)
         for piece, own in zip(pieces, users.segment, strict=True)
         if isfinite(piece.slope_error)
     ]
-    return float(chi2.sf(sum(squares), len(squares))) if squares else nan

@@ -11,6 +11,7 @@ from analysis.mismatch.candidates import CANDIDATES, Proposal
 from analysis.mismatch.candidates.patterns import of_any_shape
 from analysis.mismatch.credited import given_back
 from analysis.mismatch.displaced import displaced
+from analysis.mismatch.forms import other_form
 from analysis.mismatch.lightfield import measured_light
 from analysis.mismatch.named import Named, camera_without, renewed
 from analysis.mismatch.own import Own, called, explained, refitted, resized, sizes, without_own
@@ -127,7 +128,7 @@ class Fitted:
         Light falls by a shape that is fitted as well. Where it is not clear, whether light falls at
         all is asked of the fall alone, see `unclear`.
         """
-        state = self._resized(state, self._called(state))
+        state = self._in_form(self._resized(state, self._called(state)))
         self.named = [
             n if n.proposal is None else replace(n, proposal=of_any_shape(n.proposal))
             for n in self.named
@@ -148,6 +149,16 @@ class Fitted:
         self.own = [own for own in self.own if own.contradicted]
         self.camera = resized(self.camera, good)
         return State.of(self.setting, resized(camera, good), self.step, near=state)
+
+    def _in_form(self, state: State) -> State:
+        """Return the state with each effect in the form beside which the user's numbers hold."""
+        for i, named in enumerate(self.named):
+            effect = named.effect
+            found = None if effect is None else other_form(state, self.camera.noise, effect)
+            if found is not None and named.proposal is not None:
+                self.named[i] = renewed(named, named.proposal, found[0], named.errors)
+                state = State.of(self.setting, found[1], self.step, near=state)
+        return state
 
     def of_all(self, camera: Camera) -> State:
         """Return the state of all frames of a small recording beside a camera."""

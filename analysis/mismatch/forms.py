@@ -3,16 +3,18 @@
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from analysis.mismatch.basenumbers import HOLD, WRONG, beside, chance
+from analysis.mismatch.basenumbers import HOLD, WRONG, beside, chance, far_off
 from analysis.mismatch.credited import joined
 from analysis.mismatch.proposed import replicates_for
 from analysis.mismatch.rank import TOLD_APART, Ranked
 from analysis.mismatch.state import State
 from dsis.camera import BaseNoise, Camera
+from dsis.effects import Effect
 from dsis.effects.readout_memory import ReadoutMemory
 from dsis.effects.rts import Rts
 
 _MOST = 0.5  # of the signal; of the noise, less: beyond it there is no other form
+_NEARLY = 0.25  # of what a number is off by: sizes of effects have errors, too
 OTHER_LEVELS = ("above", "either")
 
 
@@ -62,6 +64,27 @@ def _remembered(state: State, users: BaseNoise, ranked: Ranked) -> Ranked:
         return noise
     wrong = beside(state, users, noise) < WRONG
     return signal if wrong and beside(state, users, signal) > HOLD else noise
+
+
+def other_form(state: State, users: BaseNoise, effect: Effect) -> tuple[Effect, Camera] | None:
+    """Return a memory in its other form, and the camera with it; None: it has the one it should.
+
+    What is named since may have been what made the user's numbers wrong: of the form beside which
+    they are wrong, and beside the other hold, or are nearly right, it is not.
+    """
+    if not isinstance(effect, ReadoutMemory) or effect.before_line == "black":
+        return None
+    apart = 1 if state.setting.layout.channels == ("MONO",) else 2
+    other = _other(effect)
+    if other is None or effect.lag_pixels % apart or effect.lag_pixels == apart:
+        return None  # told otherwise, see `in_form`
+    if not chance(users, state.calibrated) < WRONG:
+        return None
+    effects = tuple(other if own == effect else own for own in state.camera.effect)
+    camera = state.camera.model_copy(update={"effect": effects})
+    calibrated = state.setting.calibrated(camera, state.calibrated)
+    nearer = far_off(users, calibrated) < _NEARLY * far_off(users, state.calibrated)
+    return (other, camera) if nearer or chance(users, calibrated) > HOLD else None
 
 
 def _other(effect: ReadoutMemory) -> ReadoutMemory | None:

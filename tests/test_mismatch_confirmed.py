@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from analysis.mismatch import confirmed, explaining
+from analysis.mismatch.candidates import CANDIDATES
 from analysis.mismatch.finding import Gain
 from analysis.mismatch.trial import Gained
 from exposing import effect
@@ -241,7 +242,7 @@ def test_what_nothing_calls_for_in_all_frames_must_be_shown_by_locked_ones(
     trial: Any = None  # nothing more is asked
     told = {first: ("column_prnu" if explains else None, 1.0)}
     monkeypatch.setattr(explaining, "changes", lambda *_: {named.name: None})
-    monkeypatch.setattr(explaining, "explained", lambda *_: told)
+    monkeypatch.setattr(explaining, "explained", lambda *_, **__: told)
     gains = {"column_prnu": Gain(0.14, (low, 0.5))}
     found = explaining.uncalled(search, base, base, gains, trial)
     assert found == ((named, explaining.UNCALLED) if dropped else None)
@@ -268,7 +269,7 @@ def test_a_line_that_explains_nothing_must_be_sure(
     trial: Any = Stub(lines=Stub(gain=lambda _: odds))
     monkeypatch.setattr(explaining, "changes", lambda *_: {named.name: None})
     told = {first: ("periodic_noise" if explains else None, 5.0)}
-    monkeypatch.setattr(explaining, "explained", lambda *_: told)
+    monkeypatch.setattr(explaining, "explained", lambda *_, **__: told)
     gains = {"periodic_noise": Gain(0.3, (0.1, 0.5))}
     found = explaining.uncalled(search, base, base, gains, trial)
     assert found == ((named, explaining.UNCALLED) if dropped else None)
@@ -285,7 +286,7 @@ def test_what_only_hints_at_an_effect_does_not_call_for_it(
     trial: Any = None
     monkeypatch.setattr(explaining, "changes", lambda *_: {named.name: None})
     told = {"fixed_smooth_variance": ("amp_glow", 1.0)}
-    monkeypatch.setattr(explaining, "explained", lambda *_: told)
+    monkeypatch.setattr(explaining, "explained", lambda *_, **__: told)
     gains = {named.name: Gain(0.13, (-0.2, 0.4))}
     assert explaining.uncalled(search, base, base, gains, trial) == (named, explaining.UNCALLED)
 
@@ -359,24 +360,36 @@ def test_an_effect_of_no_clear_size_leaves_little(error: float, left: float, ref
 
 
 @pytest.mark.parametrize(
-    ("kind", "told", "dropped"),
+    ("kind", "told", "beside", "dropped"),
     [
-        ("adc_dnl", "quantisation", True),
-        ("adc_dnl", "adc_dnl", False),
-        ("nonlinearity", "quantisation", False),  # of which every level says something
+        ("adc_dnl", "quantisation", None, True),
+        ("adc_dnl", "adc_dnl", None, False),
+        ("nonlinearity", "quantisation", None, False),  # of which every level says something
+        ("prnu", "dsnu", "dsnu", False),  # both are called for by the same
     ],
 )
 def test_what_is_drawn_must_be_put_down_to_something(
-    monkeypatch: pytest.MonkeyPatch, kind: str, told: str, dropped: bool
+    monkeypatch: pytest.MonkeyPatch, kind: str, told: str, beside: str | None, dropped: bool
 ) -> None:
     """Beside coarse codes frames gain by any widths that scatter, and none of that is seen."""
-    size = {"rms_lsb": 0.02} if kind == "adc_dnl" else {"percent_full_scale": 1.0}
-    named: Any = Stub(name=kind, kind=kind, effect=effect(kind, **size), measured=False)
-    monkeypatch.setattr(explaining, "changes", lambda *_: {kind: None})
-    monkeypatch.setattr(explaining, "explained", lambda *_: {"code_imbalance": (told, 0.5)})
-    search: Any = Stub(named=[named], without=lambda *_: None)
-    state: Any = Stub(mismatches=[Stub(statistic="code_imbalance")])
+    sizes = {
+        "adc_dnl": {"rms_lsb": 0.02},
+        "nonlinearity": {"percent_full_scale": 1.0},
+        "prnu": {"sigma_percent": 0.4},
+        "dsnu": {"sigma_dn": 3.0},
+    }
+    some: list[Any] = [
+        Stub(name=one, kind=one, effect=effect(one, **sizes[one]), measured=False)
+        for one in (kind, beside)
+        if one is not None
+    ]
+    own: Any = {one.name: None for one in some}
+    monkeypatch.setattr(explaining, "changes", lambda *_: own)
+    calls = sorted(CANDIDATES[kind].calls)
+    monkeypatch.setattr(explaining, "explained", lambda *_, **__: {calls[0]: (told, 0.5)})
+    search: Any = Stub(named=some, without=lambda *_: None)
+    state: Any = Stub(mismatches=[Stub(statistic=calls[0])])
     found = explaining.hollow(search, state, state)
-    assert found == ((named, explaining.HOLLOW) if dropped else None)
+    assert found == ((some[0], explaining.HOLLOW) if dropped else None)
     hidden: Any = Stub(mismatches=[Stub(statistic="row_variance")])
     assert explaining.hollow(search, hidden, state) is None

@@ -1,5 +1,6 @@
 """What was credited with the part of another effect gives it back where both are fitted."""
 
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from dsis.grid import Cfa, PixelGrid
 from exposing import effect
 from mismatch_recordings import camera, recorded
 
+LAYOUT: Any = SimpleNamespace(rows=96, columns=128)
 WHITE, DARK = effect("row_noise", sigma_dn=0.5), effect("dsnu", sigma_dn=1.0)
 
 
@@ -34,7 +36,7 @@ def _named(one: Effect | None, name: str = "row_noise") -> Named:
 
 
 def test_bands_and_white_rows_have_the_variance_that_white_rows_had() -> None:
-    bare, starts = together(camera(DARK, WHITE), _bands(0.3), 1)
+    bare, starts = together(camera(DARK, WHITE), _bands(0.3), 1, LAYOUT)
     assert bare.effect == (DARK,)
     assert [one.effect.kind for one in starts] == ["row_banding", "row_noise"]
     sizes: list[Any] = [one.effect.model_dump()["sigma_dn"] for one in starts]
@@ -43,17 +45,20 @@ def test_bands_and_white_rows_have_the_variance_that_white_rows_had() -> None:
 
 
 def test_of_bands_larger_than_all_white_rows_keep_little() -> None:
-    _, starts = together(camera(WHITE), _bands(0.8), 0)
+    _, starts = together(camera(WHITE), _bands(0.8), 0, LAYOUT)
     assert starts[1].effect.model_dump()["sigma_dn"] == pytest.approx(0.05)
 
 
 def test_rows_of_the_users_own_give_nothing_back() -> None:
     """They come first, and are addressed by their places: sizes are fitted there."""
-    assert together(camera(WHITE, DARK), _bands(0.3), 2) == (camera(WHITE, DARK), [_bands(0.3)])
+    assert together(camera(WHITE, DARK), _bands(0.3), 2, LAYOUT) == (
+        camera(WHITE, DARK),
+        [_bands(0.3)],
+    )
     both = joined(camera(WHITE, DARK), (_bands(0.3).effect,), 2)
     assert both is not None
     assert both.effect[:2] == (WHITE, DARK)
-    assert given_back(camera(WHITE), _bands(0.3).effect, 1) == camera(WHITE)
+    assert given_back(camera(WHITE), _bands(0.3).effect, 1, LAYOUT) == camera(WHITE)
     kept = kept_up([_named(effect("row_noise", sigma_dn=0.2))], camera(WHITE), 1)
     assert [n.proposal.effect for n in kept if n.proposal] == [effect("row_noise", sigma_dn=0.2)]
 
@@ -62,7 +67,9 @@ def test_a_glow_and_a_dark_current_have_the_mean_that_the_current_had() -> None:
     """Levels of darks tell their sum; pixels stay as far apart, in DN, as maps show."""
     current = effect("dark_current", dn_per_s=80.0, log_sigma=0.5)
     glow = effect("amp_glow", dn_per_s=150.0, place="top_left", extent=0.3)
-    bare, starts = together(camera(DARK, current), Proposal(glow, ("dn_per_s", "extent")), 1)
+    bare, starts = together(
+        camera(DARK, current), Proposal(glow, ("dn_per_s", "extent")), 1, LAYOUT
+    )
     assert bare.effect == (DARK,)
     assert [one.free for one in starts] == [("dn_per_s", "extent"), ("dn_per_s",)]
     left: Any = starts[1].effect
@@ -73,7 +80,7 @@ def test_a_glow_and_a_dark_current_have_the_mean_that_the_current_had() -> None:
         rate * np.sqrt(np.expm1(s**2)) for rate, s in ((80.0, 0.5), (80.0 - mean, left.log_sigma))
     ]
     assert apart[0] == pytest.approx(apart[1])
-    (back,) = given_back(camera(left), glow, 0).effect
+    (back,) = given_back(camera(left), glow, 0, LAYOUT).effect
     assert back.model_dump() == pytest.approx(current.model_dump())
 
 
@@ -81,7 +88,7 @@ def test_without_bands_white_rows_have_all_the_variance_of_rows() -> None:
     """Simulated: no effect gains what a larger one that is there as well would explain."""
     bands = effect("row_banding", sigma_dn=0.4, length_rows=2.0)
     model = camera(DARK, bands, effect("row_noise", sigma_dn=0.3))
-    bare = given_back(camera_without(model, [bands], camera(DARK)), bands, 1)
+    bare = given_back(camera_without(model, [bands], camera(DARK)), bands, 1, LAYOUT)
     assert [one.kind for one in bare.effect] == ["dsnu", "row_noise"]
     wide = [_row_variance(one) for one in (model, bare)]
     assert wide[0] == pytest.approx(wide[1], rel=0.15)  # 512 rows, 31 pairs of frames
@@ -101,7 +108,7 @@ def test_bands_that_are_not_there_gain_nothing_on_locked_frames() -> None:
         name: gain_of(held, false, bare, signals, seed=1)
         for name, bare in {
             "robbed": camera_without(false, [bands], camera()),
-            "fair": given_back(camera_without(false, [bands], camera()), bands, 0),
+            "fair": given_back(camera_without(false, [bands], camera()), bands, 0, LAYOUT),
         }.items()
     }
     assert gains["robbed"].ci95[0] > 0
@@ -120,9 +127,9 @@ def _row_variance(model: Camera) -> float:
 @pytest.mark.parametrize("own", [(), (DARK,)])
 def test_where_nothing_was_credited_the_camera_stays(own: tuple[Effect, ...]) -> None:
     proposal = _bands(0.3)
-    assert together(camera(*own), proposal, 0) == (camera(*own), [proposal])
+    assert together(camera(*own), proposal, 0, LAYOUT) == (camera(*own), [proposal])
     drift = Proposal(effect("black_level_drift", sigma_dn=1.0), ("sigma_dn",))
-    assert together(camera(WHITE), drift, 0) == (camera(WHITE), [drift])
+    assert together(camera(WHITE), drift, 0, LAYOUT) == (camera(WHITE), [drift])
 
 
 def test_a_camera_has_what_was_fitted_once() -> None:
@@ -154,10 +161,10 @@ def test_a_filter_and_charge_share_what_neighbours_have_in_common() -> None:
     """Each has its own law: a share is given back where they are fitted, but not without one."""
     filtering = effect("spatial_filtering", fraction=0.03)
     charge = effect("crosstalk", fraction=0.02)
-    bare, starts = together(camera(DARK, filtering), Proposal(charge, ("fraction",)), 1)
+    bare, starts = together(camera(DARK, filtering), Proposal(charge, ("fraction",)), 1, LAYOUT)
     assert bare.effect == (DARK,)
     sizes: list[Any] = [one.effect.model_dump()["fraction"] for one in starts]
     assert sizes == pytest.approx([0.02, 0.01])
-    _, starts = together(camera(charge), Proposal(filtering, ("fraction",)), 0)
+    _, starts = together(camera(charge), Proposal(filtering, ("fraction",)), 0, LAYOUT)
     assert starts[1].effect.model_dump()["fraction"] == pytest.approx(0.002)
-    assert given_back(camera(filtering), charge, 0) == camera(filtering)
+    assert given_back(camera(filtering), charge, 0, LAYOUT) == camera(filtering)

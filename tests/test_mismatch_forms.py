@@ -126,7 +126,7 @@ def test_what_is_named_since_may_tell_the_other_form(
     layout = SimpleNamespace(channels=("MONO",))
     state: Any = SimpleNamespace(
         camera=model,
-        setting=SimpleNamespace(layout=layout, calibrated=calibrated),
+        setting=SimpleNamespace(layout=layout, calibrated=calibrated, given=0),
         calibrated=calibrated(model),
     )
     found = other_form(state, GIVEN, effect)

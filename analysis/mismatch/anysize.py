@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 Complex = NDArray[np.complex128]
 Array = NDArray[np.float64]
 _STRENGTHS = (0.7, 0.85, 1.0, 1.2, 1.4)  # of an amplitude that is not exact
-_MIDDLES = 65  # between the least and the largest projection
+_MIDDLES = 129  # from an amplitude below the least projection to one above the largest
 _MOST = 6.0  # amplitude of one frame, beside which sizes that differ by a sixth are one
 _FLAT = np.log(2 * np.pi)
 
@@ -17,8 +17,8 @@ def of_any_size(found: Sequence[Complex], amplitudes: Sequence[float], *, real: 
     """Return by how much likelier sizes are that are new in each frame than one of either sign.
 
     Two fields of a frame, say, each with an offset of its own, make a pattern of two signs and any
-    size. Sizes are normal variates about a middle that is each exposure's own; of two values it is
-    the likeliest one between them. Both are asked along the phase that most of the pattern has, at
+    size. Sizes are normal variates about a middle that is each exposure's own, and of two values
+    the likeliest one. Both are asked along the phase that most of the pattern has, at
     the likeliest of some amplitudes.
 
     Parameters
@@ -48,7 +48,8 @@ def _of_both(own: Array, size: float, noise: float) -> tuple[float, float]:
     own, size = own * scale, size * scale
     spread = size**2 + noise
     differ = -(own**2).sum() / spread / 2 - own.size * (np.log(spread) + _FLAT) / 2
-    middle = np.linspace(own.min(), own.max(), _MIDDLES)[:, np.newaxis]
+    # All frames may have one sign: the middle is not among them then.
+    middle = np.linspace(own.min() - size, own.max() + size, _MIDDLES)[:, np.newaxis]
     signs = [-((own - middle - sign * size) ** 2) / noise / 2 for sign in (-1, 1)]
     one = (np.logaddexp(*signs) - np.log(2) - (np.log(noise) + _FLAT) / 2).sum(1).max()
     return float(differ), float(one)

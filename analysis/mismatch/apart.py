@@ -18,7 +18,10 @@ def as_far_apart(before: Effect | None, after: Effect) -> Effect:
     """Return a dark current of a new mean, its pixels as far apart in DN as before."""
     if not isinstance(before, DarkCurrent) or not isinstance(after, DarkCurrent):
         return after
-    if not (before.log_sigma and after.dn_per_s) or after.log_sigma != before.log_sigma:
+    if (
+        not (before.log_sigma and before.dn_per_s and after.dn_per_s)
+        or after.log_sigma != before.log_sigma
+    ):
         return after
     sigma = of_all(before.log_sigma, before.dn_per_s / after.dn_per_s)
     return after.model_copy(update={"log_sigma": min(sigma, MOST_APART)})

@@ -1,6 +1,6 @@
 """Whether the numbers of a camera's base model hold beside an effect."""
 
-from math import isfinite, nan, sqrt
+from math import inf, isfinite, nan, sqrt
 
 from scipy.stats import chi2
 
@@ -46,8 +46,8 @@ def chance(users: BaseNoise, calibrated: Calibrated) -> float:
 
 
 def far_off(users: BaseNoise, calibrated: Calibrated) -> float:
-    """Return how many standard errors slopes fitted again are from the user's, in all."""
-    return sqrt(sum(_squares(users, calibrated)))
+    """Return how many standard errors slopes fitted again are from the user's; inf: none is."""
+    return sqrt(sum(_squares(users, calibrated)) or inf)
 
 
 def _squares(users: BaseNoise, calibrated: Calibrated) -> list[float]:

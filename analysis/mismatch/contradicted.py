@@ -89,7 +89,11 @@ def refuted(
     drawn = _alike_spread(state, np.where(known, mean - state.null.mean, 0.0), drawn)
     scatter = np.sqrt(np.maximum(sd**2 - change**2, state.null.sd**2) + drawn**2)
     denial = _denied(state, predictor, kind, state.null.mean, mean, scatter)
-    if denial is not None and "dual_gain" in left and (both := with_path(state, mean)) is not None:
+    if (
+        denial is not None
+        and "dual_gain" in left
+        and (both := with_path(state, mean, kind)) is not None
+    ):
         alone = state.null.mean + both - mean
         denial = _denied(state, predictor, kind, alone, both, scatter)
     return denial or _of_codes(state, kind, mean)

@@ -11,6 +11,7 @@ from math import hypot, sqrt
 from analysis.mismatch.apart import as_far_apart
 from analysis.mismatch.candidates import CANDIDATES, Proposal
 from analysis.mismatch.candidates.patterns import glowing
+from analysis.mismatch.layout import Layout
 from analysis.mismatch.named import Named, renewed
 from analysis.mismatch.polish import with_effects
 from dsis.camera import Camera
@@ -20,22 +21,23 @@ from dsis.effects.amp_glow import AmpGlow
 _SIGMA, _SHARE, _RATE = "sigma_dn", "fraction", "dn_per_s"
 _MAY = frozenset(kind for own in CANDIDATES.values() for kind in own.credited)
 _KEPT = 0.1  # of its size, that the credited effect keeps at least where a fit starts
-_SENSOR = (96, 128)  # rows and columns, of whose mean that of a glow is much the same
 
 
-def together(camera: Camera, proposal: Proposal, given: int) -> tuple[Camera, list[Proposal]]:
+def together(
+    camera: Camera, proposal: Proposal, given: int, layout: Layout
+) -> tuple[Camera, list[Proposal]]:
     """Return a camera, and what is fitted in it: a proposal, and what was credited with its part.
 
     The credited effect leaves the camera, and is proposed again with the variance, the share or the
     mean that the other leaves it. Where there is none the camera stays as it is, and so do its
-    first effects, as many as are `given`: they are the user's.
+    first effects, as many as are `given`: they are the user's. `layout` tells the mean of a glow.
     """
     place = _credited(camera, proposal.effect, given)
     if place is None:
         return camera, [proposal]
     credited = camera.effect[place]
     name = _size(credited)
-    size, other = float(getattr(credited, name)), _part(proposal.effect, name)
+    size, other = float(getattr(credited, name)), _part(proposal.effect, name, layout)
     left = sqrt(max(size**2 - other**2, 0.0)) if name == _SIGMA else size - other
     again = Proposal(_of_size(credited, name, max(left, _KEPT * size)), (name,))
     return _without(camera, place), [proposal, again]
@@ -47,7 +49,7 @@ def joined(camera: Camera, effects: Sequence[Effect], given: int) -> Camera | No
     return with_effects(camera if place is None else _without(camera, place), effects)
 
 
-def given_back(camera: Camera, effect: Effect, given: int) -> Camera:
+def given_back(camera: Camera, effect: Effect, given: int, layout: Layout) -> Camera:
     """Return a camera without an effect in which what was credited has its part again.
 
     Variances add, and means: no effect is to gain what another would explain without it. Shares do
@@ -58,7 +60,7 @@ def given_back(camera: Camera, effect: Effect, given: int) -> Camera:
     if place is None or name == _SHARE:
         return camera
     credited = camera.effect[place]
-    size, other = float(getattr(credited, name)), _part(effect, name)
+    size, other = float(getattr(credited, name)), _part(effect, name, layout)
     again = _of_size(credited, name, hypot(size, other) if name == _SIGMA else size + other)
     effects = (*camera.effect[:place], again, *camera.effect[place + 1 :])
     return camera.model_copy(update={"effect": effects})
@@ -88,11 +90,13 @@ def _size(effect: Effect) -> str:
     return next(name for name in (_SIGMA, _SHARE, _RATE) if hasattr(effect, name))
 
 
-def _part(effect: Effect, name: str) -> float:
+def _part(effect: Effect, name: str, layout: Layout) -> float:
     """Return what an effect has of a size; a glow of a dark current: the mean of the sensor."""
     size = float(getattr(effect, name))
     if isinstance(effect, AmpGlow):
-        return size * float(glowing(_SENSOR, effect.place, effect.extent).mean())
+        return size * float(
+            glowing((layout.rows, layout.columns), effect.place, effect.extent).mean()
+        )
     return size
 
 

@@ -21,7 +21,7 @@ _LEFT = 0.4  # of a departure may be left where it is called explained
 
 
 def explained(
-    base: State, final: State, changes: Mapping[str, Array]
+    base: State, final: State, changes: Mapping[str, Array], *, whatever_left: bool = False
 ) -> dict[str, tuple[str | None, float]]:
     """Return the effect that explains each statistic of the base mismatches, and z afterwards.
 
@@ -31,6 +31,8 @@ def explained(
         The re-calibrated base model and the final one.
     changes
         By effect's name: what it changes in the numbers, in deviations of the base null.
+    whatever_left
+        Whether an effect is returned as well of what is still there: that which explains most.
     """
     found: dict[str, tuple[str | None, float]] = {}
     matrix = base.null.contrasts.matrix
@@ -57,7 +59,8 @@ def explained(
         }
         best = max(score, key=lambda kind: score[kind], default=None)
         top = float(np.abs(z).max())
-        clear = best is not None and score[best] > 0 and (not still or abs(left) < _LEFT * top)
+        clear = whatever_left or not still or abs(left) < _LEFT * top
+        clear &= best is not None and score[best] > 0
         found[mismatch.statistic] = (best if clear else None, left)
     return found
 

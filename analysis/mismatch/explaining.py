@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.mismatch.candidates import CANDIDATES
+from analysis.mismatch.candidates import CANDIDATES, calls_of
 from analysis.mismatch.explain import because, changes, explained
 from analysis.mismatch.finding import Gain
 from analysis.mismatch.instance import LINES
@@ -54,16 +54,19 @@ def _explaining_nothing(
     asked: Sequence[Named],
     why: str,
     known: Mapping[str, Array] | None = None,
+    *,
+    whatever_left: bool = False,
 ) -> tuple[Named, str] | None:
     """Return the first of some effects to which nothing that differed is put down, and why.
 
-    None: there is none. `known` is as in `idle`.
+    None: there is none. `known` is as in `idle`, `whatever_left` as in `explained`.
     """
     if not asked:
         return None
     if known is None:
         known = changes(base, final, search.named, partial(search.without, final))
-    told = explained(base, final, {n.name: known[n.name] for n in search.named})
+    own = {n.name: known[n.name] for n in search.named}
+    told = explained(base, final, own, whatever_left=whatever_left)
     nothing = next((n for n in asked if not because(told, n.name)), None)
     return None if nothing is None else (nothing, why)
 
@@ -99,14 +102,17 @@ def hollow(search: Search, base: State, final: State) -> tuple[Named, str] | Non
     """Return an effect that draws at random, to which nothing that differed is put down, or None.
 
     Frames gain by whatever spreads their samples where numbers of the model are off beside it: more
-    noise, longer tails or codes of other widths. What differed and called for it must be its own,
-    some of it; for what nothing called see `uncalled`.
+    noise, longer tails or codes of other widths. Of something that differed it must explain most,
+    whatever is left of that. Of two effects that the same calls for one may explain all of it
+    better, and of what nothing called for see `uncalled`.
     """
     first = {m.statistic for m in base.mismatches}
+    called = {n.name: first.intersection(calls_of(n.kind)) for n in search.named}
     asked = [
         n
         for n in search.named
         if n.kind in CANDIDATES and n.effect is not None and n.effect.draws
-        if not (n.kind in LINES or n.measured or first.isdisjoint(CANDIDATES[n.kind].calls))
+        if not (n.kind in LINES or n.measured) and called[n.name]
+        if all(called[n.name].isdisjoint(own) for name, own in called.items() if name != n.name)
     ]
-    return _explaining_nothing(search, base, final, asked, HOLLOW)
+    return _explaining_nothing(search, base, final, asked, HOLLOW, whatever_left=True)

@@ -200,7 +200,7 @@ class Fitted:
             able = [own for own in camera.effect if not own.unfit_for(camera.read_out)]
             return camera.model_copy(update={"effect": tuple(able)})
         left = camera_without(state.camera, [named.proposal.effect], self.camera)
-        return given_back(left, named.proposal.effect, self.setting.given)
+        return given_back(left, named.proposal.effect, self.setting.given, self.setting.layout)
 
     def _beside(self, named: Named) -> set[str]:
         """Return the kinds of the other effects named, and of the camera's own of other sizes."""

@@ -80,7 +80,10 @@ def other_form(state: State, users: BaseNoise, effect: Effect) -> tuple[Effect, 
         return None  # told otherwise, see `in_form`
     if not chance(users, state.calibrated) < WRONG:
         return None
-    effects = tuple(other if own == effect else own for own in state.camera.effect)
+    first = state.setting.given  # the user's come first
+    effects = tuple(
+        other if i >= first and own == effect else own for i, own in enumerate(state.camera.effect)
+    )
     camera = state.camera.model_copy(update={"effect": effects})
     calibrated = state.setting.calibrated(camera, state.calibrated)
     nearer = far_off(users, calibrated) < _NEARLY * far_off(users, state.calibrated)

@@ -64,8 +64,8 @@ class Own:
     @property
     def users(self) -> "Own":
         """The effect as the user wrote it; of dark currents as far apart in DN as they are."""
-        effect = _of_size(self.effect, self.name, self.model)
-        return replace(self, effect=as_far_apart(self.effect, effect or self.effect))
+        effect = _of_size(self.effect, self.name, self.model) or self.effect
+        return replace(self, effect=effect if self._none else as_far_apart(self.effect, effect))
 
     @property
     def proposal(self) -> Proposal:

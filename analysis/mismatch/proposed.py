@@ -35,6 +35,11 @@ STRONG = 30.0  # gain of log-likelihood beside which what gained little before n
 WORTH_IT = 0.3  # share of it
 
 
+def beside_credited(state: State, proposal: Proposal) -> tuple[Camera, list[Proposal]]:
+    """Return a state's camera, and what is fitted in it of a proposal: see `together`."""
+    return together(state.camera, proposal, state.setting.given, state.setting.layout)
+
+
 def replicates_for(setting: Setting, effects: Iterable[Effect]) -> int:
     """Return how many simulations tell what effects change.
 
@@ -60,7 +65,7 @@ def means_of(
     effects = [proposal.effect for proposal in some]
     predictor = state.predictor(state.setting.screening)
     by_frame = state.predictor(replicates_for(state.setting, effects))
-    fits = [together(state.camera, proposal, state.setting.given) for proposal in some]
+    fits = [beside_credited(state, proposal) for proposal in some]
     alone = [len(starts) == 1 for _, starts in fits]  # else the change is another's too
     found = [
         memory.recalled(effect, state) if own else None
@@ -144,7 +149,7 @@ def _fitted(state: State, which: tuple[Proposal, Polished | None]) -> Polished |
     rounds = 0 if known_at_once(proposal.effect) else 1 + len(proposal.free)
     if state.setting.large:
         rounds = min(rounds, 1)
-    bare, starts = together(state.camera, proposal, state.setting.given)
+    bare, starts = beside_credited(state, proposal)
     if before is not None:
         found = zip(starts, before.effects, strict=True)
         starts = [replace(start, effect=effect) for start, effect in found]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.candidates import CANDIDATES, Proposal
-from analysis.mismatch.credited import joined, together
+from analysis.mismatch.credited import joined
 from analysis.mismatch.instance import (
     LINES,
     Frequency,
@@ -18,7 +18,14 @@ from analysis.mismatch.instance import (
 )
 from analysis.mismatch.memory import Memory, words
 from analysis.mismatch.polish import Polished, needed, stepped
-from analysis.mismatch.proposed import STRONG, WORTH_IT, all_fitted, means_of, replicates_for
+from analysis.mismatch.proposed import (
+    STRONG,
+    WORTH_IT,
+    all_fitted,
+    beside_credited,
+    means_of,
+    replicates_for,
+)
 from analysis.mismatch.state import State
 from dsis.effects import Effect
 from dsis.effects.adc_memory import AdcMemory
@@ -102,7 +109,7 @@ def ranked(
         by_count.setdefault(replicates_for(state.setting, [start.effect]), []).append(start)
     for count, starts in by_count.items():
         asked = state.predictor(count)
-        fits = [together(state.camera, start, state.setting.given) for start in starts]
+        fits = [beside_credited(state, start) for start in starts]
         asked.ready(camera for fit in fits for camera in needed(*fit))
         if state.setting.jobs > 1 and len(starts) > 1:
             asked.ready(stepped(asked, *fit) for fit in fits)

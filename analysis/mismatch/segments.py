@@ -63,11 +63,12 @@ def second_path(state: State, beside: Array | None = None) -> Path | None:
     calibrated, layout = state.calibrated, state.setting.layout
     if len(calibrated.switches) > 0:
         return None
-    misshapen = _misshapen(state)
+    misshapen, unfitted = _misshapen(state), calibrated.left_out | {name for name, _ in _cut(state)}
     means = sorted(
         {
             round(float(np.mean([calibrated.fit.signal_dn[e.name, c] for c in layout.channels])), 3)
             for e in layout.uniform
+            if e.name not in unfitted
         }
     )
     paths = [
@@ -104,7 +105,7 @@ def _variances(state: State) -> list[int]:
 
 
 def _cut(state: State) -> frozenset[Place]:
-    """Return where a full well that was taken in cuts noise: shape and size tell the well there."""
+    """Return where a full well of the camera cuts noise: shape and size tell the well there."""
     wells = [own.full_well_dn for own in state.camera.effect if isinstance(own, Saturation)]
     signals, levels = state.calibrated.fit.signal_dn, state.setting.seen.levels
     least = min(wells, default=inf)

@@ -44,7 +44,7 @@ def _remembered(state: State, users: BaseNoise, ranked: Ranked) -> Ranked:
     effect, *others = ranked.polished.effects
     if not isinstance(effect, ReadoutMemory) or effect.before_line == "black":
         return ranked
-    apart = 1 if state.setting.layout.channels == ("MONO",) else 2
+    apart = _apart(state)
     mixed, filtered = effect.lag_pixels % apart, effect.lag_pixels == apart and effect.fraction > 0
     other = _other(effect)
     if other is None or filtered or (effect.exchanges and not mixed):
@@ -74,7 +74,7 @@ def other_form(state: State, users: BaseNoise, effect: Effect) -> tuple[Effect, 
     """
     if not isinstance(effect, ReadoutMemory) or effect.before_line == "black":
         return None
-    apart = 1 if state.setting.layout.channels == ("MONO",) else 2
+    apart = _apart(state)
     other = _other(effect)
     if other is None or effect.lag_pixels % apart or effect.lag_pixels == apart:
         return None  # told otherwise, see `in_form`
@@ -88,6 +88,11 @@ def other_form(state: State, users: BaseNoise, effect: Effect) -> tuple[Effect, 
     calibrated = state.setting.calibrated(camera, state.calibrated)
     nearer = far_off(users, calibrated) < _NEARLY * far_off(users, state.calibrated)
     return (other, camera) if nearer or chance(users, calibrated) > HOLD else None
+
+
+def _apart(state: State) -> int:
+    """Return how far apart samples of one colour are, pixels."""
+    return 1 if state.setting.layout.channels == ("MONO",) else 2
 
 
 def _other(effect: ReadoutMemory) -> ReadoutMemory | None:

@@ -93,10 +93,9 @@ class WholeFrames(FramesAsked):
 
     def _other_phase(self, seen: "Look", frequency: Frequency, *, kept: bool) -> str | None:
         """Return why a line is none whose phase is kept, or is not; None: it may be."""
-        if kept and seen.kept is not False and seen.line is not None:
-            real = all((2 * f) % 1 == 0 for f in frequency)
-            if seen.line.of_any_size(real=real):
-                return _ANY_SIZE
+        line = seen.line if kept and seen.kept is not False else None
+        if line is not None and line.of_any_size(real=_is_real(frequency)):
+            return _ANY_SIZE
         if seen.kept is not None:
             kind = "bistable_pattern" if kept else "periodic_noise"
             return None if seen.kept == kept else _PHASE_WORDS[kind]
@@ -147,7 +146,7 @@ class WholeFrames(FramesAsked):
         power = 0.0 if seen.line is None else float(seen.line.excess[0])
         if seen.line is None or not power > _CLEAR_POWER * seen.line.error:
             return None
-        kept, real = effect.kind == "bistable_pattern", all((2 * f) % 1 == 0 for f in frequency)
+        kept, real = effect.kind == "bistable_pattern", _is_real(frequency)
         strength, error = seen.line.strength(power, kept=kept, real=real)
         # A cosine has a quarter of its power at +f; samples that are all real have all of it there.
         pixels = self.layout.rows * self.layout.columns
@@ -187,7 +186,7 @@ class WholeFrames(FramesAsked):
         power = 0.0 if line is None else float(line.excess[0])
         if line is None or not power > 0:
             return -np.inf
-        real = all((2 * f) % 1 == 0 for f in frequency)
+        real = _is_real(frequency)
         share = min(2 * np.pi * line.bins(power) ** 2, 1.0)
         anywhere = float(np.log(self.layout.rows * self.layout.columns / 2 / share))
         chosen = float(np.log(_FEW)) if kept and self._looks[frequency].exact else anywhere
@@ -291,7 +290,7 @@ def look(
     level = min(max(float(np.median(around.level[one])) for one in far), 1.0)
     among, around = own.above(ground, level), around.above(ground, level)
     own = own.above(max(ground, _wandering(layout, frames_of, (fx, fy))), level)
-    real = all((2 * f) % 1 == 0 for f in (fx, fy))
+    real = _is_real((fx, fy))
     bins = _FEW if exact else rows * columns / 2
     broad = False
     for i, axis in enumerate(axes):
@@ -318,6 +317,11 @@ def look(
     asked = zip(frequency, there, strict=True)
     x, y = (f if (2 * f) % 1 == 0 else (at + 0.5) % 1 - 0.5 for f, at in asked)
     return Look(absent, broad, kept, grows, own, crest, (x, y))
+
+
+def _is_real(frequency: Frequency) -> bool:
+    """Return whether all samples of a pattern are real: of none or half a cycle on either axis."""
+    return all((2 * f) % 1 == 0 for f in frequency)
 
 
 def _wandering(layout: Layout, frames_of: FramesOf, at: Frequency) -> float:

@@ -50,11 +50,14 @@ class Spread:
         standard error.
     gain
         Of log-likelihood beside equal dark currents, and noise up to a tenth larger, nats.
+    left
+        Share of the mean that is not of hot pixels.
     """
 
     log_sigma: float
     error: float
     gain: float
+    left: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -237,7 +240,7 @@ def _measured(asked: _Asked) -> Spread | None:
     error = _error(law, best.sigma) * max(_misfit(law, best), 1.0)
     sigma = of_all(best.sigma, best.left)
     error = hypot(error, moved - best.sigma) * sigma / best.sigma
-    return Spread(sigma, error, best.nats - equal)
+    return Spread(sigma, error, best.nats - equal, best.left if best.share else 1.0)
 
 
 def _count(pixels: Sequence[_Pixels]) -> float:

@@ -84,6 +84,31 @@ def test_a_glow_and_a_dark_current_have_the_mean_that_the_current_had() -> None:
     assert back.model_dump() == pytest.approx(current.model_dump())
 
 
+def test_hot_pixels_are_measured_anew_beside_dark_currents_that_differ() -> None:
+    """In place of those that had the warm ones; where none were measured, or users', they stay."""
+    few, many = (
+        effect("hot_pixels", pixel_fraction=share, mean_dn_per_s=mean)
+        for share, mean in ((0.01, 300.0), (0.02, 150.0))
+    )
+    current = effect("dark_current", dn_per_s=25.0, log_sigma=0.3)
+    errors = {"pixel_fraction": 0.001, "mean_dn_per_s": 30.0}
+    again = Proposal(few, (), errors=errors)
+    apart = Proposal(current, ("dn_per_s",), again=again)
+    assert together(camera(DARK, many), apart, 1, LAYOUT) == (camera(DARK), [apart, again])
+    users = camera(many, DARK)
+    assert together(users, apart, 2, LAYOUT) == (users, [apart])
+    assert together(users, Proposal(current, ()), 0, LAYOUT)[0] == users
+    both = joined(camera(DARK, many), (current, few), 1)
+    assert both is not None
+    named = [_named(many, "hot_pixels"), Named("dark_current", apart, {}, 9.0, ())]
+    kept = kept_up(named, both, 1)
+    assert kept[0].effect == few
+    assert kept[0].errors == errors
+    assert kept[0].proposal == again
+    bare = camera_without(both, [current], camera(DARK))
+    assert given_back(bare, current, 1, LAYOUT) == bare
+
+
 def test_without_bands_white_rows_have_all_the_variance_of_rows() -> None:
     """Simulated: no effect gains what a larger one that is there as well would explain."""
     bands = effect("row_banding", sigma_dn=0.4, length_rows=2.0)

@@ -91,6 +91,24 @@ def test_hot_pixels_beside_a_spread_are_both_found(beside_hot: Finding) -> None:
     assert not beside_hot.unexplained
 
 
+def test_hot_pixels_that_are_taken_in_first_give_back_what_a_spread_explains() -> None:
+    """Measured alone they are half as many again, and less hot: warm ones of the spread are none.
+
+    So they were named, beside a dark current without a spread.
+    """
+    found = find_mismatch(camera(), recording(0.3, 0.01), vocabulary=WORDS)
+    own = numbers(found)
+    planted = {
+        ("dark_current", "log_sigma"): 0.3,
+        ("hot_pixels", "pixel_fraction"): 0.01,
+        ("hot_pixels", "mean_dn_per_s"): 8000.0,
+    }
+    for (kind, name), true in planted.items():
+        value, error = own[kind][name]
+        assert abs(value - true) < 2 * error < 0.25 * true
+    assert not found.unexplained
+
+
 def test_equal_dark_currents_have_no_spread() -> None:
     """Hot pixels beside them are hot pixels, and the dark current has one number."""
     found = numbers(find_mismatch(camera(), recording(0.0, 0.004), vocabulary=WORDS))

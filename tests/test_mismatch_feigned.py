@@ -333,6 +333,16 @@ def test_trails_are_no_hot_pixels(share: float, trail: int, denied: bool, seed: 
     assert side_by_side(state, "dsnu") is None
 
 
+def test_pixels_of_a_glow_are_no_clusters() -> None:
+    """Nearly all that stand out have a neighbour that does, but not of what is around them."""
+    state = _warm(0.003, 1, 6)
+    image, _ = state.setting.seen.images["MONO", "time alone"]
+    y, x = np.mgrid[:ROWS, :COLUMNS]
+    image += 60 * np.exp(-np.hypot(y, x) / (0.2 * COLUMNS))
+    assert (image > 5).mean() > 0.05
+    assert side_by_side(state, "hot_pixels") is None
+
+
 def test_charge_that_hot_pixels_share_makes_no_clusters() -> None:
     state = _warm(0.003, 1, 5)
     image, _ = state.setting.seen.images["MONO", "time alone"]

@@ -3,9 +3,11 @@
 Offsets that rows share are row noise too. Where white row noise was taken in first it has all of
 their variance: beside it nothing that adds to that fits, until it gives some back. So have a filter
 and charge that neighbours share what the other correlates, and a dark current the mean of a glow.
+Hot pixels, taken in first, are too many where all dark currents differ.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from math import hypot, sqrt
 
 from analysis.mismatch.apart import as_far_apart
@@ -17,6 +19,7 @@ from analysis.mismatch.polish import with_effects
 from dsis.camera import Camera
 from dsis.effects import Effect
 from dsis.effects.amp_glow import AmpGlow
+from dsis.effects.hot_pixels import HotPixels
 
 _SIGMA, _SHARE, _RATE = "sigma_dn", "fraction", "dn_per_s"
 _MAY = frozenset(kind for own in CANDIDATES.values() for kind in own.credited)
@@ -36,6 +39,9 @@ def together(
     if place is None:
         return camera, [proposal]
     credited = camera.effect[place]
+    if isinstance(credited, HotPixels):
+        own = proposal.again
+        return (camera, [proposal]) if own is None else (_without(camera, place), [proposal, own])
     name = _size(credited)
     size, other = float(getattr(credited, name)), _part(proposal.effect, name, layout)
     left = sqrt(max(size**2 - other**2, 0.0)) if name == _SIGMA else size - other
@@ -53,13 +59,15 @@ def given_back(camera: Camera, effect: Effect, given: int, layout: Layout) -> Ca
     """Return a camera without an effect in which what was credited has its part again.
 
     Variances add, and means: no effect is to gain what another would explain without it. Shares do
-    not: of noise of light one has more of it, of all noise the other.
+    not: of noise of light one has more of it, of all noise the other. Hot pixels stay as they are.
     """
     place = _credited(camera, effect, given)
-    name = _SHARE if place is None else _size(camera.effect[place])
-    if place is None or name == _SHARE:
+    if place is None or isinstance(camera.effect[place], HotPixels):
         return camera
     credited = camera.effect[place]
+    name = _size(credited)
+    if name == _SHARE:
+        return camera
     size, other = float(getattr(credited, name)), _part(effect, name, layout)
     again = _of_size(credited, name, hypot(size, other) if name == _SIGMA else size + other)
     effects = (*camera.effect[:place], again, *camera.effect[place + 1 :])
@@ -67,14 +75,22 @@ def given_back(camera: Camera, effect: Effect, given: int, layout: Layout) -> Ca
 
 
 def kept_up(named: Sequence[Named], camera: Camera, given: int) -> list[Named]:
-    """Return the effects named as a camera has them, in which one may have given some back."""
-    return [_kept_up(one, camera.effect[given:]) if one.kind in _MAY else one for one in named]
+    """Return the effects named as a camera has them, in which one may have given some back.
+
+    Or was measured again: then its errors are the new ones.
+    """
+    again = [one.proposal.again for one in named if one.proposal and one.proposal.again]
+    own = camera.effect[given:]
+    return [_kept_up(one, own, again) if one.kind in _MAY else one for one in named]
 
 
-def _kept_up(named: Named, effects: Sequence[Effect]) -> Named:
+def _kept_up(named: Named, effects: Sequence[Effect], again: Sequence[Proposal]) -> Named:
     same = [own for own in effects if own.kind == named.kind]
     if named.proposal is None or named.proposal.effect in same or len(same) != 1:
         return named
+    anew = next((one for one in again if one.effect == same[0]), None)
+    if anew is not None:
+        return replace(named, proposal=anew, errors=dict(anew.errors))
     return renewed(named, named.proposal, same[0], named.errors)
 
 

@@ -170,11 +170,14 @@ def hot_laws(
     return laws
 
 
-def around(image: Array) -> Array:
-    """Return the median of the pixels around each; beyond the edges a map goes on as steeply."""
-    reach = _AROUND // 2
+def around(image: Array, size: int = _AROUND) -> Array:
+    """Return the median of the pixels around each; beyond the edges a map goes on as steeply.
+
+    `size` is that of the square, pixels: odd.
+    """
+    reach = size // 2
     padded = np.pad(image, reach, mode="reflect", reflect_type="odd")
-    return np.asarray(median_filter(padded, _AROUND)[reach:-reach, reach:-reach])
+    return np.asarray(median_filter(padded, size)[reach:-reach, reach:-reach])
 
 
 def _robust(pixels: Sequence[_Pixels]) -> float:

@@ -7,11 +7,13 @@ from numpy.typing import NDArray
 from scipy.stats import binom
 
 from analysis.mismatch.contradicted import Denial
+from analysis.mismatch.hotlaw import around
 from analysis.mismatch.state import State
 from dsis.measures.spikes import variance_of_quartiles
 
 Array = NDArray[np.float64]
-_ONE_BY_ONE = {"hot_pixels": ("time", "time alone"), "rts": ("variance",)}
+_HOT = "hot_pixels"
+_ONE_BY_ONE = {_HOT: ("time", "time alone"), "rts": ("variance",)}
 _STANDS_OUT = {"hot_pixels": 5.0, "rts": 8.0}  # variances of few frames scatter far above
 _ONE_BY_ONE_WHY = {
     "hot_pixels": "pixels that stand out with exposure time lie side by side",
@@ -19,6 +21,7 @@ _ONE_BY_ONE_WHY = {
 }
 _LIKE, _RARE = 0.3, 1e-6  # a share of a height; the chance of as many neighbours
 _MOST = 0.5  # of those that stand out
+_AROUND = 9  # pixels: most trails and clusters are smaller, and a glow is as bright beside a pixel
 
 
 def side_by_side(state: State, kind: str) -> Denial | None:
@@ -28,18 +31,24 @@ def side_by_side(state: State, kind: str) -> Denial | None:
     neighbour that does. Where most of those that stand out - of what grows with time, or of how
     noisy pixels are - have one, of a height like their own, and far more than that leaves, they are
     trails, clusters, or something that is written into the frames. Of a mosaic those of the sensor
-    count, or those of its channels.
+    count, or those of its channels. Hot pixels stand out of what is around them, be it a glow.
     """
     if kind not in _ONE_BY_ONE:
         return None
     planes = {
-        channel: heights(*own) for channel, own in first_maps(state, _ONE_BY_ONE[kind]).items()
+        channel: heights(_apart(image) if kind == _HOT else image, noise)
+        for channel, (image, noise) in first_maps(state, _ONE_BY_ONE[kind]).items()
     }
     shares = [_with_neighbours(list(planes.values()), _STANDS_OUT[kind])]
     if len(planes) > 1:
         shares.append(_with_neighbours([_mosaic(state, planes)], _STANDS_OUT[kind]))
     most = max((share for share in shares if share is not None), default=None)
     return None if most is None else Denial(1 - most, _ONE_BY_ONE_WHY[kind])
+
+
+def _apart(image: Array) -> Array:
+    """Return a map less the median around each pixel, where it is large enough for one."""
+    return image - around(image, _AROUND) if min(image.shape) > _AROUND else image
 
 
 def heights(image: Array, noise: float) -> Array:

@@ -29,6 +29,9 @@ class Proposal:
         What single pixels gain by the effect, nats, in place of counts of them; None: not asked.
     best_of
         How many were measured, of which this one explains most: one of its numbers says which.
+    again
+        An effect as it was measured anew beside this one, in place of the camera's own of its kind
+        that had a part of this one; None: nothing was.
     """
 
     effect: Effect
@@ -37,6 +40,7 @@ class Proposal:
     errors: Mapping[str, float] = field(default_factory=dict)
     of_pixels: float | None = None
     best_of: int = 1
+    again: "Proposal | None" = None
 
     @property
     def price(self) -> float:

@@ -7,13 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import median_abs_deviation
 
-from analysis.currentlaw import Body
+from analysis.currentlaw import Body, of_all
 from analysis.currentspread import CLEAR_GAIN, Spread, current_spread
 from analysis.mismatch.candidates.candidate import Candidate, Proposal, measured, proposals
 from analysis.mismatch.clues import Clues
 from analysis.mismatch.counted import Counted
-from analysis.mismatch.hotlaw import hot_laws
+from analysis.mismatch.hotlaw import HotLaw, hot_laws
 from dsis.effects.dark_current import MOST_APART, DarkCurrent
+from dsis.effects.hot_pixels import HotPixels
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -22,6 +23,7 @@ _RATE, _SPREAD = "dn_per_s", "log_sigma"
 _CLEAR = 5.0  # standard deviations of a pixel's summed variance
 _FEW = 0.1  # of all pixels
 _SEEN = 2  # frames, of which there are variances
+_LEAST_LEFT = 0.1  # of the mean: hot ones have not all of it
 
 
 def _dark_current(clues: Clues) -> Sequence[Proposal]:
@@ -36,9 +38,35 @@ def _dark_current(clues: Clues) -> Sequence[Proposal]:
     spread = current_spread_of(clues, rate)
     if spread is None or spread.log_sigma > MOST_APART:
         return found
-    of_pixels = spread.gain if _normal(clues) else None
+    again = _hot_again(clues, rate, spread)
+    of_pixels = spread.gain if again is not None or _normal(clues) else None
     values, errors = {_SPREAD: spread.log_sigma}, {_SPREAD: spread.error}
-    return [*found, *(replace(measured(own, values, errors), of_pixels=of_pixels) for own in found)]
+    if again is not None:
+        hot = again.effect.model_dump()
+        left = max(1 - hot[_NUMBERS[0]] * hot[_NUMBERS[1]] / rate, _LEAST_LEFT)
+        sigma = min(of_all(spread.log_sigma, 1 / left), MOST_APART)
+        values = {_RATE: rate * left, _SPREAD: sigma}
+        errors = {_SPREAD: spread.error * sigma / spread.log_sigma}
+    apart = (measured(own, values, errors) for own in found)
+    free = (_RATE,)
+    return [*found, *(replace(own, free=free, of_pixels=of_pixels, again=again) for own in apart)]
+
+
+def _hot_again(clues: Clues, rate: float, spread: Spread) -> Proposal | None:
+    """Return the camera's hot pixels as they are beside dark currents that differ; None: unknown.
+
+    Where these were not known yet, hot ones were measured with them: more, and less hot.
+    """
+    grown = _grown(clues)
+    if grown is None or not any(isinstance(own, HotPixels) for own in clues.camera.effect):
+        return None
+    images, scale = grown
+    mean = rate * spread.left
+    sigma = of_all(spread.log_sigma, 1 / spread.left)
+    body = Body(mean * scale, sigma, _shot(clues, mean))
+    noisy = {name: _noisy(clues, name, image / scale) for name, (image, _) in images.items()}
+    laws = [own for own in hot_laws(images, noisy, body) if own.share <= _FEW]
+    return _of_law(laws[0], scale) if laws and laws[0].gain > len(_NUMBERS) else None
 
 
 def dark_rate(clues: Clues) -> float | None:
@@ -121,15 +149,18 @@ def _hot(clues: Clues) -> Sequence[Proposal]:
     normal = bool(body) or _normal(clues)
     found: list[Proposal] = []
     for law in (own for own in hot_laws(images, noisy, body) if own.share <= _FEW):
-        if law.gain < len(_NUMBERS):
-            continue
-        values = dict(zip(_NUMBERS, (law.share, law.mean / scale), strict=True))
-        errors = dict(zip(_NUMBERS, (law.share_error, law.mean_error / scale), strict=True))
-        found += [
-            replace(measured(own, values, errors), of_pixels=law.gain if normal else None)
-            for own in proposals("hot_pixels", _NUMBERS, (), **values)
-        ]
+        own = _of_law(law, scale) if law.gain >= len(_NUMBERS) else None
+        if own is not None:
+            found.append(replace(own, of_pixels=law.gain if normal else None))
     return found
+
+
+def _of_law(law: HotLaw, scale: float) -> Proposal | None:
+    """Return hot pixels of a law that was measured; None: they are out of bounds."""
+    values = dict(zip(_NUMBERS, (law.share, law.mean / scale), strict=True))
+    errors = dict(zip(_NUMBERS, (law.share_error, law.mean_error / scale), strict=True))
+    found = proposals("hot_pixels", _NUMBERS, (), **values)
+    return measured(found[0], values, errors) if found else None
 
 
 def _grown(clues: Clues) -> tuple[Mapping[str, tuple[Array, float]], float] | None:
@@ -172,6 +203,11 @@ def _noisy(clues: Clues, channel: str, rate: Array) -> Mask:
 
 
 CANDIDATES = (
-    Candidate("dark_current", ("level", "pixel_variance"), _dark_current),
+    Candidate(
+        "dark_current",
+        ("level", "pixel_variance"),
+        _dark_current,
+        credited=frozenset({"hot_pixels"}),
+    ),
     Candidate("hot_pixels", ("outlying_pixels", "one_off_outliers", "fixed_pixel_variance"), _hot),
 )

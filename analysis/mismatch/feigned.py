@@ -68,6 +68,7 @@ _ALIKE_ROWS = frozenset({"row_correlation", "slow_row_variance"})
 _SHAPED = frozenset({"half_seam", "parity", STATISTIC})
 _NEIGHBOURS = frozenset({"fixed_correlation_0_1", "fixed_correlation_1_0", "fixed_patch_variance"})
 _MOST = 0.5  # of a pattern's variance, or of tails, that something else may feign
+_FINE = 0.25  # cycles per pixel
 _LONGEST = 1 / 8  # of a frame's rows, over which bands are taken to last
 
 
@@ -335,23 +336,30 @@ def coloured(state: State, kind: str) -> Denial | None:
     A pattern that is drawn anew for each pixel has the same power at all frequencies, as noise has.
     Where a wave is left unexplained, or that neighbours are alike, and half of the map's variance
     beyond noise, lines and smooth surfaces is of few frequencies, all pixels may be alike but for
-    it: the median bin knows of the many. By chance it differs from the mean of all bins by what its
-    own error is beyond theirs. Nor is it certain that all differ, where neighbours are alike and
-    the median bin does not say so.
+    it: the median bin knows of the many, and where no noise of frames is alike in neighbours, which
+    may be of a filter, so do the finest waves. By chance these differ from the mean of all bins by
+    what their own error is beyond its. Nor is it certain that all differ, where neighbours are
+    alike and the median bin does not say so.
     """
     called = {m.statistic for m in state.mismatches} & {FIXED_WAVE, *_NEIGHBOURS}
     if kind not in _MAPS or not called:
         return None
-    plain, most, square = 0.0, 0.0, 0.0
+    plain, most, fine, square, of_fine = 0.0, 0.0, 0.0, 0.0, 0.0
     for image, noise in first_maps(state, _MAPS[kind]).values():
         part = parts(image, noise)
         power = np.abs(np.fft.rfft2(part.pixels)[1:, 1:-1]) ** 2 / image.size
+        finest = _finest(power, image.shape)
         plain += part.square - 1
         most += white_level(power, 1) - 1
+        fine += float(finest.mean()) - 1
         square += 2 / image.size
+        of_fine += 1 / finest.size
     error, beyond = square**0.5 / log(2), (square * (1 / log(2) ** 2 - 1)) ** 0.5
     few = most < _MOST * plain and plain - most >= _SURE * beyond
-    unsure = most < _SURE * error and kind in _OF_ALL and not called.isdisjoint(_NEIGHBOURS)
+    alike = kind in _OF_ALL and not called.isdisjoint(_NEIGHBOURS)
+    if not few and alike and fine < _MOST * plain and not _noise_alike(state):
+        few, most = plain - fine >= _SURE * (of_fine - square) ** 0.5, fine
+    unsure = most < _SURE * error and alike
     if plain <= 0 or not (few or unsure):
         return None
     if not few:
@@ -359,3 +367,14 @@ def coloured(state: State, kind: str) -> Denial | None:
         return Denial(float(np.clip(most / (_SURE * error), 0.0, 1.0)), why)
     why = "a wave that stands still makes" if FIXED_WAVE in called else "neighbours have in common"
     return Denial(max(most / plain, 0.0), f"{why} most of what it would explain")
+
+
+def _finest(power: Array, shape: tuple[int, int]) -> Array:
+    """Return the power of waves of less than four pixels along rows and columns: (bin,)."""
+    down, across = np.abs(np.fft.fftfreq(shape[0])[1:]), np.fft.rfftfreq(shape[1])[1:-1]
+    return np.asarray(power[np.ix_(down > _FINE, across > _FINE)].ravel())
+
+
+def _noise_alike(state: State) -> bool:
+    """Return whether noise of neighbours is left alike: what makes it so may blur patterns, too."""
+    return any(m.statistic.startswith("correlation_") for m in state.mismatches)

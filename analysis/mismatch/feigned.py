@@ -15,6 +15,7 @@ from analysis.mismatch.bank.standing import NAME as FIXED_WAVE
 from analysis.mismatch.contradicted import Denial, rival
 from analysis.mismatch.displaced import displaced
 from analysis.mismatch.edged import STATISTIC, edged, single
+from analysis.mismatch.fading import fading
 from analysis.mismatch.feignedtails import (
     clamped,
     coded,
@@ -97,6 +98,7 @@ def of_another(state: State, effect: Effect, without: Array) -> Denial | None:
         or warm_spots(state, effect)
         or jumped(state, effect)
         or wandering(state, effect)
+        or fading(state, effect)
         or of_pink_noise(state, effect)
         or flat_columns(state, effect)
         or unequal(state, effect, without)

@@ -30,7 +30,7 @@ def _denied(
     }
     asked: list[list[Effect]] = []
 
-    def means_of(lines: Any, lit: Any, effects: Any, light: Any) -> dict[str, FrameMeans]:
+    def means_of(_: Any, lit: Any, effects: Any, light: Any) -> dict[str, FrameMeans]:
         asked.append(list(effects))
         return {own.name: means[own.name] for own in lit if light(own.name) > 0}
 

@@ -4,8 +4,8 @@ import pytest
 from scipy.stats import norm
 
 from analysis.mismatch import find_mismatch
-from dsis.effects import registry
-from mismatch_recordings import camera, recorded
+from dsis.effects import Effect, registry
+from mismatch_recordings import camera, recorded, setting_of
 
 pytestmark = pytest.mark.usefixtures("unproven")
 
@@ -52,3 +52,27 @@ def test_tails_beside_coarse_codes_that_the_model_has_are_named() -> None:
     unmodelled = camera(segments=parts)  # steps finer than the noise leave its shape
     found = find_mismatch(unmodelled, recording, seed=1, vocabulary=TAILS)
     assert [one.effect for one in found.omitted_physics] == ["heavy_tailed_read_noise"]
+
+
+@pytest.mark.parametrize(
+    "effects",
+    [
+        (),
+        (registry()["spatial_filtering"](fraction=0.04),),
+        (registry()["row_noise"](sigma_dn=1.2),),
+        (registry()["spatial_filtering"](fraction=0.04), registry()["row_noise"](sigma_dn=1.2)),
+    ],
+)
+def test_read_noise_is_told_of_what_coarse_codes_leave_of_all_noise(
+    effects: tuple[Effect, ...],
+) -> None:
+    """A filter takes a quarter of it, before codes round what is left.
+
+    Offsets of rows move pixels of a row towards another code, and are no noise of pixels.
+    """
+    true = camera(CODES, *effects, segments=((0.5, INTERCEPT, None),))
+    recording = recorded(true, 7, rows=96, columns=128, levels=LEVELS)
+    users = camera(CODES, *effects, segments=((0.5, 1.3 * INTERCEPT, None),))
+    (piece,) = setting_of(recording).calibrated(users).fit.pieces
+    assert abs(piece.intercept - INTERCEPT) < 4 * piece.intercept_error
+    assert piece.intercept_error < 0.02 * INTERCEPT

@@ -80,8 +80,9 @@ def kept_up(named: Sequence[Named], camera: Camera, given: int) -> list[Named]:
     Or was measured again: then its errors are the new ones.
     """
     again = [one.proposal.again for one in named if one.proposal and one.proposal.again]
-    own = camera.effect[given:]
-    return [_kept_up(one, own, again) if one.kind in _MAY else one for one in named]
+    return [
+        _kept_up(one, camera.effect[given:], again) if one.kind in _MAY else one for one in named
+    ]
 
 
 def _kept_up(named: Named, effects: Sequence[Effect], again: Sequence[Proposal]) -> Named:

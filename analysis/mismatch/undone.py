@@ -24,14 +24,15 @@ _STEP, _FLAT = 1e-3, 1e-2  # codes; by how much less than a level its mean code 
 
 
 def narrow(levels: Mapping[Place, Level], codes: Codes, *, spiky: bool) -> bool:
-    """Return whether noise is so narrow beside whole codes that each pixel is rounded by itself.
+    """Return whether noise is so narrow beside codes that each pixel is rounded by itself.
 
     That of the many where recordings are `spiky`. Or so near to code 0 that each is cut off there
     by itself.
     """
     squares = (own.bulk_dn2 if spiky else own.variance_dn2 for own in levels.values())
-    some = any(0 < square < NARROW for square in squares) or any(map(_clipped, levels.values()))
-    return codes == WHOLE and some
+    most = NARROW * codes[0] ** 2
+    cut = codes == WHOLE and any(map(_clipped, levels.values()))
+    return cut or any(0 < square < most for square in squares)
 
 
 def _clipped(level: Level) -> bool:
@@ -50,10 +51,10 @@ def undone(
 ) -> Offsets:
     """Return what rounding, and effects before it, added to recorded levels and variances.
 
-    Where noise is narrow rounding to whole codes is undone of what is left without the effects. Two
-    codes say nothing of the noise: where they hide it, or rounding cannot be undone, the level is
-    that of which the camera's own noise makes the mean code. Beside coarser steps nothing is said
-    of that: the camera's numbers may be those from before the steps were known.
+    Where noise is narrow rounding is undone of what is left without the effects. Two codes say
+    nothing of the noise: where they hide it, or rounding cannot be undone, the level is that of
+    which the camera's own noise makes the mean code. Beside coarser steps nothing is said of that:
+    the camera's numbers may be those from before the steps were known.
 
     Parameters
     ----------
@@ -78,7 +79,7 @@ def undone(
         mean = level.level_dn + layout.black_dn
         square = level.bulk_dn2 if spiky else level.variance_dn2
         # Rounding is no sum: narrow noise that is wider by an effect is rounded, or cut, as that.
-        alone = whole and (square - more < NARROW or _clipped(level))
+        alone = square - more < NARROW * codes[0] ** 2 or (whole and _clipped(level))
         first = (bent, more) if alone else (0.0, 0.0)
         own = mean - first[0], max(square - first[1], 0.0)
         before, variance, stretch[place], wider[place] = unrounded(*own, white, *codes)

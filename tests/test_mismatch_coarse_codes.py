@@ -5,7 +5,7 @@ from scipy.stats import norm
 
 from analysis.mismatch import find_mismatch
 from dsis.effects import Effect, registry
-from mismatch_recordings import camera, recorded, setting_of
+from mismatch_recordings import camera, recorded, setting_of, state_of
 
 pytestmark = pytest.mark.usefixtures("unproven")
 
@@ -76,3 +76,20 @@ def test_read_noise_is_told_of_what_coarse_codes_leave_of_all_noise(
     (piece,) = setting_of(recording).calibrated(users).fit.pieces
     assert abs(piece.intercept - INTERCEPT) < 4 * piece.intercept_error
     assert piece.intercept_error < 0.02 * INTERCEPT
+
+
+def test_what_coarse_codes_add_is_no_shot_noise() -> None:
+    """Half a step above a code every dark pixel is on either of two, whatever its noise."""
+    true = camera(
+        registry()["quantisation"](step_dn=16.0, phase_dn=8.0), segments=((0.5, 9.0, None),)
+    )
+    recording = recorded(true, 8, rows=64, columns=64, levels=(30.0, 900.0))
+    state = state_of(recording, true)
+    dn2 = {
+        exposure: level.variance_dn2 for (exposure, _), level in state.setting.seen.levels.items()
+    }
+    assert dn2["dark-0"] > 50.0
+    shares = {exposure: state.clues().shot_share((exposure, "MONO")) for exposure in dn2}
+    assert shares["dark-0"] == shares["dark-1"] == 0.0
+    for exposure, signal_dn in (("flat-0", 30.0), ("flat-1", 900.0)):
+        assert shares[exposure] == pytest.approx(0.5 * signal_dn / dn2[exposure], rel=0.15)

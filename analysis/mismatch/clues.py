@@ -15,6 +15,7 @@ from analysis.mismatch.null import Null
 from analysis.mismatch.observe import Observation
 from analysis.mismatch.vector import Vector
 from dsis.camera import Camera
+from dsis.effects.quantisation import Quantisation
 from dsis.effects.rts import Rts
 from dsis.measures.fixed_pattern import Smooth
 
@@ -68,10 +69,17 @@ class Clues:
         return max(self.fit.signal_dn[place], 0.0)
 
     def shot_share(self, place: Place) -> float:
-        """Return the share of shot noise in the pixel variance."""
+        """Return the share of shot noise in the pixel variance.
+
+        All but the read noise, and where codes are coarse, which add more, no more than the model
+        has of it.
+        """
         total = max(self.seen.levels[place].variance_dn2, 1e-9)
-        dark = float(self.fit.line_dn2(np.zeros(1))[0])
-        return float(np.clip(1 - max(dark, 0.0) / total, 0.0, 1.0))
+        dark, here = self.fit.line_dn2(np.array([0.0, self.signal(place)])).tolist()
+        light = total - max(dark, 0.0)
+        if any(isinstance(own, Quantisation) for own in self.camera.effect):
+            light = min(light, here - dark)
+        return float(np.clip(light / total, 0.0, 1.0))
 
     def read_share(self, place: Place) -> float:
         """Return the share of everything else."""

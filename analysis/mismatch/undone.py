@@ -17,6 +17,7 @@ Codes = tuple[float, float]
 """Step between codes, and the lowest code, its phase, DN."""
 WHOLE: Codes = (1.0, 0.0)
 NARROW = 1 / 3  # codes^2, recorded: of half a code of noise between two codes
+_COARSE = 0.45  # steps^2: of 0.6 steps, for the core of noise with tails is half as wide
 _NEAR = 0.75  # codes from its mean code within which a level lies
 _CHANCE = 4.0  # standard errors
 _NONE, _LEAST = 1e-4, 1e-9  # codes^2 and DN: none to speak of
@@ -30,9 +31,13 @@ def narrow(levels: Mapping[Place, Level], codes: Codes, *, spiky: bool) -> bool:
     by itself.
     """
     squares = (own.bulk_dn2 if spiky else own.variance_dn2 for own in levels.values())
-    most = NARROW * codes[0] ** 2
     cut = codes == WHOLE and any(map(_clipped, levels.values()))
-    return cut or any(0 < square < most for square in squares)
+    return cut or any(0 < square < _narrow(codes) for square in squares)
+
+
+def _narrow(codes: Codes) -> float:
+    """Return below which recorded variance noise is narrow beside codes, DN^2."""
+    return NARROW if codes == WHOLE else _COARSE * codes[0] ** 2
 
 
 def _clipped(level: Level) -> bool:
@@ -79,7 +84,7 @@ def undone(
         mean = level.level_dn + layout.black_dn
         square = level.bulk_dn2 if spiky else level.variance_dn2
         # Rounding is no sum: narrow noise that is wider by an effect is rounded, or cut, as that.
-        alone = square - more < NARROW * codes[0] ** 2 or (whole and _clipped(level))
+        alone = square - more < _narrow(codes) or (whole and _clipped(level))
         first = (bent, more) if alone else (0.0, 0.0)
         own = mean - first[0], max(square - first[1], 0.0)
         before, variance, stretch[place], wider[place] = unrounded(*own, white, *codes)

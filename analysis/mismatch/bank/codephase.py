@@ -23,7 +23,7 @@ LABEL, DETAIL, KIND = "code_imbalance of powers of two", "powers of two", "codes
 _PERIOD = 64  # codes
 _LEAK = 11.0  # minus the logarithm of the density that is left: of 1e6 samples, a tenth of chance
 _LEAST = 1e4  # samples
-_PILED = 5.0  # standard errors by which noise leans to lower codes
+_PILED = 5.0  # standard errors by which noise leans to lower codes, or has tails
 
 
 class CodePhases:
@@ -44,7 +44,8 @@ class CodePhases:
     def add(self, channels: Mapping[str, Channel]) -> None:
         """Take one exposure; not a channel whose codes are clipped, or coarse, or pile up.
 
-        At a full well noise is narrower than it is elsewhere, and leans to lower codes.
+        At a full well noise is narrower than it is elsewhere, and leans to lower codes. What noise
+        with tails covers hangs on its law: the core is narrower than its variance says.
         """
         cycles = np.arange(1, _PERIOD // 2 + 1) / _PERIOD
         for channel in channels.values():
@@ -52,8 +53,8 @@ class CodePhases:
             cut = channel.clipped_low + channel.clipped_high
             if codes is None or cut != 0 or codes.lattice is None or codes.lattice.step != 1:
                 continue
-            leaning = channel.estimates["skewness"]
-            if leaning.departure < -_PILED:
+            leaning, tailed = (channel.estimates[own].departure for own in ("skewness", "kurtosis"))
+            if leaning < -_PILED or tailed > _PILED:
                 continue
             covered = 2 * pi**2 * variance * cycles**2 >= _LEAK
             folded = np.bincount(

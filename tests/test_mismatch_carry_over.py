@@ -30,6 +30,8 @@ from analysis.mismatch.taking import layout_of
 from dsis.camera import read_camera
 from dsis.recording import read_recording
 from exposing import effect
+from mismatch_recordings import camera as plain
+from mismatch_recordings import recorded
 
 pytestmark = pytest.mark.usefixtures("unproven")
 
@@ -232,6 +234,24 @@ def test_in_a_mosaic_it_is_named_with_its_numbers(tmp_path: Path) -> None:
         parameter = own.parameters[name]
         assert abs(parameter.value - truth) < 4 * parameter.standard_error  # type: ignore[operator] # fitted
     assert own.heldout_gain.ci95[0] > 0
+
+
+def test_beside_memory_of_the_noise_a_residue_is_told_by_what_follows_codes() -> None:
+    """What both make alike is left, for a filter may as well: neither of these is claimed."""
+    residue = effect("adc_memory", period_codes=64, at_code=39.0, step_dn=1.5, along="rows")
+    own = {"fraction": 0.03, "lag_pixels": 1, "along": "rows", "remembers": "noise"}
+    memory = effect("readout_memory", **own)
+    parts = ((0.5, 9.0, None),)
+    levels = 100.0, 500.0, 1500.0, 3000.0
+    true = plain(residue, memory, segments=parts)
+    recording = recorded(true, 3, rows=96, columns=100, frames=10, levels=levels)
+    words = frozenset({"adc_memory", *RIVALS})
+    found = find_mismatch(plain(segments=parts), recording, seed=5, vocabulary=words)
+    assert [e.effect for e in found.omitted_physics] == ["adc_memory"]
+    step = found.omitted_physics[0].parameters["step_dn"]
+    assert abs(step.value - 1.5) < 2 * step.standard_error  # type: ignore[operator] # fitted
+    assert {e.effect for e in found.undecided} >= {"spatial_filtering", "readout_memory"}
+    assert "carry_over" not in {m.statistic for m in found.unexplained}
 
 
 def test_levels_that_are_off_call_for_a_trial(tmp_path: Path) -> None:

@@ -18,7 +18,7 @@ from analysis.mismatch.nopath import no_path
 from analysis.mismatch.otherlags import alike
 from analysis.mismatch.predict import Predictor
 from analysis.mismatch.rank import LEAST_GAIN
-from analysis.mismatch.resolved import locates, resolved
+from analysis.mismatch.resolved import carries, locates, resolved
 from analysis.mismatch.standout import side_by_side
 from analysis.mismatch.state import State
 from analysis.mismatch.unmet import mirrored, unmet
@@ -179,7 +179,7 @@ class Judge:
             return share, NEEDLESS
         # Where others have pixels that stand out, too, counts of them say whose they are.
         alone = named.of_pixels and predictor.counts.normal(mean)
-        alone = alone or self._steps(named)
+        alone = alone or self._steps(named) or self._carries(named, mean)
         if share < _RESOLVED and not (named.measured or alone):
             return share, f"{LITTLE} {max(share, 0):.0%} of what it changes"
         if named.kind not in LINES and not locates(self.state, mean):  # frames show lines
@@ -195,6 +195,10 @@ class Judge:
         if named.kind != "quantisation":
             return False
         return all(m.statistic != "code_spacing" for m in self.state.mismatches)
+
+    def _carries(self, named: Named, without: Array) -> bool:
+        """Return whether an effect is a residue, and all that follows codes is explained by it."""
+        return named.kind == "adc_memory" and carries(self.state, without)
 
 
 def _verdict(denial: Denial | None) -> Verdict | None:

@@ -20,6 +20,7 @@ FAR_OFF = 8.0  # standard deviations that no chance has
 _MOST_OF, LEAST_CHANGE = 0.7, 1.0  # few simulations show of none as much as the second
 _OPEN = 8.0  # standard errors
 MINOR = 0.3  # share of a departure
+_CARRY = "carry_over"
 _LEFT = 0.5  # of a departure may be left where it is explained
 
 
@@ -138,3 +139,17 @@ def differ(before: Sequence[Mismatch], now: Sequence[Mismatch]) -> bool:
         m.statistic not in sure or (m.p_adjusted < SURE_CHANCE and not sure[m.statistic])
         for m in now
     )
+
+
+def carries(state: State, without: Array) -> bool:
+    """Return whether samples follow the codes before them for certain, but for what explains it.
+
+    `without` are the numbers predicted without that: a converter's residue. Nothing else makes a
+    sample follow codes in periods; how alike neighbours are in all, which it changes as well,
+    others make, too.
+    """
+    if any(m.statistic == _CARRY for m in state.mismatches):
+        return False
+    _, off = off_without(state, without)
+    own = [key.statistic == _CARRY for key in state.vector.keys]
+    return bool(off[: len(own)][own].any())

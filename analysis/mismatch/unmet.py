@@ -6,7 +6,15 @@ from numpy.typing import NDArray
 from analysis.mismatch.candidates import CANDIDATES
 from analysis.mismatch.contradicted import Denial
 from analysis.mismatch.locate import FAMILY
-from analysis.mismatch.resolved import CLEAR, LEAST_CHANGE, MINOR, changed, clearly, off_without
+from analysis.mismatch.resolved import (
+    CLEAR,
+    LEAST_CHANGE,
+    MINOR,
+    carries,
+    changed,
+    clearly,
+    off_without,
+)
 from analysis.mismatch.state import State
 from analysis.mismatch.words import statistic_words
 from dsis.effects import Effect, registry
@@ -30,11 +38,11 @@ _LEFT = 0.5  # of what calls for an effect, that may stay where it is explained
 def unmet(state: State, effect: Effect, without: Array, *, shown: bool = False) -> Denial | None:
     """Return how an effect is denied by what calls for it; None: it is not.
 
-    `without` are the numbers predicted without the effect; `shown`: maps show what numbers need
-    not.
+    A residue of the code before is not, where all that follows codes is explained by it. `without`
+    are the numbers predicted without the effect; `shown`: maps show what numbers need not.
     """
     kind = effect.kind
-    if kind not in CANDIDATES:
+    if kind not in CANDIDATES or (isinstance(effect, AdcMemory) and carries(state, without)):
         return None
     known = set(CANDIDATES[kind].calls)
     if "level" not in registry()[kind].measures:

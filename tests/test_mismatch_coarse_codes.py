@@ -78,6 +78,19 @@ def test_read_noise_is_told_of_what_coarse_codes_leave_of_all_noise(
     assert piece.intercept_error < 0.02 * INTERCEPT
 
 
+@pytest.mark.parametrize("start", [0.5, 3.0])
+def test_of_a_strong_filter_before_coarse_codes_it_is_told_wherever_one_starts(
+    start: float,
+) -> None:
+    """Where a third is left of it, half a step wide before: it was 9 to 11, as the user's was."""
+    strong = registry()["spatial_filtering"](fraction=0.1)
+    true = camera(CODES, strong, segments=((0.5, INTERCEPT, None),))
+    recording = recorded(true, 7, rows=96, columns=128, levels=LEVELS)
+    users = camera(CODES, strong, segments=((0.5, start * INTERCEPT, None),))
+    (piece,) = setting_of(recording).calibrated(users).fit.pieces
+    assert piece.intercept == pytest.approx(INTERCEPT, rel=0.015)
+
+
 def test_what_coarse_codes_add_is_no_shot_noise() -> None:
     """Half a step above a code every dark pixel is on either of two, whatever its noise."""
     true = camera(

@@ -8,6 +8,7 @@ import pytest
 from scipy.ndimage import gaussian_filter
 
 from analysis.mismatch.feigned import coloured
+from exposing import effect
 
 
 @pytest.mark.parametrize("shape", [(40, 60), (61, 97), (96, 128)])
@@ -25,6 +26,7 @@ def test_what_neighbours_have_in_common_is_no_pattern_of_single_pixels(
     state: Any = SimpleNamespace(
         setting=SimpleNamespace(seen=SimpleNamespace(images={("MONO", "offset"): (image, 1.0)})),
         mismatches=[SimpleNamespace(statistic="fixed_correlation_0_1")],
+        camera=SimpleNamespace(effect=()),
     )
     assert (coloured(state, "dsnu") is not None) == denied
     assert coloured(state, "prnu") is None
@@ -48,6 +50,7 @@ def test_of_a_field_that_falls_slowly_the_finest_waves_have_little(
     state: Any = SimpleNamespace(
         setting=SimpleNamespace(seen=SimpleNamespace(images={("MONO", "gain"): (image, 1.0)})),
         mismatches=[SimpleNamespace(statistic=name) for name in names],
+        camera=SimpleNamespace(effect=()),
     )
     assert (coloured(state, "prnu") is not None) == denied
 
@@ -66,7 +69,41 @@ def test_beside_alike_neighbours_single_pixels_must_be_seen_by_themselves(
                 seen=SimpleNamespace(images={("MONO", "offset"): (image, 1.0)})
             ),
             mismatches=[SimpleNamespace(statistic=left)],
+            camera=SimpleNamespace(effect=()),
         )
         found.append(coloured(state, "dsnu") is not None)
     assert (sum(found) > 15) == (denied and left == "fixed_patch_variance")
     assert denied or not any(found)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_beside_a_filter_of_the_model_the_finest_waves_say_nothing(seed: int) -> None:
+    """It smooths pattern and noise: of white ones next to nothing is left of these."""
+    rng, shape = np.random.default_rng(seed), (96, 128)
+    white = np.hypot(1.0, 1.5) * rng.normal(0, 1, shape)
+    beside = sum(np.roll(white, by, axis) for by in (-1, 1) for axis in (0, 1))
+    image = 0.6 * white + 0.1 * beside + 0.3 * gaussian_filter(rng.normal(0, 1, shape), 3.0) / 0.1
+    image /= np.sqrt(0.36 + 4 * 0.01)  # of the noise, filtered as well
+    known = effect("spatial_filtering", fraction=0.1)
+    state: Any = SimpleNamespace(
+        setting=SimpleNamespace(seen=SimpleNamespace(images={("MONO", "offset"): (image, 1.0)})),
+        mismatches=[SimpleNamespace(statistic="fixed_patch_variance")],
+        camera=SimpleNamespace(effect=(known,)),
+    )
+    with_filter = coloured(state, "dsnu")
+    state.camera.effect = ()
+    assert coloured(state, "dsnu") is not None
+    assert with_filter is None
+
+
+def test_of_few_columns_there_are_no_finest_waves() -> None:
+    rng = np.random.default_rng(2)
+    image = gaussian_filter(rng.normal(0, 1, (64, 5)), 1.5) * 8 + rng.normal(0, 1, (64, 5))
+    state: Any = SimpleNamespace(
+        setting=SimpleNamespace(seen=SimpleNamespace(images={("MONO", "offset"): (image, 1.0)})),
+        mismatches=[SimpleNamespace(statistic="fixed_patch_variance")],
+        camera=SimpleNamespace(effect=()),
+    )
+    with np.errstate(all="raise"):
+        found = coloured(state, "dsnu")
+    assert found is None or 0 <= found.share <= 1

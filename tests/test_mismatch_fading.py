@@ -1,5 +1,6 @@
 """Light that falls or rises from frame to frame is no flicker, which is new in each."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -19,20 +20,29 @@ FLICKER = effect("flicker", sigma_percent=0.4)
 
 
 def _denied(
-    gains: NDArray[np.float64], monkeypatch: pytest.MonkeyPatch, *others: Effect, seed: int = 0
+    gains: NDArray[np.float64],
+    monkeypatch: pytest.MonkeyPatch,
+    *others: Effect,
+    seed: int = 0,
+    left: tuple[str, ...] = (),
+    dark_dn: float = 0.0,
 ) -> bool:
-    """Return whether flicker is denied by frames of some gains: (exposure, frame)."""
+    """Return whether flicker is denied by frames of some gains: (exposure, frame).
+
+    The dark's mean falls by `dark_dn` from frame to frame; `left` are unexplained statistics.
+    """
     rng = np.random.default_rng(seed)
     numbers = np.arange(float(FRAMES))
     means = {
         name: FrameMeans(numbers, signal * own + 0.02 * rng.standard_normal(FRAMES), NEW_DN2)
         for (name, signal), own in zip(SIGNALS.items(), gains, strict=True)
     }
+    means["dark"] = replace(means["dark"], means=means["dark"].means - dark_dn * numbers)
     asked: list[list[Effect]] = []
 
-    def means_of(_: Any, lit: Any, effects: Any, light: Any) -> dict[str, FrameMeans]:
+    def means_of(_: Any, some: Any, effects: Any, light: Any) -> dict[str, FrameMeans]:
         asked.append(list(effects))
-        return {own.name: means[own.name] for own in lit if light(own.name) > 0}
+        return {own.name: means[own.name] for own in some if own.kind == "dark" or light(own.name)}
 
     monkeypatch.setattr(module, "means_of", means_of)
     uniform = [SimpleNamespace(name=name, kind=name[:4]) for name in SIGNALS]
@@ -41,6 +51,7 @@ def _denied(
     state: Any = SimpleNamespace(
         setting=SimpleNamespace(layout=layout, seen=SimpleNamespace(lines={})),
         camera=SimpleNamespace(effect=(FLICKER, *others)),
+        mismatches=[SimpleNamespace(statistic=name) for name in left],
         calibrated=SimpleNamespace(fit=SimpleNamespace(signal_dn=signal_dn)),
     )
     found = fading(state, FLICKER) is not None
@@ -55,7 +66,11 @@ def test_light_that_falls_in_each_exposure_is_no_flicker(
     gains = 1 + change * np.tile(np.arange(FRAMES), (len(SIGNALS), 1))
     assert _denied(gains, monkeypatch)
     drift = effect("black_level_drift", sigma_dn=1.0, persistence=0.9)
-    assert not _denied(gains, monkeypatch, drift)  # which may be what persists
+    lag = effect("image_lag", fraction=0.4)
+    for other in (drift, lag):
+        assert not _denied(gains, monkeypatch, other)  # which may be what persists
+    assert not _denied(gains, monkeypatch, left=("frame_correlation",))
+    assert not _denied(gains, monkeypatch, dark_dn=1.0)
 
 
 def test_a_gain_that_is_new_in_each_frame_is_believed(monkeypatch: pytest.MonkeyPatch) -> None:

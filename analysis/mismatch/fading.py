@@ -1,12 +1,13 @@
 """Light that changes slowly: it is no flicker, which is new in each frame."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from analysis.mismatch.contradicted import Denial, rival
 from analysis.mismatch.framewalk import means_of, walk_of
-from analysis.mismatch.rank import SURE_GAIN
+from analysis.mismatch.rank import SURE_GAIN, TOLD_APART
 from analysis.mismatch.state import State
 from dsis.effects import Effect
 from dsis.effects.black_level_drift import BlackLevelDrift
@@ -19,13 +20,13 @@ def fading(state: State, effect: Effect) -> Denial | None:
     A lamp that warms up, or a gain that falls as a sensor does, moves the means of frames by shares
     of the light, and each follows the one before. Where all lit frames, each mean as a share of its
     exposure's, are for certain likelier with gains that persist than with new ones, these are none
-    of a flicker. An offset of the camera's that wanders may persist as well: beside one nothing is
-    said.
+    of a flicker. Nothing is said where something else may persist: an offset that wanders, in the
+    model or in darks, or charge that stays.
     """
     if not isinstance(effect, Flicker):
         return None
     others = [own for own in state.camera.effect if not isinstance(own, Flicker)]
-    if any(isinstance(own, BlackLevelDrift) for own in others):
+    if _persistent(state, others):
         return None
     layout, signal = state.setting.layout, state.calibrated.fit.signal_dn
 
@@ -42,3 +43,15 @@ def fading(state: State, effect: Effect) -> Denial | None:
     if walk is None or walk.gain < SURE_GAIN:
         return None
     return rival(walk.gain, "the light of a frame is near that of the frame before")
+
+
+def _persistent(state: State, effects: Sequence[Effect]) -> bool:
+    """Return whether means of frames may persist whatever the light does."""
+    if any(isinstance(own, BlackLevelDrift) or own.looks_back for own in effects):
+        return True
+    if any(m.statistic == "frame_correlation" for m in state.mismatches):
+        return True
+    darks = [own for own in state.setting.layout.uniform if own.kind == "dark"]
+    means = means_of(state.setting.seen.lines, darks, effects, lambda _: 0.0)
+    walk = walk_of(list(means.values())) if means else None
+    return walk is not None and walk.gain > TOLD_APART

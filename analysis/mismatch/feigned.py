@@ -1,6 +1,7 @@
 """Patterns and pixels that something else feigns: alike frames, halves, dark current."""
 
-from math import log
+from collections.abc import Sequence
+from math import inf, log
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,6 +71,7 @@ _SHAPED = frozenset({"half_seam", "parity", STATISTIC})
 _NEIGHBOURS = frozenset({"fixed_correlation_0_1", "fixed_correlation_1_0", "fixed_patch_variance"})
 _MOST = 0.5  # of a pattern's variance, or of tails, that something else may feign
 _FINE = 0.25  # cycles per pixel
+_CORRELATION = "correlation_"
 _LONGEST = 1 / 8  # of a frame's rows, over which bands are taken to last
 
 
@@ -346,21 +348,22 @@ def coloured(state: State, kind: str) -> Denial | None:
     called = {m.statistic for m in state.mismatches} & {FIXED_WAVE, *_NEIGHBOURS}
     if kind not in _MAPS or not called:
         return None
-    plain, most, fine, square, of_fine = 0.0, 0.0, 0.0, 0.0, 0.0
+    plain, most, square = 0.0, 0.0, 0.0
+    powers = []
     for image, noise in first_maps(state, _MAPS[kind]).values():
         part = parts(image, noise)
         power = np.abs(np.fft.rfft2(part.pixels)[1:, 1:-1]) ** 2 / image.size
-        finest = _finest(power, image.shape)
+        powers.append((power, image.shape))
         plain += part.square - 1
         most += white_level(power, 1) - 1
-        fine += float(finest.mean()) - 1
         square += 2 / image.size
-        of_fine += 1 / finest.size
     error, beyond = square**0.5 / log(2), (square * (1 / log(2) ** 2 - 1)) ** 0.5
     few = most < _MOST * plain and plain - most >= _SURE * beyond
     alike = kind in _OF_ALL and not called.isdisjoint(_NEIGHBOURS)
-    if not few and alike and fine < _MOST * plain and not _noise_alike(state):
-        few, most = plain - fine >= _SURE * (of_fine - square) ** 0.5, fine
+    if alike and not few and not _noise_alike(state):
+        fine, of_fine = _finest(powers)
+        if fine < _MOST * plain and plain - fine >= _SURE * max(of_fine - square, 0.0) ** 0.5:
+            few, most = True, fine
     unsure = most < _SURE * error and alike
     if plain <= 0 or not (few or unsure):
         return None
@@ -371,12 +374,29 @@ def coloured(state: State, kind: str) -> Denial | None:
     return Denial(max(most / plain, 0.0), f"{why} most of what it would explain")
 
 
-def _finest(power: Array, shape: tuple[int, int]) -> Array:
-    """Return the power of waves of less than four pixels along rows and columns: (bin,)."""
-    down, across = np.abs(np.fft.fftfreq(shape[0])[1:]), np.fft.rfftfreq(shape[1])[1:-1]
-    return np.asarray(power[np.ix_(down > _FINE, across > _FINE)].ravel())
+def _finest(powers: Sequence[tuple[Array, tuple[int, ...]]]) -> tuple[float, float]:
+    """Return the power of waves of less than four pixels along rows and columns, and its square.
+
+    Beyond noise, summed over channels: of each its spectrum, and the shape of its map. Where one is
+    too narrow for such waves nothing is known: infinite.
+    """
+    power, square = 0.0, 0.0
+    for own, shape in powers:
+        down, across = np.abs(np.fft.fftfreq(shape[0])[1:]), np.fft.rfftfreq(shape[1])[1:-1]
+        finest = own[np.ix_(down > _FINE, across > _FINE)]
+        if not finest.size:
+            return inf, inf
+        power += float(finest.mean()) - 1
+        square += 1 / finest.size
+    return power, square
 
 
 def _noise_alike(state: State) -> bool:
-    """Return whether noise of neighbours is left alike: what makes it so may blur patterns, too."""
-    return any(m.statistic.startswith("correlation_") for m in state.mismatches)
+    """Return whether noise of neighbours is alike, in the model or besides.
+
+    What makes it so, a filter say, may smooth patterns as well.
+    """
+    modelled = any(
+        name.startswith(_CORRELATION) for own in state.camera.effect for name in own.measures
+    )
+    return modelled or any(m.statistic.startswith(_CORRELATION) for m in state.mismatches)

@@ -17,12 +17,13 @@ from analysis.mismatch.model import Model, Sites
 from analysis.mismatch.observe import Level, Observation
 from analysis.mismatch.staging import with_pictures
 from analysis.mismatch.touches import SPIKES
-from analysis.mismatch.undone import halfway, narrow, rounding, together, undone
+from analysis.mismatch.undone import WHOLE, halfway, narrow, rounding, together, undone
 from dsis.camera import BaseNoise, Camera, Segment
 from dsis.effects.quantisation import Quantisation
 from dsis.measures.spikes import SPIKED
 
 _ROUNDS, _FINE_ROUNDS = 4, 8  # the latter where each pixel is rounded in its own way
+_COARSE_ROUNDS = 24  # by coarse codes: what a filter leaves of noise is halfway there each time
 _LEAST = 0.01  # of a signal: with the above, half a thousandth of it is as good as none
 _SAME = 0.05  # of an error: the fit has settled
 _CLOSER = 0.3  # a round's change beside that of the one before, unless two have shown it
@@ -136,7 +137,8 @@ def calibrate(
     before: BaseFit | None = None
     change, noise = nan, near.model.camera.noise if near is not None and known else camera.noise
     settled = False
-    for _ in range(_FINE_ROUNDS if fine else _ROUNDS if bending else 1):
+    rounds = _FINE_ROUNDS if codes_of(camera) == WHOLE else _COARSE_ROUNDS
+    for _ in range(rounds if fine else _ROUNDS if bending else 1):
         recorded = before_codes(effects, noise)
         if held is None and (fine or before is None):  # beside what effects add darks may hide it
             held = _held(camera, fitted(recorded, switches), hidden=_hidden(layout, recorded))

@@ -35,15 +35,24 @@ def side_by_side(state: State, kind: str) -> Denial | None:
     """
     if kind not in _ONE_BY_ONE:
         return None
-    planes = {
-        channel: heights(_apart(image) if kind == _HOT else image, noise)
-        for channel, (image, noise) in first_maps(state, _ONE_BY_ONE[kind]).items()
-    }
+    maps = first_maps(state, _ONE_BY_ONE[kind])
+    most = _beside(state, kind, maps)
+    if most is not None and kind == _HOT:
+        apart = {channel: (_apart(image), noise) for channel, (image, noise) in maps.items()}
+        most = _beside(state, kind, apart)
+    return None if most is None else Denial(1 - most, _ONE_BY_ONE_WHY[kind])
+
+
+def _beside(state: State, kind: str, maps: Mapping[str, tuple[Array, float]]) -> float | None:
+    """Return which share of pixels that stand out of maps has one like itself beside it.
+
+    None: half or less, or what may be chance, of the sensor and of its channels.
+    """
+    planes = {channel: heights(*own) for channel, own in maps.items()}
     shares = [_with_neighbours(list(planes.values()), _STANDS_OUT[kind])]
     if len(planes) > 1:
         shares.append(_with_neighbours([_mosaic(state, planes)], _STANDS_OUT[kind]))
-    most = max((share for share in shares if share is not None), default=None)
-    return None if most is None else Denial(1 - most, _ONE_BY_ONE_WHY[kind])
+    return max((share for share in shares if share is not None), default=None)
 
 
 def _apart(image: Array) -> Array:

@@ -17,6 +17,7 @@ from analysis.mismatch.bank.lines import any_of
 from analysis.mismatch.bank.peaks import Peak
 from analysis.mismatch.bank.scalars import UNKNOWN, Number, score_of_log
 from dsis.measures import Channel
+from dsis.measures.spikes import variance_of_quartiles
 
 Array = NDArray[np.float64]
 LABEL, DETAIL, KIND = "code_imbalance of powers of two", "powers of two", "codes"
@@ -24,6 +25,7 @@ _PERIOD = 64  # codes
 _LEAK = 11.0  # minus the logarithm of the density that is left: of 1e6 samples, a tenth of chance
 _LEAST = 1e4  # samples
 _PILED = 5.0  # standard errors by which noise leans to lower codes, or has tails
+_SAFE = 0.5  # of the variance of a core of unknown law
 
 
 class CodePhases:
@@ -45,7 +47,8 @@ class CodePhases:
         """Take one exposure; not a channel whose codes are clipped, or coarse, or pile up.
 
         At a full well noise is narrower than it is elsewhere, and leans to lower codes. What noise
-        with tails covers hangs on its law: the core is narrower than its variance says.
+        with tails covers its core does, and hangs on the law of that: half of the core's variance
+        is counted on.
         """
         cycles = np.arange(1, _PERIOD // 2 + 1) / _PERIOD
         for channel in channels.values():
@@ -54,8 +57,10 @@ class CodePhases:
             if codes is None or cut != 0 or codes.lattice is None or codes.lattice.step != 1:
                 continue
             leaning, tailed = (channel.estimates[own].departure for own in ("skewness", "kurtosis"))
-            if leaning < -_PILED or tailed > _PILED:
+            if leaning < -_PILED:
                 continue
+            if tailed > _PILED:
+                variance = _SAFE * min(variance, _core_dn2(codes.counts))
             covered = 2 * pi**2 * variance * cycles**2 >= _LEAK
             folded = np.bincount(
                 (codes.lowest + np.arange(codes.counts.size)) % _PERIOD, codes.counts, _PERIOD
@@ -88,6 +93,12 @@ class CodePhases:
                 found.append((chance, period, rms))
             period *= 2
         return found
+
+
+def _core_dn2(counts: NDArray[np.integer]) -> float:
+    """Return the variance of a histogram's middle half, of successive codes, were it normal."""
+    low, high = np.interp([0.25, 0.75], np.cumsum(counts) / counts.sum(), np.arange(counts.size))
+    return float(variance_of_quartiles(float(low), float(high)))
 
 
 def _log_chance(chi2: float, dof: float) -> float:

@@ -66,7 +66,8 @@ def _hot_again(clues: Clues, rate: float, spread: Spread) -> Proposal | None:
     body = Body(mean * scale, sigma, _shot(clues, mean))
     noisy = {name: _noisy(clues, name, image / scale) for name, (image, _) in images.items()}
     laws = [own for own in hot_laws(images, noisy, body) if own.share <= _FEW]
-    return _of_law(laws[0], scale) if laws and laws[0].gain > len(_NUMBERS) else None
+    own = _of_law(laws[0], scale) if laws and laws[0].gain > len(_NUMBERS) else None
+    return None if own is None else replace(own, of_pixels=laws[0].gain)
 
 
 def dark_rate(clues: Clues) -> float | None:

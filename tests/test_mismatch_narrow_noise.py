@@ -151,7 +151,8 @@ def test_beside_narrow_noise_what_spreads_pixels_bends_levels() -> None:
     steps, bend = Quantisation(step_dn=4), Nonlinearity(percent_full_scale=1.0)
     assert narrow({DARK: _level(8.4, 0.2)}, WHOLE, spiky=False)
     assert not narrow({DARK: _level(8.4, 0.4), FLAT: _level(8.4, 0.0)}, WHOLE, spiky=False)
-    assert not narrow({DARK: _level(8.4, 0.2)}, (4.0, 0.0), spiky=False)
+    for dn2, beside_steps in ((0.2, True), (7.0, True), (8.0, False)):  # 0.45 of 4 DN squared
+        assert narrow({DARK: _level(8.4, dn2)}, (4.0, 0.0), spiky=False) == beside_steps
     spikes = _level(8.4, 6.0)
     spikes.bulk_dn2 = 0.2
     assert narrow({DARK: spikes}, WHOLE, spiky=True)

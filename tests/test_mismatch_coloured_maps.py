@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
 
-from analysis.mismatch.feigned import coloured
+from analysis.mismatch.coloured import coloured
 from exposing import effect
 
 

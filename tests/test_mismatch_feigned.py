@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from analysis.mismatch.bank.key import Key
+from analysis.mismatch.coloured import coloured
 from analysis.mismatch.feigned import (
-    coloured,
     feigned,
     heated,
     outlying,

@@ -1,7 +1,8 @@
 """Dark currents, of all pixels and of hot ones, measured of the map that grows with exposure."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,17 +40,18 @@ def _dark_current(clues: Clues) -> Sequence[Proposal]:
     if spread is None or spread.log_sigma > MOST_APART:
         return found
     again = _hot_again(clues, rate, spread)
-    of_pixels = spread.gain if again is not None or _normal(clues) else None
-    values, errors = {_SPREAD: spread.log_sigma}, {_SPREAD: spread.error}
+    mean, sigma = rate, spread.log_sigma
     if again is not None:
-        hot = again.effect.model_dump()
-        left = max(1 - hot[_NUMBERS[0]] * hot[_NUMBERS[1]] / rate, _LEAST_LEFT)
-        sigma = min(of_all(spread.log_sigma, 1 / left), MOST_APART)
-        values = {_RATE: rate * left, _SPREAD: sigma}
-        errors = {_SPREAD: spread.error * sigma / spread.log_sigma}
-    apart = (measured(own, values, errors) for own in found)
-    free = (_RATE,)
-    return [*found, *(replace(own, free=free, of_pixels=of_pixels, again=again) for own in apart)]
+        share, own = (float(getattr(again.effect, name)) for name in _NUMBERS)
+        left = max(1 - share * own / rate, _LEAST_LEFT)
+        mean, sigma = rate * left, min(of_all(sigma, 1 / left), MOST_APART)
+    errors = {_SPREAD: spread.error * sigma / spread.log_sigma}
+    of_pixels = spread.gain if again is not None or _normal(clues) else None
+    apart = [
+        replace(measured(one, {_SPREAD: sigma}, errors), of_pixels=of_pixels, again=again)
+        for one in proposals("dark_current", [_RATE], dn_per_s=mean)
+    ]
+    return [*found, *apart]
 
 
 def _hot_again(clues: Clues, rate: float, spread: Spread) -> Proposal | None:
@@ -57,17 +59,12 @@ def _hot_again(clues: Clues, rate: float, spread: Spread) -> Proposal | None:
 
     Where these were not known yet, hot ones were measured with them: more, and less hot.
     """
-    grown = _grown(clues)
-    if grown is None or not any(isinstance(own, HotPixels) for own in clues.camera.effect):
+    if not any(isinstance(own, HotPixels) for own in clues.camera.effect):
         return None
-    images, scale = grown
-    mean = rate * spread.left
-    sigma = of_all(spread.log_sigma, 1 / spread.left)
-    body = Body(mean * scale, sigma, _shot(clues, mean))
-    noisy = {name: _noisy(clues, name, image / scale) for name, (image, _) in images.items()}
-    laws = [own for own in hot_laws(images, noisy, body) if own.share <= _FEW]
-    own = _of_law(laws[0], scale) if laws and laws[0].gain > len(_NUMBERS) else None
-    return None if own is None else replace(own, of_pixels=laws[0].gain)
+    mean, sigma = rate * spread.left, of_all(spread.log_sigma, 1 / spread.left)
+    shot = _shot(clues, mean)
+    found = _hot_beside(clues, lambda scale: Body(mean * scale, sigma, shot))
+    return found[0] if found else None
 
 
 def dark_rate(clues: Clues) -> float | None:
@@ -112,11 +109,18 @@ def _normal(clues: Clues) -> bool:
 
 def _body(clues: Clues, scale: float) -> Body:
     """Return the law of the camera's dark currents, in a map's unit."""
-    own = [e for e in clues.camera.effect if isinstance(e, DarkCurrent) and e.log_sigma]
-    if len(own) != 1:
+    own = _apart(clues)
+    if own is None:
         return Body()
-    rate = own[0].dn_per_s
-    return Body(rate * scale, own[0].log_sigma, _shot(clues, rate))
+    return Body(own.dn_per_s * scale, own.log_sigma, _shot(clues, own.dn_per_s))
+
+
+def _apart(clues: Clues) -> DarkCurrent | None:
+    """Return the camera's dark current whose pixels differ; None: it has none, or several."""
+    own = [
+        e for e in clues.camera.effect if isinstance(e, DarkCurrent) and e.log_sigma * e.dn_per_s
+    ]
+    return own[0] if len(own) == 1 else None
 
 
 def _shot(clues: Clues, rate: float) -> float:
@@ -141,19 +145,22 @@ def _hot(clues: Clues) -> Sequence[Proposal]:
 
     None of which more pixels are hot than few: where all are, dark currents differ everywhere.
     """
+    found = _hot_beside(clues, partial(_body, clues))
+    if _apart(clues) is not None or _normal(clues):
+        return found
+    return [replace(own, of_pixels=None) for own in found]
+
+
+def _hot_beside(clues: Clues, body: Callable[[float], Body]) -> list[Proposal]:
+    """Return the likeliest laws of hot pixels beside others' dark currents, in a map's unit."""
     grown = _grown(clues)
     if grown is None:
         return []
     images, scale = grown
     noisy = {name: _noisy(clues, name, image / scale) for name, (image, _) in images.items()}
-    body = _body(clues, scale)
-    normal = bool(body) or _normal(clues)
-    found: list[Proposal] = []
-    for law in (own for own in hot_laws(images, noisy, body) if own.share <= _FEW):
-        own = _of_law(law, scale) if law.gain >= len(_NUMBERS) else None
-        if own is not None:
-            found.append(replace(own, of_pixels=law.gain if normal else None))
-    return found
+    laws = [own for own in hot_laws(images, noisy, body(scale)) if own.share <= _FEW]
+    found = [(own.gain, _of_law(own, scale)) for own in laws if own.gain >= len(_NUMBERS)]
+    return [replace(own, of_pixels=gain) for gain, own in found if own is not None]
 
 
 def _of_law(law: HotLaw, scale: float) -> Proposal | None:

@@ -1,5 +1,6 @@
 """Promise: the command line is quick and documented, and the package holds what it needs."""
 
+import re
 import subprocess
 import sys
 import tomllib
@@ -75,3 +76,10 @@ def test_locked_versions_cover_every_requirement_and_name_no_address() -> None:
     for requirement in wanted:
         name = requirement.split(">")[0].lower().replace("_", "-")
         assert name in locked, name
+
+
+def test_what_takes_long_has_something_quicker_beside_it() -> None:
+    """Whole diagnoses that are run by `-m long` alone are not all that is asked of a law."""
+    for file in sorted((ROOT / "tests").glob("test_*.py")):
+        tests = re.findall(r"((?:^[@ )\]].*\n)*)^def test_", file.read_text("utf-8"), re.MULTILINE)
+        assert not tests or any("@pytest.mark.long" not in own for own in tests), file.name

@@ -101,6 +101,7 @@ def _changed(recording: InMemory, name: str, stack: Array) -> InMemory:
     return replace(recording, stacks={**recording.stacks, name: made})
 
 
+@pytest.mark.long
 def test_interference_in_short_bursts_is_no_heavy_tailed_noise() -> None:
     """It has no word; what noise its rows have is left open."""
     rng, recording = np.random.default_rng(5), recorded(camera(), 6, levels=TWO_LEVELS)

@@ -223,6 +223,7 @@ def _planted(folder: Path, cfa: str) -> None:
     plant(folder, case)
 
 
+@pytest.mark.long
 def test_in_a_mosaic_it_is_named_with_its_numbers(tmp_path: Path) -> None:
     _planted(tmp_path, "RGGB")
     camera, recording = read_camera(tmp_path / "camera.toml"), read_recording(tmp_path)

@@ -131,6 +131,7 @@ def test_offsets_that_the_user_states_are_cut_off_pixel_by_pixel(black: float, s
     assert black_dn == pytest.approx(black, abs=0.15)  # where darks lie 2 DN above it
 
 
+@pytest.mark.long
 def test_offsets_beside_a_cut_are_named_with_their_size() -> None:
     user = _user(0.0, Prnu(sigma_percent=100 * SPREAD))
     (one,) = find_mismatch(user, _with_offsets(0.0, 13), seed=1).omitted_physics

@@ -41,6 +41,7 @@ def test_tails_that_rounding_makes_are_not_named(*, there: bool) -> None:
     assert ("kurtosis" in left) == ("code_spacing" in left) == (not there)
 
 
+@pytest.mark.long
 def test_tails_beside_coarse_codes_that_the_model_has_are_named() -> None:
     tails = registry()["heavy_tailed_read_noise"](tail_df=5.0)
     parts = ((0.5, 150.0, None),)  # wider than a step: there tails are seen

@@ -69,6 +69,7 @@ def beside_hot() -> Finding:
     return find_mismatch(camera(), recording(SIGMA, 0.004), vocabulary=WORDS)
 
 
+@pytest.mark.long
 def test_a_spread_is_a_number_of_the_dark_current(spread: Finding) -> None:
     """No hot pixels are named for its tail, and nothing is left."""
     found = numbers(spread)
@@ -80,6 +81,7 @@ def test_a_spread_is_a_number_of_the_dark_current(spread: Finding) -> None:
     assert not spread.unexplained
 
 
+@pytest.mark.long
 def test_hot_pixels_beside_a_spread_are_both_found(beside_hot: Finding) -> None:
     """The few hot ones leave the others' spread as it is, and nothing is left."""
     found = numbers(beside_hot)
@@ -116,6 +118,7 @@ def test_equal_dark_currents_have_no_spread() -> None:
     assert "hot_pixels" in found
 
 
+@pytest.mark.long
 def test_a_glow_beside_a_spread_leaves_it_its_mean() -> None:
     """What levels show of both is parted: pixels stay as far apart while the mean is fitted."""
     planted = {"dark_current": ("dn_per_s", MEAN), "amp_glow": ("dn_per_s", 700.0)}
@@ -141,6 +144,7 @@ def test_a_users_other_spread_is_a_wrong_number(users: float) -> None:
     assert {m.statistic for m in found.unexplained} <= {"skewness"}  # of counted photons
 
 
+@pytest.mark.long
 def test_a_users_other_mean_is_a_wrong_number_and_the_spread_about_it_is_right() -> None:
     """Pixels are 0.7 apart about the user's mean, and 0.6 about the recorded one, as they say."""
     model = camera(DarkCurrent(dn_per_s=0.8 * MEAN, log_sigma=SIGMA))

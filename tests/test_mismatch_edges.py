@@ -242,6 +242,7 @@ def test_without_its_word_nothing_else_is_named() -> None:
     assert any(m.statistic == "fixed_edge" for m in found.unexplained)
 
 
+@pytest.mark.long
 def test_one_column_at_the_edge_is_no_decay() -> None:
     stacks = recorded(camera(), 9, columns=64, levels=TWO_LEVELS)
     assert stacks.stacks is not None

@@ -106,6 +106,7 @@ def test_pixels_of_odd_rows_make_no_amplifiers_of_them() -> None:
     assert of_few_that_stand_out(_state({}), ODD_ROWS) is None
 
 
+@pytest.mark.long
 def test_sites_that_focus_are_named_by_no_word() -> None:
     """One of 64 pixels collects 6 % less light."""
     recording = recorded(camera(), 4, rows=64, columns=96, levels=FEW_LEVELS, lit=False)

@@ -91,7 +91,7 @@ def test_covariance_of_lines_is_that_of_drawn_ones() -> None:
         assert products.mean() == pytest.approx(expected[apart], abs=5 * error)
 
 
-@pytest.mark.parametrize("cfa", ["MONO", "RGGB"])
+@pytest.mark.parametrize("cfa", ["MONO", pytest.param("RGGB", marks=pytest.mark.long)])
 def test_white_columns_without_their_word_stay_unexplained(cfa: str) -> None:
     hidden = EFFECTS["column_noise"](sigma_dn=0.42)
     found = find_mismatch(

@@ -38,6 +38,7 @@ def _warmed(recording: InMemory, dn_per_s: Array, rng: np.random.Generator) -> I
     return replace(recording, stacks=stacks)
 
 
+@pytest.mark.long
 def test_hot_pixels_whose_heights_are_lognormal_are_hot_pixels() -> None:
     """A law with a longer tail: the brightest leaves a fourth moment, and spikes of its shot noise.
 
@@ -63,6 +64,7 @@ def test_a_kink_is_seen_beside_one_flat_below_it() -> None:
     assert not found.unexplained
 
 
+@pytest.mark.long
 def test_a_second_path_is_seen_beside_crosstalk_that_was_fitted_without_it() -> None:
     """Read noise that begins at a switch makes neighbours less alike there: both or neither."""
     crosstalk = registry()["crosstalk"](fraction=0.064)

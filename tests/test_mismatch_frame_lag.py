@@ -32,7 +32,7 @@ def _averaged(*, charge_alone: bool) -> InMemory:
     return InMemory(made.sensor, made.exposures, made.rows, made.columns, made.folder, stacks)
 
 
-@pytest.mark.parametrize("charge_alone", [True, False])
+@pytest.mark.parametrize("charge_alone", [True, pytest.param(False, marks=pytest.mark.long)])
 def test_lag_is_named_where_charge_alone_stays(*, charge_alone: bool) -> None:
     found = find_mismatch(BASE, _averaged(charge_alone=charge_alone), seed=1)
     named = {one.effect for one in found.omitted_physics}

@@ -61,6 +61,7 @@ def test_flats_that_are_not_full_keep_their_say(true: Camera) -> None:
         assert layout.full == frozenset()
 
 
+@pytest.mark.long
 def test_a_soft_limit_below_known_light_is_found_as_soft() -> None:
     softness = 30.0
     true = camera(Saturation(full_well_dn=FULL, softness_dn=softness))

@@ -59,6 +59,7 @@ def test_what_is_as_good_as_the_same_everywhere_is_no_glow() -> None:
     assert not GLOW.sane(layout, registry()["amp_glow"](dn_per_s=9.0, extent=1.5))
 
 
+@pytest.mark.long
 def test_brightness_and_extent_of_a_glow_are_told_within_their_errors() -> None:
     glow = {"dn_per_s": 570.0, "place": "left", "extent": 0.27}
     true = camera(registry()["amp_glow"](**glow))

@@ -54,6 +54,7 @@ def test_memory_pays_for_the_lag_that_was_chosen() -> None:
     assert first.best_of == len(lags) > 4
 
 
+@pytest.mark.long
 def test_smoothing_along_rows_and_memory_are_told_apart_by_no_slope() -> None:
     """A sample that has not settled keeps a share of the last: its variance falls as a filter's.
 

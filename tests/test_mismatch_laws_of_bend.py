@@ -82,6 +82,7 @@ def test_variances_say_how_much_a_response_bends_where_light_is_unknown(percent:
     assert start.percent_full_scale == pytest.approx(percent, rel=0.4)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("law", ["gamma"])
 def test_whatever_its_law_a_smooth_bend_is_named(law: str) -> None:
     bent = LAWS[law]

@@ -65,6 +65,7 @@ def _named(found: Finding) -> dict[str, dict[str, tuple[float, float]]]:
     }
 
 
+@pytest.mark.long
 def test_a_lens_off_the_centre_is_measured_and_hides_no_row_noise() -> None:
     """Half of the light is lost in a corner; row noise is two sevenths of the read noise."""
     light = _lens(0.5, (6.0, -15.0))

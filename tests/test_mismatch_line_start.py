@@ -34,7 +34,7 @@ def _filtered(cfa: str, taps: list[float], poles: list[float], axis: int) -> InM
 
 @pytest.mark.parametrize(
     ("cfa", "lag", "axis", "along"),
-    [("MONO", 1, 2, "rows"), ("RGGB", 8, 1, "columns")],
+    [("MONO", 1, 2, "rows"), pytest.param("RGGB", 8, 1, "columns", marks=pytest.mark.long)],
 )
 def test_memory_that_begins_at_black_is_named_and_nothing_else(
     cfa: str, lag: int, axis: int, along: str

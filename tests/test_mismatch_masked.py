@@ -108,6 +108,7 @@ def test_neighbours_that_share_noise_on_top_have_shared_no_charge() -> None:
     assert (denied, still, masked) == (True, True, False)
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("unproven")
 def test_a_full_well_and_a_second_path_are_both_named() -> None:
     """One line through all variances lies above some and below others: the well is below that."""

@@ -211,6 +211,7 @@ def test_a_camera_that_is_right_is_right_beside_coarse_codes(
     assert found.verdict == "match"
 
 
+@pytest.mark.long
 def test_a_wave_that_rounding_weakens_is_told_as_it_was_before() -> None:
     """Of noise of 0.3 codes about a whole code 0.66 of a small wave is left: numpy's own frames."""
     levels, amplitude = (40.0, 160.0), 0.04

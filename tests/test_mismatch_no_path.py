@@ -55,6 +55,7 @@ def _soft(charge: Array) -> Array:
     return np.asarray(charge * (1 + (np.maximum(charge, 0) / FULL) ** 4) ** -0.25)
 
 
+@pytest.mark.long
 def test_a_second_path_that_goes_takes_the_mismatch_of_its_gain_along() -> None:
     """All levels bend toward a limit: a path, and its gain, are tried on the way."""
     words = frozenset({"dual_gain", "dual_gain_mismatch", "saturation"})

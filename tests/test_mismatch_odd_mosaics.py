@@ -14,6 +14,7 @@ pytestmark = pytest.mark.usefixtures("unproven")
 ROWS, COLUMNS = 65, 97
 
 
+@pytest.mark.long
 def test_charge_of_the_odd_last_lines_crosses_into_what_is_looked_at() -> None:
     """Without them the last lines of a cropped frame would have one neighbour less."""
     crosstalk = registry()["crosstalk"](fraction=0.04)

@@ -41,6 +41,7 @@ def test_a_wrong_size_is_a_parameter_error() -> None:
     assert found.camera.effect == (_column_fpn(error.recorded),)
 
 
+@pytest.mark.long
 def test_an_effect_that_is_not_there_has_next_to_no_size() -> None:
     found = _found(camera(), camera(_prnu(1.0)), LEVELS)  # few tell so little of none
     assert found.verdict == "parameters"
@@ -59,6 +60,7 @@ def test_a_size_of_none_is_no_reason_for_a_second_effect() -> None:
     assert found.camera.effect == (_prnu(error.recorded),)
 
 
+@pytest.mark.long
 def test_a_right_size_does_not_stand_in_for_a_wrong_one_beside_it() -> None:
     """Gains that neighbours share are too large: the white ones must not shrink instead."""
     true, model = (
@@ -92,6 +94,7 @@ def test_right_sizes_stay_as_they_are_beside_physics_that_is_left_out() -> None:
     assert found.camera.effect[:2] == own
 
 
+@pytest.mark.long
 def test_a_wrong_size_and_omitted_physics_are_told_apart() -> None:
     noise = _effect("row_noise", sigma_dn=2.0)
     found = _found(camera(_prnu(1.0), noise), camera(_prnu(1.2)))

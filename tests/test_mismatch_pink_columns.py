@@ -40,8 +40,8 @@ def _white(sigma: float) -> Moves:
 @pytest.mark.parametrize(
     ("moves", "cfa", "expected"),
     [
-        (_pink(1.5, 1.0), Cfa.MONO, {"pink_noise": "columns"}),
-        (_pink(1.5, 0.95), Cfa.RGGB, {"pink_noise": "columns"}),
+        pytest.param(_pink(1.5, 1.0), Cfa.MONO, {"pink_noise": "columns"}, marks=pytest.mark.long),
+        pytest.param(_pink(1.5, 0.95), Cfa.RGGB, {"pink_noise": "columns"}, marks=pytest.mark.long),
         (_white(1.0), Cfa.MONO, {"column_noise": ""}),
     ],
 )

@@ -186,6 +186,7 @@ def _has_numbers(named: OmittedEffect, own: dict[str, float]) -> None:
         assert abs(fitted.value - value) < 4 * fitted.standard_error
 
 
+@pytest.mark.long
 def test_in_a_mosaic_it_is_named_with_its_numbers() -> None:
     own = {"sigma_dn": 1.13, "length_rows": 3.0}
     true, base = camera(effect("row_banding", **own), cfa="RGGB"), camera(cfa="RGGB")
@@ -196,6 +197,7 @@ def test_in_a_mosaic_it_is_named_with_its_numbers() -> None:
     _has_numbers(named, own)
 
 
+@pytest.mark.long
 def test_beside_white_rows_both_are_named_with_their_numbers() -> None:
     both = {
         "row_noise": {"sigma_dn": 1.6},

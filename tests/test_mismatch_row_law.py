@@ -167,7 +167,7 @@ def test_sizes_beside_row_noise_are_those_that_were_drawn() -> None:
     assert 0.6 < np.std(off, ddof=1) < 1.4
 
 
-@pytest.mark.parametrize("cause", [_pink, _bands(7.0)])
+@pytest.mark.parametrize("cause", [pytest.param(_pink, marks=pytest.mark.long), _bands(7.0)])
 def test_noise_of_single_rows_is_told_with_its_size_whatever_it_is_beside(cause: Rows) -> None:
     """Odds of 20 for what is not there are wrong in one of 20 at most."""
     rng, wrong, sizes = np.random.default_rng(31), 0, []

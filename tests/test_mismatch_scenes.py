@@ -137,6 +137,7 @@ def test_row_noise_is_located_in_scenes_too(tmp_path: Path) -> None:
     assert curve.observed[-len(SCENES) :] == pytest.approx(16.0, rel=SURE * (2 / 5 / 63) ** 0.5)
 
 
+@pytest.mark.long
 def test_lag_shows_in_scenes(tmp_path: Path) -> None:
     last: dict[str, Array] = {}
 
@@ -221,6 +222,7 @@ def test_a_scene_that_shifts_is_left_out(frames: str, tmp_path: Path) -> None:
     assert "room" in finding.proof.heldout_frames
 
 
+@pytest.mark.long
 def test_lamps_that_flicker_in_a_scene_are_no_noise_of_its_pixels(tmp_path: Path) -> None:
     def lamps(rng: np.random.Generator, name: str, light: Array, _frame: int) -> Array:
         return light * (1 + 0.03 * rng.normal()) if name in SCENES else light

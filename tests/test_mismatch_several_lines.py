@@ -48,6 +48,7 @@ def _found(folder: Path, *vocabulary: str) -> Finding:
     return find_mismatch(camera, recording, seed=5, vocabulary=frozenset(vocabulary))
 
 
+@pytest.mark.long
 def test_two_lines_are_two_effects(tmp_path: Path) -> None:
     found = _found(tmp_path, *LIKE_LINES, *KINDS)
     assert [e.effect for e in found.omitted_physics] == ["periodic_noise"] * 2

@@ -219,6 +219,7 @@ def _found(true: Camera, seed: int, words: frozenset[str] = WORDS) -> Finding:
     return find_mismatch(camera(cfa=true.cfa), recording, seed=1, vocabulary=words)
 
 
+@pytest.mark.long
 def test_in_a_mosaic_it_is_named_with_its_numbers() -> None:
     own = {"sigma_percent": 0.16, "length_pixels": 3.0}
     found = _found(camera(effect("smooth_prnu", **own), cfa="RGGB"), 9)

@@ -83,7 +83,7 @@ def test_moments_are_means_over_pixels_whose_limits_differ(softness: float, spre
         assert np.log(between) == pytest.approx(log_apart, abs=0.08)
 
 
-@pytest.mark.parametrize("softness", [0.0, 40.0])
+@pytest.mark.parametrize("softness", [0.0, pytest.param(40.0, marks=pytest.mark.long)])
 def test_full_wells_that_differ_from_pixel_to_pixel(softness: float) -> None:
     """numpy's sensor: without a word for it, frames denied the full well of all pixels."""
     own = np.random.default_rng(3).standard_normal((64, 64))

@@ -122,6 +122,7 @@ def test_a_wrong_switch_is_found_beside_spikes() -> None:
     assert 500 < switch < 900
 
 
+@pytest.mark.long
 def test_rare_spikes_are_named_alone_with_their_numbers() -> None:
     recording = recorded(camera(IMPULSE), 6, levels=FEW_LEVELS)
     found = find_mismatch(camera(), recording, seed=2, vocabulary=RIVALS)

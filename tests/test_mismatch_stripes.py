@@ -23,6 +23,7 @@ def test_a_weak_bistable_stripe_is_located_and_proposed(frequency: tuple[float, 
     assert frequency in {one.effect.model_dump()["frequency"] for one in proposed}
 
 
+@pytest.mark.long
 def test_a_weak_bistable_checkerboard_is_named() -> None:
     true = _striped((0.5, 0.5), amplitude_dn=0.16)
     found = find_mismatch(camera(), recorded(true, 12, levels=FEW_LEVELS), seed=1)

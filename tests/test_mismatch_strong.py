@@ -33,6 +33,7 @@ def test_a_strong_bend_is_fitted_until_no_level_departs() -> None:
     assert not found.unexplained
 
 
+@pytest.mark.long
 def test_what_a_rough_fit_leaves_of_levels_is_no_residue_of_a_converter() -> None:
     """Here one of 1024 codes was named, for levels that a bend fitted roughly had left."""
     found = _found(LEVELS, effect("crosstalk", fraction=0.004))

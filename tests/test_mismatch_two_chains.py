@@ -54,6 +54,7 @@ def test_the_power_of_lines_that_alternate(axis: str, size: float) -> None:
     assert numbers[f"{ALTERNATING} of {other}"][0] == pytest.approx(1, abs=SURE * error / expected)
 
 
+@pytest.mark.long
 def test_two_chains_are_located_and_have_no_word() -> None:
     rng = np.random.default_rng(3)
     recording = recorded(camera(), 7, rows=ROWS, columns=COLUMNS, levels=FEW_LEVELS)

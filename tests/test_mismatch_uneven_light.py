@@ -56,6 +56,7 @@ def test_uneven_light_is_named_with_its_numbers(percent: dict[str, float]) -> No
         assert off < max(4 * fitted.standard_error, 0.02)
 
 
+@pytest.mark.long
 def test_two_amplifiers_that_have_no_word_are_no_tilt_of_the_light() -> None:
     taps = registry()["tap_mismatch"](gain_percent=3.0, regions="left_right")
     words = VOCABULARY - {"tap_mismatch"}

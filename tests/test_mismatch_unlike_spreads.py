@@ -57,6 +57,7 @@ def test_one_that_spreads_a_hundred_times_as_far_leaves_others_as_they_are() -> 
     assert (tails < 1.5).all()
 
 
+@pytest.mark.long
 def test_photons_are_named_beside_few_pixels_that_jump() -> None:
     """Few jumping pixels make the skewness of darks anything; that of lit frames is the light's."""
     counted = camera(registry()["rts"](pixel_fraction=0.001, amplitude_dn=25.0))

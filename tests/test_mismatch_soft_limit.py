@@ -1,12 +1,13 @@
 """A full well that is reached softly: where it starts from, and what a camera makes of it."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.stats import skew
 
 from analysis.mismatch import find_mismatch
 from analysis.mismatch.bank.key import Key
@@ -59,6 +60,10 @@ def test_moments_are_those_of_noise_that_is_limited(softness: float) -> None:
         assert made.mean() - signal[i] == pytest.approx(mean[i], abs=0.15)
         assert np.log(made.var() / sd[i] ** 2) == pytest.approx(log_variance[i], abs=0.01)
         assert (away**3).mean() / made.std() ** 3 == pytest.approx(skewness[i], abs=0.02)
+        read = made + rng.normal(0.0, 9.0, made.size)  # which no limit takes
+        _, with_read, less_skewed = (one[i] for one in soft_moments(signal, sd, FULL, softness, 81))
+        assert np.log(read.var() / (sd[i] ** 2 + 81)) == pytest.approx(with_read, abs=0.01)
+        assert skew(read) == pytest.approx(less_skewed, abs=0.02)
 
 
 @pytest.mark.parametrize(("softness", "spread"), [(20.0, 1.0), (80.0, 0.5)])
@@ -83,20 +88,39 @@ def test_moments_are_means_over_pixels_whose_limits_differ(softness: float, spre
         assert np.log(between) == pytest.approx(log_apart, abs=0.08)
 
 
-@pytest.mark.parametrize("softness", [0.0, pytest.param(40.0, marks=pytest.mark.long)])
-def test_full_wells_that_differ_from_pixel_to_pixel(softness: float) -> None:
-    """numpy's sensor: without a word for it, frames denied the full well of all pixels."""
+def _of_wells(spread: float, softness: float) -> Callable[[NDArray[np.float64]], Any]:
+    """Return the response of pixels whose full wells differ by so many per cent."""
     own = np.random.default_rng(3).standard_normal((64, 64))
-    wells = FULL * (1 + 0.01 * own)
+    wells = FULL * (1 + spread / 100 * own)
 
     def limited(charge: NDArray[np.float64]) -> NDArray[np.float64]:
         if not softness:
             return np.minimum(charge, wells)
         return np.asarray(wells - softness * np.logaddexp(0, (wells - charge) / softness))
 
-    levels = (300.0, 900.0, 1500.0, 2100.0, 2990.0)
+    return limited
+
+
+BRIGHT = (300.0, 900.0, 1500.0, 2100.0, 2990.0)
+FAR_ABOVE = (300.0, 900.0, 1500.0, 2100.0, 2800.0, 3160.0, 3800.0)
+
+
+@pytest.mark.parametrize(
+    ("levels", "softness"),
+    [
+        (BRIGHT, 0.0),
+        pytest.param(BRIGHT, 40.0, marks=pytest.mark.long),
+        pytest.param(FAR_ABOVE, 40.0, marks=pytest.mark.long),
+    ],
+)
+def test_full_wells_that_differ_from_pixel_to_pixel(
+    levels: tuple[float, ...], softness: float
+) -> None:
+    """numpy's sensor: without a word for it, frames denied the full well of all pixels."""
     found = find_mismatch(
-        camera(segments=((SLOPE, READ, None),)), responding(5, levels, limited), seed=1
+        camera(segments=((SLOPE, READ, None),)),
+        responding(5, levels, _of_wells(1.0, softness)),
+        seed=1,
     )
     (named,) = found.omitted_physics
     assert named.effect == "saturation"
@@ -108,6 +132,19 @@ def test_full_wells_that_differ_from_pixel_to_pixel(softness: float) -> None:
     for name, one in said.items():
         assert abs(one.value - truth[name]) < 3 * one.standard_error, name
         assert one.standard_error < SHARES[name] * truth[name], name
+
+
+@pytest.mark.parametrize("spread", [0.0, 0.3, 1.0])
+def test_light_far_above_a_soft_limit_starts_near_what_made_it(spread: float) -> None:
+    """Of two flats the noise is gone: nothing foretells that of the brighter one."""
+    recording = responding(5, FAR_ABOVE, _of_wells(spread, SOFT))
+    started = _proposed(state_of(recording, camera(segments=((SLOPE, READ, None),))))
+    alike = [one for one in started if ("spread_percent" in one.free) == (spread > 0)]
+    (soft,) = (one.effect for one in alike if "softness_dn" in one.free)
+    assert isinstance(soft, Saturation)
+    assert soft.full_well_dn == pytest.approx(FULL, abs=10.0)
+    assert soft.softness_dn == pytest.approx(SOFT, rel=0.25)
+    assert soft.spread_percent == pytest.approx(spread, rel=0.25)
 
 
 def test_darks_alone_say_nothing_of_a_full_well() -> None:

@@ -1,9 +1,10 @@
 """What bends the mean level: non-linearity, saturation, paths that disagree."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import minimize
 from scipy.stats import norm
 
 from analysis.mismatch.candidates.candidate import Candidate, Proposal, measured, proposals
@@ -107,7 +108,8 @@ def _saturation(clues: Clues) -> Sequence[Proposal]:
     less, of_less = clues.excess("pixel_variance").get(top, (0.0, np.inf))
     if not clues.signal(top) > 0 or not np.isfinite(error) or apart < _DIFFERENT * error:
         return found
-    if less > -_DIFFERENT * of_less:  # gains that differ leave all of the noise
+    # Gains that differ leave all of the noise; where light is far above it nothing foretells it.
+    if less > -_DIFFERENT * of_less and not _full(clues, top):
         return found
     spread = float(np.clip(100 * apart**0.5 / clues.signal(top), *_SPREADS))
     hard = [one for one in found if "softness_dn" not in one.free]
@@ -192,18 +194,20 @@ def _soft_limits(
         return []
     bent = off["level"]
     signal = np.array([clues.signal(at) - bent.get(at, (0.0, 0.0))[0] for at, *_ in rows])
-    line = [float(clues.fit.line_dn2(np.array([own]))[0]) for own in signal]
-    sd = np.sqrt(np.maximum(line, _ROUNDING))  # of light that is hardly there a line has none
+    line = clues.fit.line_dn2(signal)
+    # Read noise comes after a full well; of light that is hardly there a line has none.
+    after = max(float(clues.fit.line_dn2(np.zeros(1))[0]), 0.0)
+    sd = np.sqrt(np.maximum(line - after, _ROUNDING))
     number, value, error = np.array([row[1:] for row in rows]).T
     free = np.stack([np.where(number == 0, signal / signal.max(), 0.0), number == 1], 1)
     free = free / error[:, np.newaxis]
-    level, unit = clues.signal(top), clues.seen.levels[top].variance_dn2 ** 0.5
+    level, unit = clues.signal(top), _noise_dn(clues, top)
 
     def misfit(full: float, softness: float, apart: float) -> float:
         if apart:
-            made = moments_of_many(signal, sd, full, softness, apart)
+            made = moments_of_many(signal, sd, full, softness, apart, after)
         else:
-            made = soft_moments(signal, sd, full, softness)
+            made = soft_moments(signal, sd, full, softness, after)
         own = (value - np.choose(number.astype(int), made)) / error
         rest = own - free @ np.linalg.lstsq(free, own, rcond=None)[0]
         return (_NU + 1) / 2 * float(np.log1p(rest**2 / _NU).sum())
@@ -215,7 +219,8 @@ def _soft_limits(
             for full in level + np.sqrt(unit * max(softness, unit)) * _BEYOND
             for apart in (np.minimum(spread * _FARTHER, _MOST_SPREAD) if spread else (0.0,))
         )
-        return min((misfit(*one), one) for one in tried)
+        own = min((misfit(*one), one) for one in tried)
+        return _nearer(misfit, own, unit, fixed=some.size == 1)
 
     best, found = least(unit * _SOFTNESS)
     as_hard = np.inf
@@ -233,32 +238,76 @@ def _soft_limits(
     return proposals("saturation", [*names, "spread_percent"], (), **own, spread_percent=apart)
 
 
+def _nearer(
+    misfit: Callable[[float, float, float], float],
+    start: tuple[float, tuple[float, float, float]],
+    unit: float,
+    *,
+    fixed: bool,
+) -> tuple[float, tuple[float, float, float]]:
+    """Return the least misfit near one of a grid, and where: between two of it none may fit.
+
+    `fixed`: the softness stays.
+    """
+    full, softness, apart = start[1]
+
+    def there(moved: Array) -> tuple[float, float, float]:
+        soft = softness if fixed else softness * float(np.exp(np.clip(moved[1], -1, 1)))
+        far = min(apart * float(np.exp(np.clip(moved[-1], -1, 1))), _MOST_SPREAD)
+        return full + float(moved[0]) * unit, soft, far
+
+    count = 1 + (not fixed) + (apart > 0)
+    simplex = np.vstack([np.zeros(count), 0.1 * np.eye(count)])
+    options = {"initial_simplex": simplex, "maxfev": 150 * count, "xatol": 1e-3, "fatol": 1e-2}
+    own = minimize(
+        lambda moved: misfit(*there(moved)), np.zeros(count), method="Nelder-Mead", options=options
+    )
+    return min(start, (float(own.fun), there(own.x)))
+
+
+def _noise_dn(clues: Clues, top: Place) -> float:
+    """Return the noise of the brightest level; where a full well left none, that of its light."""
+    own = clues.seen.levels[top].variance_dn2
+    if _full(clues, top):
+        own = max(own, float(clues.fit.line_dn2(np.array([clues.signal(top)]))[0]))
+    return float(own**0.5)
+
+
 def _logarithm(value: float, error: float) -> tuple[float, float]:
     return float(np.log(value)), error / value
 
 
-def soft_moments(signal: Array, sd: Array, full: float, softness: float) -> list[Array]:
+def soft_moments(
+    signal: Array, sd: Array, full: float, softness: float, after_dn2: float = 0.0
+) -> list[Array]:
     """Return what a soft limit makes of normal noise: change of mean, log variance, skewness.
 
-    `signal` and `sd` (place,) are those without it, DN; the limit is that of `Saturation`.
+    `signal` and `sd` (place,) are those without it, DN; the limit is that of `Saturation`. Noise of
+    variance `after_dn2` comes after it.
     """
     q = signal[:, np.newaxis] + sd[:, np.newaxis] * _NODES
     made = full - softness * np.logaddexp(0, (full - q) / softness) - signal[:, np.newaxis]
     mean = made @ _WEIGHTS
     away = made - mean[:, np.newaxis]
-    variance = np.maximum(away**2 @ _WEIGHTS, 1e-12)
-    return [mean, np.log(variance / sd**2), (away**3 @ _WEIGHTS) / variance**1.5]
+    variance = np.maximum(away**2 @ _WEIGHTS + after_dn2, 1e-12)
+    third = away**3 @ _WEIGHTS
+    return [mean, np.log(variance / (sd**2 + after_dn2)), third / variance**1.5]
 
 
 def moments_of_many(
-    signal: Array, sd: Array, full: float, softness: float, spread: float
+    signal: Array,
+    sd: Array,
+    full: float,
+    softness: float,
+    spread: float,
+    after_dn2: float = 0.0,
 ) -> list[Array]:
     """Return means over pixels whose limits differ by `spread`, per cent; see `soft_moments`.
 
     The last is the logarithm of the variance of their levels, DN^2.
     """
     wells = full * (1 + spread / 100 * _FEW_NODES)
-    each = np.stack([soft_moments(signal, sd, float(own), softness) for own in wells])
+    each = np.stack([soft_moments(signal, sd, float(own), softness, after_dn2) for own in wells])
     levels, logs, skewness = each.transpose(1, 2, 0)
     variance = np.exp(logs)
     third = (skewness * variance**1.5) @ _FEW_WEIGHTS

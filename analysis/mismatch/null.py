@@ -113,19 +113,23 @@ def null_of(
     wide = widening(seen.keys, np.where(known, np.nan_to_num(values), 0.0), error, recorded)
     known &= np.isfinite(wide)
     sd = np.where(known, sd * wide, sd)
-    sd = np.sqrt(sd**2 + np.where(known, wandering_dn2(layout, seen.keys, mean, recorded), 0.0))
+    wander = np.where(known, wandering_dn2(layout, seen.keys, mean, recorded), 0.0)
+    sd = np.sqrt(sd**2 + wander)
+    wander = np.sqrt(wander) / sd
     sums = contrasts(layout, Vector(seen.keys, seen.values, sd), known)
     parts = np.where(known, (np.nan_to_num(values) - mean) / sd, 0.0)
     along = parts @ sums.matrix.T
     spread = (along**2).sum(0) / (count - 1)
     alike = _shared(sums, [one.shared for one in simulated], sd)
     alike += _together(sums, drawn_together(seen.keys, mean, known), seen.keys)
-    expected = (1 + alike) / (1 + 1 / count)
+    # No simulation wanders: it has the rest.
+    expected = (1 - sums.matrix**2 @ wander**2 + alike) / (1 + 1 / count)
     pooled = (_OWN * expected + (count - 1) * spread) / (_OWN + count - 1)
     alone = spread * (_farther(count - 1) / _farther(_OWN + count - 1)) ** 2
     pooled = np.where(_denied(along.var(0, ddof=1) / expected, count - 1), alone, pooled)
     # The same few recordings leave all numbers unsure, at worst to the same side.
     aside = (np.abs(sums.matrix) @ (np.sqrt(besides) / sd)) ** 2
+    aside += _wandering(sums, wander, seen.keys)
     return Null(
         (*seen.keys, *sums.keys),
         mean,
@@ -164,6 +168,17 @@ def _together(sums: Contrasts, part: Array, keys: Sequence[Key]) -> Array:
     added = np.zeros(len(sums.keys))
     for which in groups.values():
         added += _of_parts(sums.matrix[:, which], part[which])
+    return added
+
+
+def _wandering(sums: Contrasts, part: Array, keys: Sequence[Key]) -> Array:
+    """Return the variance that frames which wander bring contrasts: all channels of one as one."""
+    groups: dict[str, list[int]] = {}
+    for i in np.flatnonzero(part).tolist():
+        groups.setdefault(keys[i].exposure, []).append(i)
+    added = np.zeros(len(sums.keys))
+    for which in groups.values():
+        added += (sums.matrix[:, which] @ part[which]) ** 2
     return added
 
 

@@ -132,3 +132,20 @@ def test_an_effect_has_a_size_where_one_number_less_of_it_is_less() -> None:
     assert taps.proposal.signed
     assert prnu.beside(_prnu(1.0)).value == pytest.approx(2**0.5)
     assert not taps.like(_effect("tap_mismatch", gain_percent=-1.0, regions="top_bottom"))
+
+
+@pytest.mark.long
+def test_what_is_named_first_gives_back_what_another_size_makes() -> None:
+    """A field of gains took what a larger PRNU makes, was denied for it, and PRNU took the field."""
+    field = _effect("smooth_prnu", sigma_percent=0.31, length_pixels=3.8)
+    true, model = camera(_prnu(0.64), field, cfa="RGGB"), camera(_prnu(0.44), cfa="RGGB")
+    recording = recorded(true, 3, rows=96, columns=96, levels=(100.0, 300.0, 900.0))
+    found = find_mismatch(model, recording, seed=1)
+    (named,) = found.omitted_physics
+    assert named.effect == "smooth_prnu"
+    assert not found.unexplained
+    (error,) = found.parameter_errors
+    assert error.parameter == "effect.prnu.sigma_percent"
+    assert abs(error.recorded - 0.64) < SURE * error.standard_error
+    sigma = named.parameters["sigma_percent"]
+    assert abs(sigma.value - 0.31) < SURE * sigma.standard_error

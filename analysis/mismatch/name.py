@@ -1,11 +1,12 @@
 """Which physics explains the mismatches: add the best effect, fit all again, look again."""
 
 from collections.abc import Container, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.mismatch.candidates import CANDIDATES
 from analysis.mismatch.choice import Choice
 from analysis.mismatch.credited import kept_up
 from analysis.mismatch.fitted import WEAK
@@ -24,6 +25,7 @@ _MOST_EFFECTS = 20  # some may have to go again
 _CHOSEN = frozenset({"adc_memory", "dual_gain"})  # a period, a gap between levels
 _ROUNDS, _FEW_ROUNDS = 6, 3  # of a search that goes on; of a large recording
 _FORGIVING = 2  # rounds after which what was dropped may come back
+_LESS = 0.7  # of what is left, at most, where another size explains it
 
 
 @dataclass
@@ -31,6 +33,7 @@ class Search(Choice):
     """The search from a base state; `run` leaves the result in the attributes."""
 
     asked: tuple[State, State] | None = None  # with what differs in all frames, and without
+    together: set[int] = field(default_factory=set)  # places of sizes fitted with what is named
 
     def run(self) -> State:
         """Return the final state."""
@@ -134,7 +137,10 @@ class Search(Choice):
                 state = self._polished(sized) if rough else sized
                 continue
             if added is None:
-                break
+                state, before = self._with_sizes(state), state
+                if state is before:
+                    break
+                continue
             if self._feigned(state, added[0].gain):
                 state, before = self._polished(state), state
                 if state is not before:
@@ -148,6 +154,38 @@ class Search(Choice):
             self.ties = []  # what was undecided on the way is explained
             self.doubted = {}
         return state
+
+    def _with_sizes(self, state: State) -> State:
+        """Return the state with user's effects of the sizes that stand beside what is named.
+
+        What was named first may have had what another size of them makes, and no number called for
+        that any more: where something is left that calls for it, both are fitted together.
+        """
+        if self.setting.large or not self._depart(state):
+            return state
+        kinds = [one.kind for one in self.named if one.kind in CANDIDATES]
+        shared = {
+            name for kind in kinds for name in (*CANDIDATES[kind].calls, *CANDIDATES[kind].hints)
+        }
+        known = {own.place for own in self.own} | self.together
+        some = [
+            own
+            for own in self._sizes()
+            if own.place not in known and own.value and own.effect.kind not in kinds
+            if shared.intersection(CANDIDATES[own.effect.kind].calls)
+        ]
+        if not some:
+            return state
+        self.together |= {own.place for own in some}
+        kept = self.named, self.own, self.camera, self.polished, self.rough
+        self.own = sorted([*self.own, *some], key=lambda own: own.place)
+        made = self._polished(state)
+        places = {own.place for own in some}
+        right = all(not own.contradicted for own in self.own if own.place in places)
+        if right or _most(made) > _LESS * _most(state):
+            self.named, self.own, self.camera, self.polished, self.rough = kept
+            return state
+        return made
 
     def _take(self, named: Named) -> None:
         self.named.append(named)
@@ -231,3 +269,8 @@ class Search(Choice):
 
     def _judge(self, state: State) -> Judge:
         return Judge(state, lambda named: self.without(state, named), self.setting.nulls)
+
+
+def _most(state: State) -> float:
+    """Return how far off is what is left most."""
+    return max((abs(one.z) for one in state.mismatches), default=0.0)

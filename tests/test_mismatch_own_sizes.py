@@ -136,7 +136,7 @@ def test_an_effect_has_a_size_where_one_number_less_of_it_is_less() -> None:
 
 @pytest.mark.long
 def test_what_is_named_first_gives_back_what_another_size_makes() -> None:
-    """A field of gains took what a larger PRNU makes, was denied for it, and PRNU took the field."""
+    """A field took what a larger PRNU makes, was denied for it, and PRNU took the field."""
     field = _effect("smooth_prnu", sigma_percent=0.31, length_pixels=3.8)
     true, model = camera(_prnu(0.64), field, cfa="RGGB"), camera(_prnu(0.44), cfa="RGGB")
     recording = recorded(true, 3, rows=96, columns=96, levels=(100.0, 300.0, 900.0))

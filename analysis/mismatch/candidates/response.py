@@ -254,13 +254,15 @@ def _nearer(
     def there(moved: Array) -> tuple[float, float, float]:
         soft = softness if fixed else softness * float(np.exp(np.clip(moved[1], -1, 1)))
         far = min(apart * float(np.exp(np.clip(moved[-1], -1, 1))), _MOST_SPREAD)
-        return full + float(moved[0]) * unit, soft, far
+        return max(full + float(moved[0]) * unit, unit), soft, far
 
     count = 1 + (not fixed) + (apart > 0)
     simplex = np.vstack([np.zeros(count), 0.1 * np.eye(count)])
-    options = {"initial_simplex": simplex, "maxfev": 150 * count, "xatol": 1e-3, "fatol": 1e-2}
     own = minimize(
-        lambda moved: misfit(*there(moved)), np.zeros(count), method="Nelder-Mead", options=options
+        lambda moved: misfit(*there(moved)),
+        np.zeros(count),
+        method="Nelder-Mead",
+        options={"initial_simplex": simplex, "maxfev": 150 * count, "xatol": 1e-3, "fatol": 1e-2},
     )
     return min(start, (float(own.fun), there(own.x)))
 

@@ -27,6 +27,8 @@ REC709_CHROMATICITIES = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
 # Writers stamp the time of writing into some formats; the same frame must give the same bytes.
 _NO_DATE = "2000:01:01 00:00:00"
 _TIFF_HEADER_BYTES = 256
+# SMPTE ST 268-1, file information header: bytes 36 to 135 hold the name of the file, NUL if unset.
+_DPX_NAME_AT, _DPX_NAME_BYTES = 36, 100
 
 
 @dataclass(frozen=True)
@@ -301,9 +303,24 @@ def _written(path: Path, pixels: NDArray[np.generic], spec: oiio.ImageSpec) -> s
     out = oiio.ImageOutput.create(str(path))
     whole = out is not None and out.open(str(path), spec) and out.write_image(pixels)
     whole = (out is not None and out.close()) and whole
+    try:
+        if whole and path.suffix.lower() == ".dpx":
+            _forget_dpx_name(path)
+    except OSError as error:
+        return error.strerror or "unknown"
     if whole and _holds(path, pixels):
         return ""
     return (out.geterror() if out else oiio.geterror()).strip() or "the disk may be full"
+
+
+def _forget_dpx_name(path: Path) -> None:
+    """Clear the file's name in the header of a DPX: no attribute of OpenImageIO sets or drops it.
+
+    It writes the whole path of the unfinished file: the folder would be in the bytes of a frame.
+    """
+    with path.open("r+b") as file:
+        file.seek(_DPX_NAME_AT)
+        file.write(bytes(_DPX_NAME_BYTES))
 
 
 def _plain_tiff(path: Path, pixels: NDArray[np.generic]) -> bool:

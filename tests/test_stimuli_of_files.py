@@ -1,6 +1,7 @@
 """Promise: frames, stills and cameras of the user become stimuli in every format."""
 
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -9,7 +10,9 @@ from dsis.cli import main
 from dsis.imagefile import read, write
 from dsis.manifest import read_manifest
 from dsis.spec import SHIPPED, read_spec
+from dsis.spec.schema import Format
 from dsis.stimuli import build_stimuli, check_stimuli
+from folder_bytes import every_byte
 from ramp import COLUMNS, FRAMES, ROWS, frames_of, scene, write_test
 
 
@@ -29,6 +32,19 @@ def test_formats_hold_the_same_frames(tmp_path: Path) -> None:
     ):
         image = read(tmp_path / "out" / form / name / f"00003.{extension}")
         assert np.abs(np.clip(image, 0, 1) - player).max() <= error, form
+
+
+def test_no_byte_depends_on_the_folder_that_the_stimuli_go_to(tmp_path: Path) -> None:
+    """Whatever the format: two places, names of different lengths, one of them not ASCII."""
+    spec = write_test(tmp_path, formats=list(get_args(Format)))
+    folders = tmp_path / "here", tmp_path / "somewhere else \N{LATIN SMALL LETTER E WITH ACUTE}"
+    for folder in folders:
+        build_stimuli(read_spec(spec), folder)
+    one, other = (every_byte(folder) for folder in folders)
+    assert {name.split("/")[0] for name in one} > set(get_args(Format))
+    assert one == other
+    del one["manifest.json"]  # names where the footage lies, to build the same again
+    assert not [name for name, held in one.items() if bytes(tmp_path.parent) in held]
 
 
 def test_a_numbered_sequence_is_read_in_natural_order(tmp_path: Path) -> None:

@@ -47,6 +47,23 @@ def test_figures_of_the_real_ccd(ccd: Fit, key: tuple[str, str]) -> None:
     assert found[key] == pytest.approx(PACKAGE[key], rel=ONE_PERCENT)
 
 
+def test_errors_of_the_real_ccd_are_of_its_scatter(ccd: Fit) -> None:
+    """Its levels lie off the lines by more than sampling; oracle: leave-one-out of each level.
+
+    The jackknife knows no leverage beyond its own and no factor for few levels: within a third.
+    """
+    known = [level.statistics for level in ccd.levels]
+    stated = {q.name: q.standard_error for q in ccd.channels["MONO"].figures}
+    flats = [s for s in known if s.kind == "flat" and s.exposure != "flat-50"]  # the stack's twin
+    inside = [s for s in flats if s.level_dn < 0.7 * max(s.level_dn for s in flats)]
+    left = []
+    for out in inside:
+        figures = figures_of_merit([s for s in known if s.exposure != out.exposure])
+        left.append([q.value for q in figures if q.name in ("K", "R")])
+    jackknife = np.sqrt((len(left) - 1) * np.var(np.array(left, float), axis=0))
+    assert [stated["K"], stated["R"]] == pytest.approx(jackknife, rel=1 / 3)
+
+
 def test_what_is_wrong_with_the_real_ccd_is_said(ccd: Fit) -> None:
     assert len(ccd.segments.lines) == 1
     assert ccd.segments.scatter > 0

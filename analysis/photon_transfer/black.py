@@ -1,9 +1,9 @@
 """Black level and dark current of one channel: the mean of darks against exposure time."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 from scipy import stats
 
 P_SCALED = 0.01  # scatter rarer than this is real: errors are scaled by it
@@ -35,9 +35,7 @@ class DarkLine:
         return self.black_dn + (self.current_dn_per_s or 0.0) * exposure_time_s
 
 
-def dark_line(
-    times_s: Sequence[float], levels_dn: Sequence[float], errors_dn: Sequence[float]
-) -> DarkLine:
+def dark_line(times_s: ArrayLike, levels_dn: ArrayLike, errors_dn: ArrayLike) -> DarkLine:
     """Return the weighted least-squares line; a constant where there are fewer than three times.
 
     With two exposure times a line fits whatever the darks did; they count as one level each, so a
@@ -45,8 +43,8 @@ def dark_line(
     """
     t, y = np.asarray(times_s, float), np.asarray(levels_dn, float)
     error = np.maximum(np.asarray(errors_dn, float), 1e-9)
-    line = len(set(times_s)) >= 3
-    design = np.stack([np.ones_like(t), t], 1) if line else np.ones((t.size, 1))
+    design = dark_design(t, t)
+    line = design.shape[1] > 1
     scale = np.array([1.0, max(float(np.abs(t).max()), 1e-30)])[: design.shape[1]]
     whitened = design / scale / error[:, None]
     solution, *_ = np.linalg.lstsq(whitened, y / error, rcond=None)
@@ -59,3 +57,22 @@ def dark_line(
     current = float(value[1]) if line else None
     current_se = float(sd[1]) if line else None
     return DarkLine(float(value[0]), float(sd[0]), current, current_se, chi2, dof)
+
+
+def dark_design(times_s: ArrayLike, at_s: ArrayLike) -> NDArray[np.float64]:
+    """Return what black level and dark current count at some times, for darks of `times_s`.
+
+    A row for each of `at_s`; the column of the current is there from three times of darks on.
+    """
+    at = np.asarray(at_s, float)
+    line = np.unique(np.asarray(times_s, float)).size >= 3
+    return np.stack([np.ones_like(at), at], 1) if line else np.ones((at.size, 1))
+
+
+def dark_shares(times_s: ArrayLike, errors_dn: ArrayLike, at_s: ArrayLike) -> NDArray[np.float64]:
+    """Return what each dark counts in the value of `dark_line` at some times; (time, dark)."""
+    error = np.maximum(np.asarray(errors_dn, float), 1e-9)
+    design = dark_design(times_s, times_s)
+    scale = np.maximum(np.abs(design).max(0), 1e-30)
+    solve = np.linalg.pinv(design / scale / error[:, None]) / error
+    return np.asarray(dark_design(times_s, at_s) / scale @ solve)

@@ -1,6 +1,7 @@
 """What bends the mean level: non-linearity, saturation, paths that disagree."""
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -258,11 +259,14 @@ def _nearer(
 
     count = 1 + (not fixed) + (apart > 0)
     simplex = np.vstack([np.zeros(count), 0.1 * np.eye(count)])
+    options: Any = {
+        "initial_simplex": simplex,
+        "maxfev": 150 * count,
+        "xatol": 1e-3,
+        "fatol": 1e-2,
+    }
     own = minimize(
-        lambda moved: misfit(*there(moved)),
-        np.zeros(count),
-        method="Nelder-Mead",
-        options={"initial_simplex": simplex, "maxfev": 150 * count, "xatol": 1e-3, "fatol": 1e-2},
+        lambda moved: misfit(*there(moved)), np.zeros(count), method="Nelder-Mead", options=options
     )
     return min(start, (float(own.fun), there(own.x)))
 

@@ -12,6 +12,8 @@ from analysis.scale import Scale
 from analysis.votes import scored
 from dsis.errors import Fault, InputError
 
+ROBOTS = "simulated_observers"
+
 
 def is_sureal(path: Path) -> bool:
     """Return whether a file is to be read as sureal's JSON."""
@@ -24,7 +26,8 @@ def read_sureal(path: Path) -> pd.DataFrame:
     `os` of a video is {observer: vote or list of votes}, or a list of votes, one an observer (these
     are then called o1, o2 ...); null is a vote not given. A video whose path is its content's
     reference video is a hidden reference. Stimuli are named by `asset_name`, else `path`, else by
-    content and asset id.
+    content and asset id. Observers whom the dataset lists as `simulated_observers`, a key of
+    dsis that sureal passes over, are marked as simulated.
 
     Raises
     ------
@@ -33,6 +36,7 @@ def read_sureal(path: Path) -> pd.DataFrame:
     """
     dataset = _load(path)
     contents, references = _contents(dataset)
+    robots = _robots(dataset, path)
     faults: list[Fault] = []
     rows = []
     for at, video in enumerate(dataset["dis_videos"]):
@@ -46,7 +50,7 @@ def read_sureal(path: Path) -> pd.DataFrame:
         name = _name(video, content)
         try:
             rows += [
-                (who, name, content, kind, repetition, vote)
+                (who, name, content, kind, repetition, vote, who in robots)
                 for who, repetition, vote in _votes(video["os"])
             ]
         except ValueError as error:
@@ -55,7 +59,7 @@ def read_sureal(path: Path) -> pd.DataFrame:
         raise InputError(faults)
     if not rows:
         raise InputError.of(path, "dis_videos", "holds no votes")
-    columns = ["observer", "stimulus", "content", "kind", "repetition", "vote"]
+    columns = ["observer", "stimulus", "content", "kind", "repetition", "vote", "simulated"]
     return pd.DataFrame(rows, columns=columns).astype({"vote": "float64"})
 
 
@@ -77,6 +81,15 @@ def _contents(dataset: dict[str, Any]) -> tuple[dict[Any, str], dict[Any, Any]]:
     videos = [v for v in dataset.get("ref_videos", []) if isinstance(v, dict)]
     names = {v.get("content_id"): str(v.get("content_name", v.get("content_id"))) for v in videos}
     return names, {v.get("content_id"): v["path"] for v in videos if v.get("path")}
+
+
+def _robots(dataset: dict[str, Any], path: Path) -> set[str]:
+    """Return the observers that the dataset says are simulated."""
+    names = dataset.get(ROBOTS, [])
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        fact = f"is {json.dumps(names)[:40]}, must be a list of observers"
+        raise InputError.of(path, ROBOTS, fact)
+    return set(names)
 
 
 def _is_reference(video: dict[str, Any], references: dict[Any, Any]) -> bool:
@@ -138,6 +151,7 @@ def write_sureal(votes: pd.DataFrame, path: Path, scale: Scale, title: str = "ds
         "dataset_name": title,
         "yuv_fmt": "notyuv",
         "ref_score": scale.high,
+        ROBOTS: sorted(set(names[rows["simulated"]])),
         "ref_videos": [
             {"content_id": number, "content_name": name, "path": references[name]}
             for name, number in contents.items()

@@ -48,6 +48,8 @@ def lengthen(
 def write_wide(votes: pd.DataFrame, path: Path) -> None:
     """Write the scored votes with one row a stimulus and repetition, one column an observer.
 
+    Where votes are simulated, a column says so; those of people then stand in rows of their own.
+
     Raises
     ------
     InputError
@@ -62,11 +64,14 @@ def write_wide(votes: pd.DataFrame, path: Path) -> None:
         fact = "stands in several labs" if twice else "is the name of another column"
         raise InputError.of("observer", ", ".join(twice or taken), f"{fact}: cannot be a column")
     about = ["stimulus", *CONDITION, "kind", "repetition"]
+    if rows["simulated"].any():
+        about.append("simulated")
+    key = ["stimulus", "repetition", "simulated"]
     by_stimulus = {
-        key: dict(zip(mine["observer"], mine["vote"], strict=True))
-        for key, mine in rows.groupby(["stimulus", "repetition"], sort=True)
+        one: dict(zip(mine["observer"], mine["vote"], strict=True))
+        for one, mine in rows.groupby(key, sort=True)
     }
-    first = rows.drop_duplicates(["stimulus", "repetition"]).set_index(["stimulus", "repetition"])
+    first = rows.drop_duplicates(key).set_index(key)
     table = first.loc[list(by_stimulus)].reset_index()[about]
     observers = people["observer"].tolist()
     for name in observers:

@@ -13,7 +13,7 @@ from analysis.votesfile import read_test
 from dsis.cli import main
 from dsis.errors import InputError
 from dsis.manifest import Clip, ClipFiles, Manifest, Quality, write_manifest
-from dsis.session import export_votes, run_robots
+from dsis.session import run_robots
 from dsis.session.store import STORE
 from dsis.spec import Sequence, Session
 
@@ -155,6 +155,11 @@ def test_a_dataset_of_sureal(tmp_path):
             "dis_videos[0].os",
             'of a is "x", must be a number',
         ),
+        (
+            '{"dis_videos": [{"os": {"a": 3}}], "simulated_observers": "a"}',
+            "simulated_observers",
+            'is "a", must be a list of observers',
+        ),
         ('{"dis_videos": [{"os": {"a": true}}]}', "dis_videos[0].os", "must be a number"),
         ('{"dis_videos": [{"os": {"a": 7}}]}', "vote 1, vote", "must be from 1 to 5"),
     ],
@@ -201,13 +206,14 @@ def write_stimuli(folder):
     write_manifest(manifest, folder)
 
 
-def test_the_store_is_read_as_its_export(tmp_path):
+def test_the_store_is_read_as_its_export(tmp_path, capsys):
     folder = tmp_path / "stimuli"
     write_stimuli(folder)
     with pytest.raises(InputError, match="no session has been held"):
         analysis.read_votes(folder)
     run_robots(folder, 3, seed=5)
-    export_votes(folder, tmp_path / "votes")
+    assert main(["votes", str(folder), "-o", str(tmp_path / "votes")]) == 0
+    assert "SIMULATED: all of these votes" in capsys.readouterr().out
     exported = analysis.read_votes(tmp_path / "votes" / "votes.csv")
     for path in (folder, folder / STORE):
         votes, test = read_test(path)
@@ -218,6 +224,24 @@ def test_the_store_is_read_as_its_export(tmp_path):
     page = (tmp_path / "report" / "report.html").read_text(encoding="utf-8")
     assert "SIMULATED VOTES" in page
     assert "By hand" in page
+    sureal = analysis.read_votes(tmp_path / "votes" / "sureal.json")
+    assert sureal["simulated"].all()
+
+
+def test_every_form_of_votes_says_whose_are_simulated(tmp_path):
+    rows = [("ann", "a", 3), ("bot", "a", 4), ("ann", "b", 5), ("bot", "b", 6)]
+    votes = pd.DataFrame(rows, columns=["observer", "stimulus", "vote"])
+    votes = votes.assign(simulated=votes["observer"] == "bot")
+    analysis.write_sureal(votes, tmp_path / "votes.json", Scale(1, 10))
+    analysis.write_votes(votes, tmp_path / "votes.csv")
+    analysis.write_wide(votes, tmp_path / "wide.csv")
+    for name in ("votes.json", "votes.csv", "wide.csv"):
+        again = analysis.read_votes(tmp_path / name, PAPER)
+        again = again[again["vote"].notna()]
+        assert again.groupby("observer")["simulated"].all().to_dict() == {"ann": False, "bot": True}
+        assert len(again) == 4
+    analysis.write_wide(votes.assign(simulated=False), tmp_path / "wide.csv")
+    assert "simulated" not in (tmp_path / "wide.csv").read_text(encoding="utf-8")
 
 
 def lab(folder, text, scale="[1, 10]"):

@@ -118,5 +118,7 @@ def votes(options: argparse.Namespace) -> None:
     """Export the recorded votes."""
     from dsis.session import export_votes
 
-    export_votes(options.stimuli_dir, options.out, personal=options.personal)
+    simulated = export_votes(options.stimuli_dir, options.out, personal=options.personal)
+    if simulated != "none":
+        print(f"SIMULATED: {simulated} of these votes are of robots, not of people")
     print(f"votes in {options.out / 'votes.csv'}; report: dsis report {options.out / 'votes.csv'}")

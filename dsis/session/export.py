@@ -5,7 +5,7 @@ import io
 import json
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from dsis.errors import InputError
 from dsis.manifest import Manifest, read_manifest
@@ -41,10 +41,11 @@ FILES = {
     SUREAL: "valid votes on the test, as a dataset of the program sureal",
 }
 
+Simulated = Literal["all", "some", "none"]
 _Table = tuple[Sequence[Column], Sequence[object]]
 
 
-def export_votes(folder: Path, out: Path, *, personal: bool = False) -> None:
+def export_votes(folder: Path, out: Path, *, personal: bool = False) -> Simulated:
     """Write `votes.csv` and the tables beside it, frame log, sureal's JSON and `datapackage.json`.
 
     The same votes give the same bytes. A session may be running: its votes so far are written.
@@ -57,6 +58,11 @@ def export_votes(folder: Path, out: Path, *, personal: bool = False) -> None:
         A new folder, or an earlier export, which is replaced.
     personal
         Write `people.csv` too: age groups and screening of the observers.
+
+    Returns
+    -------
+    Simulated
+        Whether all, some or none of the votes are simulated.
 
     Raises
     ------
@@ -77,7 +83,8 @@ def export_votes(folder: Path, out: Path, *, personal: bool = False) -> None:
                 PEOPLE,
                 [Person(name, at, record) for name, (at, record) in records],
             )
-        package = _package(store, manifest, tables)
+        simulated = _simulated(shown)
+        package = _package(store, manifest, tables, simulated)
         sureal = sureal_dataset(manifest, shown)
     with result_folder(out, PACKAGE, keep=_not_ours) as partial:
         for name, (columns, entries) in tables.items():
@@ -87,6 +94,7 @@ def export_votes(folder: Path, out: Path, *, personal: bool = False) -> None:
         for name, values in ((SUREAL, sureal), (PACKAGE, package)):
             text = json.dumps(values, indent=1, ensure_ascii=False) + "\n"
             (partial / name).write_text(text, encoding="utf-8", newline="")
+    return simulated
 
 
 def _shown(store: Store, manifest: Manifest, logs: list[dict[str, Any]]) -> Iterator[Shown]:
@@ -146,16 +154,23 @@ def _confirmed(fact: dict[str, Any]) -> Confirmed:
     )
 
 
-def _package(store: Store, manifest: Manifest, tables: dict[str, _Table]) -> dict[str, Any]:
+def _simulated(shown: Sequence[Shown]) -> Simulated:
+    marks = [entry.vote.simulated for entry in shown if entry.vote is not None]
+    if all(marks):
+        return "all"
+    return "some" if any(marks) else "none"
+
+
+def _package(
+    store: Store, manifest: Manifest, tables: dict[str, _Table], simulated: Simulated
+) -> dict[str, Any]:
     """Return what `datapackage.json` says of the test, of every column and of the other files."""
-    simulated = [row.vote.simulated for row in store.rows() if row.vote is not None]
-    some = "some" if any(simulated) else "none"
     return {
         "schema": SCHEMA,
         "title": manifest.title,
         "scale": list(manifest.session.scale),
         "labels": list(manifest.session.labels),
-        "simulated": "all" if all(simulated) else some,
+        "simulated": simulated,
         "manifest_sha256": store.manifest_sha256,
         "resources": [
             {

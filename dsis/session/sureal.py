@@ -12,16 +12,20 @@ def sureal_dataset(manifest: Manifest, shown: Sequence[Shown]) -> dict[str, Any]
     """Return the valid votes of the test by stimulus and observer; JSON can hold it.
 
     Observers with repeated presentations have a list of votes. A hidden reference is the video
-    whose path is its content's reference.
+    whose path is its content's reference. `simulated_observers`, which sureal passes over, names
+    the observers that are simulated.
     """
     clips = {clip.stimulus: clip for clip in manifest.clips}
     scores: dict[str, dict[str, dict[int, int]]] = {}
+    robots: set[str] = set()
     for entry in shown:
         p, vote = entry.presentation, entry.vote
         if p.kind not in SCORED or vote is None or not vote.valid or vote.vote is None:
             continue
         by_observer = scores.setdefault(p.stimulus, {})
         by_observer.setdefault(entry.observer, {})[p.repetition] = vote.vote
+        if vote.simulated:
+            robots.add(entry.observer)
     contents = list(dict.fromkeys(clips[stimulus].content for stimulus in sorted(scores)))
     references = {c.content: c.reference or c.stimulus for c in map(clips.__getitem__, scores)}
     return {
@@ -30,6 +34,7 @@ def sureal_dataset(manifest: Manifest, shown: Sequence[Shown]) -> dict[str, Any]
         "width": manifest.sequence.width,
         "height": manifest.sequence.height,
         "ref_score": manifest.session.scale[1],
+        "simulated_observers": sorted(robots),
         "ref_videos": [
             {"content_id": number, "content_name": content, "path": references[content]}
             for number, content in enumerate(contents)

@@ -72,7 +72,8 @@ def simulated_mark(share: float) -> str:
     """Return the words that stand with every table and figure; empty where no vote is simulated."""
     if share <= 0:
         return ""
-    return "SIMULATED VOTES" if share >= 1 else f"{100 * share:.2g} % SIMULATED VOTES"
+    # A single vote of a person among them: not yet 100 %.
+    return "SIMULATED VOTES" if share >= 1 else f"{min(100 * share, 99):.2g} % SIMULATED VOTES"
 
 
 def _mark_simulated(figure: Figure, share: float) -> None:

@@ -3,7 +3,7 @@
 import csv
 import io
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import pandas as pd
@@ -27,6 +27,7 @@ class Rejected:
 
     lab: str
     observer: str
+    simulated: bool = field(default=False, compare=False)
 
     def __str__(self) -> str:
         return f"{self.lab}/{self.observer}" if self.lab else self.observer
@@ -74,8 +75,8 @@ def reject(
         A name is no observer's, or several observers', or nobody would be left.
     """
     whole = complete(votes)
-    people = index_votes(whole).observers[["lab", "observer"]]
-    known = [Rejected(lab, name) for lab, name in people.itertuples(index=False, name=None)]
+    people = index_votes(whole).observers[["lab", "observer", "simulated"]]
+    known = [Rejected(*person) for person in people.itertuples(index=False, name=None)]
     faults, chosen = [], set()
     given = dict.fromkeys(accepted, "--accept") | dict.fromkeys(observers, "--reject")
     for name, option in given.items():

@@ -15,10 +15,9 @@ from analysis.screening import (
     screen_correlation,
 )
 from analysis.table import Column, Kind
-from analysis.votes import COLUMNS, CONDITION, index_votes
+from analysis.votes import COLUMNS, CONDITION, SIMULATED, index_votes
 
 _VOTE = {column.name: column for column in COLUMNS}
-_SIMULATED = Column("simulated", Kind.FLAG, "", "true: simulated votes are among these")
 
 
 def _score(name: str, meaning: str) -> Column:
@@ -42,7 +41,7 @@ MOS_COLUMNS = (
     _score("score_p910", "maximum-likelihood score (P.910, Annex E)"),
     _score("p910_ci_low", "lower end of its 95 % interval"),
     _score("p910_ci_high", "upper end of the same"),
-    _SIMULATED,
+    SIMULATED,
     Column("kind", Kind.TEXT, "", "test, or reference: a hidden reference"),
     Column("ci_method", Kind.TEXT, "", "of ci_low: t; binomial where all agree; none"),
     _score("ci_binomial_low", "lower end of the 95 % interval by Clopper-Pearson, conservative"),
@@ -62,7 +61,7 @@ OBSERVER_COLUMNS = (
     Column("bt500_rejected", Kind.FLAG, "", "(p + q) / n > 0.05 and |p - q| / (p + q) < 0.3"),
     Column("correlation", Kind.NUMBER, "", "smaller of Pearson's and Spearman's, votes with mos"),
     Column("correlation_rejected", Kind.FLAG, "", "at most min(0.7, mean - sd over the observers)"),
-    _SIMULATED,
+    SIMULATED,
     _VOTE["lab"],
 )
 

@@ -55,6 +55,8 @@ COLUMNS = (
     Column("simulated", Kind.FLAG, "", "true: the vote of a simulated observer", default=False),
 )
 _DTYPES = {column.name: pd.Series(dtype=DTYPES[column.kind]).dtype for column in COLUMNS}
+SIMULATED = Column("simulated", Kind.FLAG, "", "true: simulated votes are among these")
+"""The mark that every table computed from votes has."""
 CONDITION = ("content", "noise", "demosaic", "level")
 
 

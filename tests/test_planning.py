@@ -188,7 +188,9 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     assert main([*command, "--alpha", "0.001", "--groups"]) == 2
     assert "--alpha: is not used with --pilot" in capsys.readouterr().err
     assert main([*command, "--observers", "8", "12", "--seed", "2"]) == 0
+    assert capsys.readouterr().out.startswith("SIMULATED VOTES: ")
     out = tmp_path / "pilot-plan"
+    assert pd.read_csv(out / "power.csv")["simulated"].all()
     assert sorted(p.name for p in out.iterdir()) == ["power.csv", "power.png", "power.svg"]
     assert "SIMULATED VOTES" in (out / "power.svg").read_text(encoding="utf-8")
     before = {p.name: p.read_bytes() for p in out.iterdir()}

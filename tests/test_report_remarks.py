@@ -6,8 +6,11 @@ import pytest
 from scipy.stats import beta
 
 import analysis
+from analysis.figures import simulated_mark
 from analysis.report import Options, analyse
+from analysis.report.tables import TABLES
 from analysis.scale import Description, Scale
+from dsis.cli import main
 from opinions import MARK, PICTURES, Page, make_votes, marks_in_figure, page, report, table
 
 
@@ -28,11 +31,60 @@ def test_simulated_votes_are_marked_in_every_table_and_figure(tmp_path, share):
     assert mark.encode() in (out / "mos.png").read_bytes()  # among its properties
     for name in PICTURES:
         assert mark in (out / f"{name}.svg").read_text()
-    for name in ("mos.csv", "observers.csv", "removed_votes.csv"):
-        flags = pd.read_csv(out / name)["simulated"]
+    for name in TABLES:
+        rows = pd.read_csv(out / name)
+        assert "simulated" in rows, name
+        if name == "order.csv":  # no row: the votes have no order
+            continue
+        flags = rows["simulated"]
         assert flags.dtype == bool
-        assert flags.all() if share == 1 or name == "mos.csv" else flags.any()
+        if "observer" in rows:
+            assert flags.tolist() == (rows["observer"].str[1:].astype(int) <= share * 18).tolist()
+        else:
+            assert flags.all()
     assert "say nothing about what people see" in parsed.remarks
+
+
+@pytest.mark.usefixtures("unpainted")
+@pytest.mark.parametrize(("share", "mark"), [(1.0, MARK), (0.5, f"50 % {MARK}"), (0.0, None)])
+def test_the_terminal_says_what_the_report_says(tmp_path, capsys, share, mark):
+    votes = make_votes(methods=("none",))
+    robots = votes["observer"].str[1:].astype(int) <= share * 18
+    analysis.write_votes(votes.assign(simulated=robots), tmp_path / "votes.csv")
+    assert main(["report", str(tmp_path / "votes.csv"), "--scale", "1", "10"]) == 0
+    said = capsys.readouterr().out
+    assert said.startswith(f"{mark}: ") if mark else "SIMULATED" not in said
+    assert "- The scale is 1 to 10, not BT.500's" in said
+
+
+@pytest.mark.usefixtures("unpainted")
+def test_observers_left_out_keep_their_mark(tmp_path):
+    votes = make_votes(methods=("none",))
+    analysis.write_votes(votes.assign(simulated=votes["observer"] == "s1"), tmp_path / "votes.csv")
+    results = analysis.write_report(
+        tmp_path / "votes.csv", tmp_path / "report", (1, 10), rejected=["s1", "s2"]
+    )
+    assert results.counts.simulated_share == 0
+    left_out = pd.read_csv(tmp_path / "report" / "rejections.csv").set_index("observer")
+    assert left_out.loc[["s1", "s2"], "simulated"].tolist() == [True, False]
+
+
+def test_votes_of_robots_that_are_not_marked_are_remarked_on():
+    votes = table(TYPICAL, simulated=False)
+    robots = votes.assign(observer="robot-" + votes["observer"])
+    for shown, expected in (
+        (robots.drop(columns="simulated"), True),
+        (robots, True),
+        (robots.assign(simulated=True), False),
+        (pd.concat([robots, votes]), False),
+    ):
+        found = " ".join(analyse(shown, Description(Scale(1, 5))).remarks)
+        said = "all observers are called as dsis calls its simulated ones: robot-o0, robot-o1"
+        assert (said in found) is expected
+
+
+def test_a_single_person_among_robots_is_not_rounded_away():
+    assert simulated_mark(0.9999) == f"99 % {MARK}"
 
 
 # Votes on 24 stimuli by sixteen observers, nothing remarkable about them.

@@ -7,11 +7,12 @@ import matplotlib as mpl
 import pandas as pd
 from matplotlib.figure import Figure
 
-from analysis.figures import COLOURS, INK, MARKS, STYLE, save
+from analysis.figures import COLOURS, INK, MARKS, STYLE, save, simulated_mark
 from analysis.planning.pilot import ALPHA, OBSERVERS, POWER_COLUMNS, power_from_pilot
 from analysis.planning.samplesize import Plan, observers_needed, power_of
-from analysis.report.remarks import count_votes
+from analysis.report.remarks import count_votes, unmarked_robots
 from analysis.table import to_csv
+from analysis.votes import index_votes
 from analysis.votesfile import read_test
 from dsis.errors import Fault, InputError
 from dsis.outdir import UNFINISHED, result_folder
@@ -76,7 +77,10 @@ def write_power(options: argparse.Namespace) -> str:
         share = count_votes(votes).simulated_share
         draw_power(table, options.power, share, partial / "power")
     wide = table.pivot_table(index="comparison", columns="observers", values="power", sort=False)
-    return f"power by number of observers\n{wide.round(2).to_string()}\nin {out}"
+    mark = simulated_mark(share)
+    lines = [f"{mark}: what holds for them may not hold for people"] if mark else []
+    lines += ["power by number of observers", wide.round(2).to_string()]
+    return "\n".join([*lines, *unmarked_robots(index_votes(votes)), f"in {out}"])
 
 
 def _not_ours(out: Path) -> str | None:

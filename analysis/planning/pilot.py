@@ -1,6 +1,7 @@
 """Power of a larger test, simulated with the observer model fitted to a pilot's votes."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +14,7 @@ from analysis.inference.design import CELL, Contrast, list_contrasts, not_compar
 from analysis.models import fit_p910
 from analysis.scale import Scale
 from analysis.table import Column, Kind
-from analysis.votes import Indexed, index_votes
+from analysis.votes import SIMULATED, Indexed, index_votes
 from dsis.errors import InputError
 
 RUNS = 1000
@@ -27,6 +28,7 @@ POWER_COLUMNS = (
     Column("difference", Kind.NUMBER, "grade", "of the two scores in the simulation"),
     Column("power", Kind.NUMBER, "", "share of simulated tests that show it: paired t, Holm"),
     Column("power_se", Kind.NUMBER, "", "standard error of that share"),
+    replace(SIMULATED, meaning="true: simulated votes are among those of the pilot"),
 )
 
 
@@ -81,7 +83,8 @@ def power_from_pilot(
         _simulated(panel, pairs, size, runs, np.random.SeedSequence([seed, size]))
         for size in sorted(set(observers))
     ]
-    return pd.concat(tables, ignore_index=True)
+    robots = bool(scored.observers["simulated"].any())
+    return pd.concat(tables, ignore_index=True).assign(simulated=robots)
 
 
 class _Panel(NamedTuple):

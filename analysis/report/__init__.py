@@ -33,7 +33,7 @@ def write_report(
     accepted: Iterable[str] = (),
     threshold: float = THRESHOLD_SD,
     passes: int = 1,
-) -> None:
+) -> Results:
     """Write the MOS report of votes: the files `FILES`, into the folder `out`.
 
     The page holds its figures and needs no network. The same votes give the same bytes. Work goes
@@ -53,6 +53,11 @@ def write_report(
         decided by the report itself.
     threshold, passes
         Of the removal of votes: standard deviations, and how often.
+
+    Returns
+    -------
+    Results
+        What the report shows.
 
     Raises
     ------
@@ -76,6 +81,7 @@ def write_report(
         texts["report.html"] = render(results, test, names, figures)
         for name, text in texts.items():
             (partial / name).write_text(text, encoding="utf-8", newline="")
+    return results
 
 
 def _not_ours(out: Path) -> str | None:

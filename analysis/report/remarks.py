@@ -13,7 +13,8 @@ from analysis.repeatability import Retest
 from analysis.scale import Scale
 from analysis.screening import THRESHOLD_SD
 from analysis.sos import SUSPICIOUS, SosFit
-from analysis.votes import SCORED_KINDS, complete, index_votes
+from analysis.votes import SCORED_KINDS, Indexed, complete, index_votes
+from dsis.session.robots import ROBOT
 
 FEW_OBSERVERS = 15  # BT.500: fewer make an informal test
 MANY_REMOVED = 0.10
@@ -119,6 +120,8 @@ def _about_the_test(votes: pd.DataFrame, scale: Scale, counts: Counts) -> Iterat
             f"{100 * counts.simulated_share:.3g} % of the scored votes are simulated: they show "
             "that the procedure works and say nothing about what people see."
         )
+    scored = index_votes(votes)
+    yield from unmarked_robots(scored)
     if counts.observers < FEW_OBSERVERS:
         yield (
             f"{_number(counts.observers, 'observer')}: with fewer than {FEW_OBSERVERS} BT.500 "
@@ -126,7 +129,6 @@ def _about_the_test(votes: pd.DataFrame, scale: Scale, counts: Counts) -> Iterat
         )
     if (scale.low, scale.high) != (1, 5):
         yield f"The scale is {scale}, not BT.500's impairment scale of five grades."
-    scored = index_votes(votes)
     if len(scored.table["repetition"].unique()) > 1:
         yield (
             "Sequences were shown repeatedly to the same observers. Their votes are pooled, as if "
@@ -139,6 +141,17 @@ def _about_the_test(votes: pd.DataFrame, scale: Scale, counts: Counts) -> Iterat
     most = int(scored.per_stimulus(np.ones(len(scored.vote))).max())
     if len(scored.vote) < most * len(scored.stimuli):
         yield "Not all sequences have the same number of votes: see n."
+
+
+def unmarked_robots(scored: Indexed) -> Iterator[str]:
+    """Yield a sentence where all observers are called as dsis calls its robots, none marked so."""
+    names = scored.observers["observer"]
+    if names.str.startswith(ROBOT).all() and not scored.observers["simulated"].any():
+        yield (
+            f"No vote is marked as simulated, but all observers are called as dsis calls its "
+            f"simulated ones: {_names(names)}. If they are, the votes lack the column simulated "
+            "(true for each)."
+        )
 
 
 def _about_the_removal(counts: Counts, scores: pd.DataFrame, findings: Findings) -> Iterator[str]:

@@ -1,4 +1,4 @@
-"""The tables of a report as CSV: which file has which columns."""
+"""The tables of a report as CSV: which file has which columns; each says what is simulated."""
 
 from dataclasses import replace
 
@@ -14,8 +14,9 @@ from analysis.scores import MOS_COLUMNS, OBSERVER_COLUMNS
 from analysis.screening import REMOVED_COLUMNS
 from analysis.screens import SCREEN_COLUMNS
 from analysis.table import Column
+from analysis.votes import SIMULATED
 
-TABLES: dict[str, tuple[Column, ...]] = {
+_COLUMNS: dict[str, tuple[Column, ...]] = {
     "mos.csv": MOS_COLUMNS,
     "observers.csv": OBSERVER_COLUMNS,
     "removed_votes.csv": REMOVED_COLUMNS,
@@ -26,6 +27,12 @@ TABLES: dict[str, tuple[Column, ...]] = {
     "screens.csv": SCREEN_COLUMNS,
     "rejections.csv": PROPOSAL_COLUMNS,
     "order.csv": ORDER_COLUMNS,
+}
+TABLES = {
+    name: columns
+    if any(column.name == SIMULATED.name for column in columns)
+    else (*columns, SIMULATED)
+    for name, columns in _COLUMNS.items()
 }
 
 
@@ -50,7 +57,7 @@ def columns_of(options: Options) -> dict[str, tuple[Column, ...]]:
 
 def tables_of(results: Results) -> dict[str, pd.DataFrame]:
     """Return the table of each file of `TABLES`."""
-    return {
+    tables = {
         "mos.csv": results.scores,
         "observers.csv": results.observers,
         "removed_votes.csv": results.removed,
@@ -62,3 +69,20 @@ def tables_of(results: Results) -> dict[str, pd.DataFrame]:
         "rejections.csv": keep_decisions(results.proposal, results.options.rejected),
         "order.csv": results.order,
     }
+    return {name: _marked(table, results) for name, table in tables.items()}
+
+
+def _marked(table: pd.DataFrame, results: Results) -> pd.DataFrame:
+    """Say of each row whether its votes are simulated: by observer, by stimulus, or of them all."""
+    if SIMULATED.name in table:
+        return table
+    if "observer" in table:
+        known = results.observers[["lab", "observer", SIMULATED.name]].to_numpy().tolist()
+        people = {(lab, observer): simulated for lab, observer, simulated in known}
+        people |= {(one.lab, one.observer): one.simulated for one in results.options.rejected}
+        mine = zip(table["lab"], table["observer"], strict=True)
+        return table.assign(**{SIMULATED.name: [people[person] for person in mine]})
+    if "stimulus" in table:
+        stimuli = results.scores.set_index("stimulus")[SIMULATED.name]
+        return table.assign(**{SIMULATED.name: table["stimulus"].map(stimuli)})
+    return table.assign(**{SIMULATED.name: results.counts.simulated_share > 0})

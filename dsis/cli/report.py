@@ -30,13 +30,14 @@ def add_report(add: Add) -> None:
 
 def report(options: argparse.Namespace) -> None:
     """Write the MOS report."""
+    from analysis.figures import simulated_mark
     from analysis.rejection import read_accepted
     from analysis.report import write_report
 
     first: Path = options.votes[0]
     out = options.out or first.with_name(f"{first.stem}-report")
     accepted = [] if options.accept is None else read_accepted(options.accept)
-    write_report(
+    results = write_report(
         options.votes,
         out,
         tuple(options.scale) if options.scale else None,
@@ -45,7 +46,12 @@ def report(options: argparse.Namespace) -> None:
         threshold=options.threshold,
         passes=options.passes,
     )
+    mark = simulated_mark(results.counts.simulated_share)
+    if mark:
+        print(f"{mark}: these scores are not those of people")
     print(mos_table(out / "mos.csv"))
+    for remark in results.remarks:
+        print(f"- {remark}")
     print(f"report in {out / 'report.html'}")
 
 

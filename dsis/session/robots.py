@@ -39,6 +39,8 @@ HALF_SCALE_DELTA_E = 4.0
 SOS = 0.19
 BIAS_VARIANCE = 0.089 / (5 - 1) ** 2  # of the squared width of the scale
 LAPSES = 0.01
+ROBOT = "robot-"
+"""How the names of robots begin."""
 CLOCK_START = datetime(1970, 1, 1, tzinfo=UTC)  # robots vote on a clock of their own
 
 _Grades = NDArray[np.float64]
@@ -116,10 +118,10 @@ def run_robots(folder: Path, observers: int, seed: int, setup: Setup | None = No
             put_in_force(store, setup, manifest.session)
         hidden = current_setup(store, manifest.session).hidden_references
         for number in range(1, observers + 1):
-            name = f"robot-{number:03d}"
+            name = f"{ROBOT}{number:03d}"
             known = store.observer(name)
             if known is None:
-                mirrors = None if number % 2 else f"robot-{number - 1:03d}"
+                mirrors = None if number % 2 else f"{ROBOT}{number - 1:03d}"
                 plan = draw_plan(manifest, name, seed, mirrors=mirrors, hidden_references=hidden)
                 _run(store, name, plan, energies, manifest.session)
             elif not known.simulated or known.seed != seed:

@@ -5,7 +5,7 @@ every other column of `COLUMNS` may be absent and then has its default everywher
 """
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from analysis.table import DTYPES, Column, Kind
 from analysis.table import codebook as table_codebook
-from dsis.errors import InputError
+from dsis.errors import Fault, InputError
 
 TABLE = "votes"  # what messages call a table that came from no file
 SCORED_KINDS = ("test", "reference")
@@ -65,14 +65,29 @@ def codebook() -> list[dict[str, str]]:
     return table_codebook(COLUMNS)
 
 
+def misspelt(names: Iterable[object]) -> dict[str, str]:
+    """Return {name: column meant} of names that are a column's but for capitals, blanks, hyphens.
+
+    Such a column would be passed over, and what it says of the votes with it. Not where the column
+    meant is there as well.
+    """
+    given = [str(name) for name in names]
+    absent = {column.name for column in COLUMNS} - set(given)
+    plain = {name: re.sub(r"[\s-]+", "_", name.strip().lower()) for name in given}
+    return {name: meant for name, meant in plain.items() if meant in absent}
+
+
 def complete(votes: pd.DataFrame) -> pd.DataFrame:
     """Return the table with every column of `COLUMNS`, in their types and defaults.
 
     Raises
     ------
     InputError
-        A needed column is missing, or a column cannot be brought to its type.
+        A needed column is missing or misspelt, or a column cannot be brought to its type.
     """
+    wrong = misspelt(votes.columns)
+    if wrong:
+        raise InputError(Fault(TABLE, name, f"must be spelled {wrong[name]}") for name in wrong)
     whole = votes.copy()
     for column in COLUMNS:
         if column.required and column.name not in whole:

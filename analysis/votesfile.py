@@ -13,7 +13,7 @@ from analysis.scale import Description, describe_test
 from analysis.storefile import exported, store_folder
 from analysis.surealfile import is_sureal, read_sureal
 from analysis.table import DTYPES, Column, Kind, to_csv
-from analysis.votes import COLUMNS, complete, contradictions
+from analysis.votes import COLUMNS, complete, contradictions, misspelt
 from analysis.widefile import is_wide, lengthen
 from dsis.errors import Fault, InputError
 
@@ -31,7 +31,8 @@ def read_votes(
 
     CSV is UTF-8, with or without byte order mark; cells are parted by commas, semicolons or tabs
     (the latter two may have decimal commas). Blanks around a cell are no part of it; blank lines
-    are passed over; a blank vote is a vote not given. Columns not known are kept as text. A table
+    are passed over; a blank vote is a vote not given. Columns not known are kept as text, but those
+    that are known and spelled otherwise (`Kind`) are refused. A table
     without the columns `observer` and `vote` is wide: one row a stimulus, one column an observer.
     A `.json` is a dataset of sureal; a stimuli folder, or the `votes.sqlite` in it, is the store
     of its session.
@@ -168,11 +169,12 @@ def _delimiter(text: str) -> str:
 def _check_shape(
     file: Path, header: list[str], at: int, lines: list[int], rows: list[list[str]]
 ) -> None:
-    known = ", ".join(header)
-    found: _Found = [
+    known, wrong = ", ".join(header), misspelt(header)
+    found: _Found = [(at, name, f"must be spelled {meant}") for name, meant in wrong.items()]
+    found += [
         (at, column.name, f"column is missing; found here: {known}{_other_names(column, header)}")
         for column in COLUMNS
-        if column.required and column.name not in header and not is_wide(header)
+        if column.required and column.name not in (*header, *wrong.values()) and not is_wide(header)
     ]
     found += [
         (at, name or "header", f"stands {header.count(name)} times" if name else "has no name")

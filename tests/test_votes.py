@@ -113,6 +113,32 @@ def test_all_faults_come_at_once_with_their_rows(tmp_path):
     assert "test, training, dummy, reference" in found["row 5, kind"]
 
 
+@pytest.mark.parametrize(
+    ("header", "wrong"),
+    [
+        ("observer,stimulus,vote,Kind", {"Kind": "kind"}),
+        ("observer,stimulus,vote,VALID", {"VALID": "valid"}),
+        ("observer,stimulus,Vote,Simulated", {"Vote": "vote", "Simulated": "simulated"}),
+        ("observer,stimulus,vote,Dropped frames", {"Dropped frames": "dropped_frames"}),
+        ("stimulus,Simulated,ann,bob", {"Simulated": "simulated"}),
+        ("stimulus,Observer,Vote,x", {"Observer": "observer", "Vote": "vote"}),
+    ],
+)
+def test_known_columns_that_are_spelled_otherwise_are_not_passed_over(tmp_path, header, wrong):
+    """Else dummy, invalid and simulated votes would be scored as those of people."""
+    found = faults(write(tmp_path, f"{header}\na,b,5,1\n"))
+    assert dict(found) == {
+        f"row 1, {name}": f"must be spelled {meant}" for name, meant in wrong.items()
+    }
+
+
+def test_a_data_frame_has_its_columns_by_their_names_too(tmp_path):
+    votes = analysis.read_votes(write(tmp_path, SMALL), PAPER)
+    with pytest.raises(InputError, match="votes: Kind: must be spelled kind"):
+        analysis.mos(votes.rename(columns={"kind": "Kind"}))
+    assert len(analysis.mos(votes.assign(Kind="mine")))  # beside the one that counts
+
+
 def test_a_stimulus_has_one_condition(tmp_path):
     file = write(
         tmp_path,

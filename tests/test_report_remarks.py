@@ -58,6 +58,15 @@ def test_the_terminal_says_what_the_report_says(tmp_path, capsys, share, mark):
 
 
 @pytest.mark.usefixtures("unpainted")
+def test_report_and_terminal_say_why_there_are_no_contrasts(tmp_path, capsys):
+    analysis.write_votes(table(TYPICAL), tmp_path / "votes.csv")
+    assert main(["report", str(tmp_path / "votes.csv"), "--scale", "1", "5"]) == 0
+    why = "No comparison of conditions: the votes lack the columns noise and demosaic"
+    assert f"- {why}" in capsys.readouterr().out
+    assert why in Page(page(tmp_path / "votes-report")).remarks
+
+
+@pytest.mark.usefixtures("unpainted")
 def test_observers_left_out_keep_their_mark(tmp_path):
     votes = make_votes(methods=("none",))
     analysis.write_votes(votes.assign(simulated=votes["observer"] == "s1"), tmp_path / "votes.csv")
@@ -95,6 +104,14 @@ TYPICAL = np.clip(
 ).tolist()
 
 
+# The same, named so that contrasts can be made.
+PAIRED = table(TYPICAL).assign(
+    noise=lambda votes: np.where(votes["stimulus"].str[1:].astype(int) % 2, "sd", "awgn"),
+    demosaic="none",
+    content=lambda votes: "c" + (votes["stimulus"].str[1:].astype(int) // 2).astype(str),
+)
+
+
 @pytest.mark.parametrize(
     ("votes", "remark"),
     [
@@ -105,7 +122,20 @@ TYPICAL = np.clip(
         (table([[4], *TYPICAL]), "A single vote has no interval of Student's: s0"),
         (table([[5] * 15 + [4], *TYPICAL]), "The interval leaves the scale on s0"),
         (table([[4] * 16] * 2), "No correlation exists for o0"),
-        (table(TYPICAL), ""),
+        (table(TYPICAL), "the votes lack the columns noise and demosaic (missing, or blank every"),
+        (table(TYPICAL, noise="sd"), "the votes lack the column demosaic (missing, or blank every"),
+        (
+            pd.concat(
+                [
+                    table([row], noise="sd", demosaic="none", content=f"c{at}", level=0).assign(
+                        stimulus=f"s{at}"
+                    )
+                    for at, row in enumerate(TYPICAL)
+                ]
+            ),
+            "no two sequences of one content and level differ in demosaic alone",
+        ),
+        (PAIRED, ""),
         (table([[5, 4, 4], *TYPICAL]), "Not all sequences have the same number of votes"),
         (
             pd.concat([table(TYPICAL), table(TYPICAL, repetition=2)]),

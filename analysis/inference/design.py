@@ -75,8 +75,34 @@ def list_contrasts(scored: Indexed) -> list[Contrast]:
 
 
 def not_comparable(scored: Indexed) -> Iterator[str]:
-    """Yield a sentence for each condition that several stimuli share: none can be compared then."""
+    """Yield why no conditions can be compared; nothing where they can.
+
+    A sentence for each condition that several stimuli share; else which columns of the votes are
+    missing, or that no two stimuli are a pair.
+    """
     tests = _named(scored)
+    yield from _alike(tests)
+    if tests.empty:
+        yield f"No comparison of conditions: {_unnamed(scored)}."
+    elif not tests[list(CONDITION)].duplicated().any() and not list_contrasts(scored):
+        yield (
+            "No comparison of conditions: no two sequences of one content and level differ in "
+            f"demosaic alone (a method against {UNDEMOSAICKED}) or in noise alone ({CAMERA} "
+            f"against {WHITE})."
+        )
+
+
+def _unnamed(scored: Indexed) -> str:
+    """Return which columns do not say what is compared."""
+    stimuli = scored.stimuli[scored.stimuli["kind"] == "test"]
+    blank = [name for name in ("noise", "demosaic") if (stimuli[name] == "").all()]
+    if not blank:
+        return "no sequence has both a noise and a demosaic in these columns of the votes"
+    columns = f"column{'s' if len(blank) > 1 else ''} {' and '.join(blank)}"
+    return f"the votes lack the {columns} (missing, or blank everywhere)"
+
+
+def _alike(tests: pd.DataFrame) -> Iterator[str]:
     for values, sharing in tests.groupby(list(CONDITION), dropna=False, sort=False):
         if len(sharing) == 1:
             continue

@@ -118,8 +118,8 @@ def _panel(scored: Indexed, scale: Scale) -> _Panel:
 def _own_pairs(scored: Indexed) -> _Pairs:
     cells = [c for c in list_contrasts(scored) if c.grain == CELL]
     if not cells:
-        why = " ".join(not_comparable(scored)) or "names no conditions to compare (noise, demosaic)"
-        raise InputError.of("--pilot", "", f"{why.rstrip('.')}: give --difference")
+        why = " ".join(not_comparable(scored)).rstrip(".")
+        raise InputError.of("--pilot", "", f"{why}: give --difference")
     score = fit_p910(scored).scores["score"].to_numpy(dtype=np.float64)
     plus = [cell.plus[0] for cell in cells]
     minus = [cell.minus[0] for cell in cells]

@@ -91,6 +91,8 @@ def test_plans_that_are_none_are_refused_at_once():
         "--power",
         "--comparisons",
     ]
+    with pytest.raises(InputError, match=r"--power: is 1, must be above 0.05 and below 1$"):
+        observers_needed(Plan(1, 1, power=1))
     with pytest.raises(InputError, match="more than 100000 observers"):
         observers_needed(Plan(1e-4, 1))
     with pytest.raises(InputError, match="at most 1000 with Holm"):

@@ -137,7 +137,7 @@ def _check(plan: Plan) -> None:
     numbers = (
         ("--difference", plan.difference, plan.difference != 0, "other than 0"),
         ("--sd", plan.sd, plan.sd > 0, "above 0"),
-        ("--power", plan.power, plan.alpha < plan.power < 1, f"from {plan.alpha:g} to 1"),
+        ("--power", plan.power, plan.alpha < plan.power < 1, f"above {plan.alpha:g} and below 1"),
         ("--alpha", plan.alpha, 0 < plan.alpha < 1, "between 0 and 1"),
         ("--comparisons", plan.comparisons, plan.comparisons >= 1, "at least 1"),
     )

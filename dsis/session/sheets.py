@@ -10,7 +10,7 @@ import jinja2
 
 from dsis.errors import Fault, InputError
 from dsis.manifest import Manifest, read_manifest
-from dsis.outdir import UNFINISHED, result_folder
+from dsis.outdir import UNFINISHED, listed, result_folder
 from dsis.session import events
 from dsis.session.setup import Setup, current_setup
 from dsis.session.steps import grade_words
@@ -64,9 +64,11 @@ def read_typed_votes(folder: Path, path: Path) -> tuple[int, int]:
     manifest = read_manifest(folder)
     lines = list(_read(path))
     with open_store(folder, manifest) as store, store.transaction():
-        rows = {(row.observer, row.presentation.place): row for row in store.rows()}
+        plans: _Plans = {}
+        for row in store.rows():
+            plans.setdefault(row.observer, {})[row.presentation.place] = row
         robots = {known.observer for known in store.observers() if known.simulated}
-        found = [_checked(line, rows, robots, store.scale, path) for line in lines]
+        found = [_checked(line, plans, robots, store.scale, path) for line in lines]
         faults = [entry for entry in found if isinstance(entry, Fault)]
         faults += _twice(lines, path)
         if faults:
@@ -77,6 +79,7 @@ def read_typed_votes(folder: Path, path: Path) -> tuple[int, int]:
 
 
 _PLAN = ("presentation", "session", "kind", "reference", "stimulus")
+_Plans = dict[str, dict[int, Row]]  # by observer and place in the order
 _Line = tuple[int, str, str, str]  # row in the file, and its cells
 
 
@@ -131,7 +134,7 @@ def _read(path: Path) -> Iterator[_Line]:
 
 def _checked(
     line: _Line,
-    rows: dict[tuple[str, int], Row],
+    plans: _Plans,
     robots: set[str],
     scale: tuple[int, int],
     path: Path,
@@ -142,11 +145,11 @@ def _checked(
     def fault(key: str, fact: str) -> Fault:
         return Fault(str(path), f"row {number}: {key}", fact)
 
-    row = rows.get((observer, int(place))) if place.isdecimal() else None
+    if observer not in plans or observer in robots:
+        return fault("observer", _nobody(observer, plans, robots))
+    row = plans[observer].get(int(place)) if place.isdecimal() else None
     if row is None:
         return fault("presentation", f"{place!r} is not in the plan of {observer!r}")
-    if observer in robots:
-        return fault("observer", f"{observer!r} is a simulated observer")
     if not text:
         return None
     grade = int(text) if text.removeprefix("-").isdecimal() else None
@@ -156,6 +159,14 @@ def _checked(
     if row.vote is not None and row.vote.vote != grade:
         return fault("vote", f"is {grade}, but {row.vote.vote} is stored already")
     return row, grade
+
+
+def _nobody(observer: str, plans: _Plans, robots: set[str]) -> str:
+    """Return why no votes of this observer can be typed."""
+    if observer in robots:
+        return f"{observer!r} is a simulated observer"
+    people = listed(sorted(plans.keys() - robots)) or "nobody"
+    return f"{observer!r} has no plan; who has: {people}"
 
 
 def _twice(lines: list[_Line], path: Path) -> Iterator[Fault]:

@@ -42,19 +42,20 @@ class ObserverRecord(Model):
     colour_vision: Literal["normal", "deficient", "not tested"]
     note: Note = ""
 
+    # The words are those of the form that the experimenter sees.
     @model_validator(mode="after")
     def _whole(self) -> Self:
         if (self.acuity is None) != (self.acuity_chart == "not tested"):
-            message = "acuity must be given if, and only if, a chart was read"
+            message = "Acuity must be given if, and only if, a chart was read"
             raise ValueError(message)
         if (self.colour_vision == "not tested") != (self.colour_test == "not tested"):
-            message = "colour_vision must say what the test of colour vision showed"
+            message = "Colour vision must say what the test of colour vision showed"
             raise ValueError(message)
         if (self.colour_plates is None) != (self.colour_read is None):
-            message = "colour_plates and colour_read must be given together"
+            message = "Plates shown and Plates read right must be given together"
             raise ValueError(message)
         if (self.colour_read or 0) > (self.colour_plates or 0):
-            message = f"colour_read is {self.colour_read}, more than the plates shown"
+            message = f"Plates read right is {self.colour_read}, more than Plates shown"
             raise ValueError(message)
         return self
 

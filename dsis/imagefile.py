@@ -247,12 +247,12 @@ def begin(path: Path) -> Path:
 
     Raises `OSError`, which names `path`, where no file can be written.
     """
-    path.parent.mkdir(parents=True, exist_ok=True)
     unfinished = path.with_name(f".{path.stem}.unfinished{path.suffix}")
     try:
+        path.parent.mkdir(parents=True, exist_ok=True)
         unfinished.write_bytes(b"")
     except OSError as error:
-        raise OSError(error.errno, error.strerror, str(path)) from None
+        raise OSError(error.errno, f"cannot be written: {error.strerror}", str(path)) from None
     return unfinished
 
 

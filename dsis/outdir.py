@@ -50,13 +50,13 @@ def listed(names: Sequence[str]) -> str | None:
 
 @contextmanager
 def said_of(out: Path) -> Iterator[None]:
-    """Say of `out`, which the user named, what the system says of a file beside it."""
+    """Say that `out`, which the user named, cannot be written, and what the system says of it."""
     try:
         yield
     except OSError as error:
         if error.errno is None:
             raise
-        raise OSError(error.errno, error.strerror, str(out)) from None
+        raise OSError(error.errno, f"cannot be written: {error.strerror}", str(out)) from None
 
 
 def check_parents(out: Path) -> None:

@@ -77,6 +77,7 @@ def test_what_the_system_refuses_is_said_of_the_folder_that_was_named(
     with pytest.raises(PermissionError) as refused:
         make(tmp_path / "out")
     assert refused.value.filename == str(tmp_path / "out")
+    assert refused.value.strerror == "cannot be written: Permission denied"
 
 
 def interrupted(out: Path, resume: str | None) -> None:

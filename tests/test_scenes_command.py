@@ -97,7 +97,7 @@ def test_a_place_where_nothing_can_be_written_is_refused_before_rendering(
     monkeypatch.setenv("DSIS_CACHE", str(tmp_path / "cache"))
     out = tmp_path / "city.exr"
     assert main(["scenes", "city", "--preset", "quick", "--out", str(out)]) == 2
-    assert capsys.readouterr().err == f"dsis: {out}: Permission denied\n"
+    assert capsys.readouterr().err == f"dsis: {out}: cannot be written: Permission denied\n"
     assert not (tmp_path / "cache").exists()
 
 

@@ -101,3 +101,23 @@ def test_consent_and_hidden_references_come_from_the_spec_where_no_set_up_says()
     assert Setup(lab="TUM").completed(session).hidden_references
     own = Setup(consent="Ours.", hidden_references=False).completed(session)
     assert (own.consent, own.hidden_references) == ("Ours.", False)
+
+
+def test_what_the_page_on_sessions_says_may_be_left_out_of_a_set_up(tmp_path):
+    page = (ROOT / "docs" / "session.md").read_text(encoding="utf-8")
+    says, rest = page.split("```toml\n", 1)
+    text = rest.split("```", 1)[0].replace('["...", "..."]', "[]")
+    path = tmp_path / "lab.toml"
+    whole, display = text.split("[display]")
+    for line in whole.splitlines()[1:]:
+        path.write_text(text.replace(line, ""), encoding="utf-8")
+        assert read_setup(path, (1, 10)).display is not None
+    path.write_text(whole, encoding="utf-8")
+    assert read_setup(path, (1, 10)).display is None
+    needed = [line for line in display.splitlines() if " = " in line]
+    assert "a `[display]` needs the four keys\nshown" in says
+    assert len(needed) == 4
+    for line in needed:
+        path.write_text(text.replace(line, ""), encoding="utf-8")
+        with pytest.raises(InputError, match=f"display.{line.split()[0]}: is missing"):
+            read_setup(path, (1, 10))

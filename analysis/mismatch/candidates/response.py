@@ -259,15 +259,11 @@ def _nearer(
 
     count = 1 + (not fixed) + (apart > 0)
     simplex = np.vstack([np.zeros(count), 0.1 * np.eye(count)])
-    options: Any = {
-        "initial_simplex": simplex,
-        "maxfev": 150 * count,
-        "xatol": 1e-3,
-        "fatol": 1e-2,
-    }
-    own = minimize(
-        lambda moved: misfit(*there(moved)), np.zeros(count), method="Nelder-Mead", options=options
-    )
+    def missed(moved: Array) -> float:
+        return misfit(*there(moved))
+
+    options: dict[str, Any] = {"initial_simplex": simplex, "maxfev": 150 * count}
+    own = minimize(missed, np.zeros(count), method="Nelder-Mead", tol=1e-3, options=options)
     return min(start, (float(own.fun), there(own.x)))
 
 

@@ -1,11 +1,10 @@
 """What bends the mean level: non-linearity, saturation, paths that disagree."""
 
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize
+from scipy.optimize import fmin
 from scipy.stats import norm
 
 from analysis.mismatch.candidates.candidate import Candidate, Proposal, measured, proposals
@@ -259,12 +258,18 @@ def _nearer(
 
     count = 1 + (not fixed) + (apart > 0)
     simplex = np.vstack([np.zeros(count), 0.1 * np.eye(count)])
-    def missed(moved: Array) -> float:
-        return misfit(*there(moved))
 
-    options: dict[str, Any] = {"initial_simplex": simplex, "maxfev": 150 * count}
-    own = minimize(missed, np.zeros(count), method="Nelder-Mead", tol=1e-3, options=options)
-    return min(start, (float(own.fun), there(own.x)))
+    made = fmin(
+        lambda moved: misfit(*there(moved)),
+        np.zeros(count),
+        initial_simplex=simplex,
+        maxfun=150 * count,
+        xtol=1e-3,
+        ftol=1e-2,
+        disp=False,
+    )
+    nearest = there(np.asarray(made))
+    return min(start, (misfit(*nearest), nearest))
 
 
 def _noise_dn(clues: Clues, top: Place) -> float:

@@ -26,7 +26,8 @@ def compare_models(votes: pd.DataFrame, rule: Bt500Rule = BT500) -> pd.DataFrame
     BR: the same after the observers' bias, 2 J + I; P.913: of those who pass. P.910: a score per
     stimulus, bias and inconsistency per observer, J + 2 I. Models compare on the same votes: MOS,
     BR and P.910 do; screening makes its model better by leaving out what does not fit. A stimulus
-    on which all agree has no density under a sd of its own and adds nothing there.
+    on which all agree has no density under a sd of its own and adds nothing there. Where P.910's
+    fit is degenerate its likelihood has no bound: blank.
 
     Parameters
     ----------
@@ -76,6 +77,8 @@ def _spread_by_stimulus(
 
 def _spread_by_observer(votes: pd.DataFrame, scored: Indexed) -> tuple[int, float]:
     fit = p910(votes)
+    if fit.degenerate:
+        return len(scored.vote), np.nan
     score, people = fit.scores["score"].to_numpy(), fit.observers
     bias, spread = people["bias"].to_numpy(), people["inconsistency"].to_numpy()
     residual = scored.vote - score[scored.stimulus] - bias[scored.observer]

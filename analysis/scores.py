@@ -5,7 +5,7 @@ import pandas as pd
 
 from analysis.bootstrap import bootstrap_scores
 from analysis.intervals import binomial_interval, default_interval
-from analysis.models import p910, p913, scores_of
+from analysis.models import MaximumLikelihood, p910, p913, scores_of
 from analysis.scale import Scale
 from analysis.screening import (
     THRESHOLD_SD,
@@ -38,7 +38,10 @@ MOS_COLUMNS = (
     _score("ci_trimmed_high", "upper end of the same"),
     _score("mos_bt500", "mean over the observers that BT.500's screening accepts"),
     _score("mos_p913", "mean after bias removal (P.913, 12.4), then BT.500's screening"),
-    _score("score_p910", "maximum-likelihood score (P.910, Annex E)"),
+    _score(
+        "score_p910",
+        "maximum-likelihood score (P.910, Annex E); blank where it leans on one observer",
+    ),
     _score("p910_ci_low", "lower end of its 95 % interval"),
     _score("p910_ci_high", "upper end of the same"),
     SIMULATED,
@@ -114,7 +117,7 @@ def score_table(
     raw = mos(votes, scale)
     trimmed = mos(remove_outliers(votes, threshold, passes=passes).kept, scale)
     rejected = screen_bt500(votes)["rejected"].to_numpy(dtype=np.bool_)
-    likelihood = p910(votes).scores
+    likelihood = _usable(p910(votes))
     table = raw.assign(
         n_removed=raw["n"] - trimmed["n"],
         mos_trimmed=trimmed["mos"],
@@ -140,6 +143,13 @@ def score_table(
             **{f"{name}_low": drawn["boot_low"], f"{name}_high": drawn["boot_high"]}
         )
     return table[[column.name for column in MOS_COLUMNS]]
+
+
+def _usable(fit: MaximumLikelihood) -> pd.DataFrame:
+    """Return the scores, blank where they rest on somebody's votes alone and mean nothing."""
+    if not fit.degenerate:
+        return fit.scores
+    return fit.scores.assign(**dict.fromkeys(("score", "ci_low", "ci_high"), np.nan))
 
 
 def observer_table(votes: pd.DataFrame) -> pd.DataFrame:

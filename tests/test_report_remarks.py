@@ -201,3 +201,27 @@ def test_votes_that_spread_too_much_are_flagged(shared_data):
     found = " ".join(results.remarks)
     assert "SOS parameter a = 0.26, over 0.25" in found
     assert "Screening proposes to reject s27, s28, s29, s30" in found
+
+
+LEANING = np.random.default_rng(2).integers(1, 6, (4, 12)).tolist()  # 12 observers, 4 sequences
+
+
+def test_scores_that_lean_on_one_observer_are_left_blank(tmp_path):
+    """What the remark says not to use stands nowhere; the rest of the table does."""
+    votes = table(LEANING)
+    assert analysis.p910(votes).degenerate
+    out = report(tmp_path, votes, (1, 5))
+    scores = pd.read_csv(out / "mos.csv")
+    assert scores[["score_p910", "p910_ci_low", "p910_ci_high"]].isna().all(axis=None)
+    assert scores[["mos", "ci_low", "mos_p913"]].notna().all(axis=None)
+    models = pd.read_csv(out / "models.csv").set_index("model")
+    criteria = ["loglik_per_vote", "aic_per_vote", "bic_per_vote"]
+    assert models.loc["P.910", criteria].isna().all()
+    assert models.loc["BR", criteria].notna().all()
+    text = page(out)
+    assert "do not use its scores" in Page(text).remarks
+    assert "P.910 is left blank" in text
+    assert "P.910's scores and likelihood are not given here" in text.replace("&#39;", "'")
+    sound = report(tmp_path, table(TYPICAL), (1, 5), "sound")
+    assert pd.read_csv(sound / "mos.csv")["score_p910"].notna().all()
+    assert "P.910 is left blank" not in page(sound)

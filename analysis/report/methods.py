@@ -34,7 +34,7 @@ def _where_done(results: Results) -> Iterator[Paragraph]:
     if len(results.dmos):
         yield "DMOS", _DMOS
     yield "Screening", _SCREENS
-    yield "Observer models", _OBSERVERS
+    yield "Observer models", _OBSERVERS + (_UNBOUNDED if results.p910_degenerate else "")
     if results.retest is not None:
         yield "Test and retest", _RETEST
     if len(results.order):
@@ -127,6 +127,10 @@ _OBSERVERS = (
     "alternating projection; the interval of a score is \u00b1 1.96 standard errors from the "
     "spread of the residuals on its sequence. Models are compared by AIC and BIC per vote. SOS "
     "parameter: a of variance = a (H \u2212 MOS)(MOS \u2212 L), least squares over sequences."
+)
+_UNBOUNDED = (
+    " P.910's scores and likelihood are not given here: the likelihood grew without limit towards "
+    "the votes of single observers, as it may where each has cast few."
 )
 _RETEST = (
     "Second votes were compared with first ones of the same observer on the same sequence: mean "

@@ -45,6 +45,7 @@ def render(
         "scores": _named(results.scores)[:SCORES_SHOWN],
         "more_scores": max(0, len(results.scores) - SCORES_SHOWN),
         "n_removed": int(results.scores["n_removed"].sum()),
+        "p910_degenerate": results.p910_degenerate,
         "dmos": [row | {"kind": "test"} for row in _named(results.dmos)][:SCORES_SHOWN],
         "models": _rows(results.models),
         "sos": results.sos,

@@ -20,7 +20,6 @@ FEW_OBSERVERS = 15  # BT.500: fewer make an informal test
 MANY_REMOVED = 0.10
 FEW_SEQUENCES = 20  # below, the standard error of a correlation of 0.7 is over 0.11
 NAMES_LISTED = 6
-ALL_TOO_CONSISTENT = 1e-3  # inconsistency over the scale's width: the fit leans on one observer
 
 
 @dataclass(frozen=True)
@@ -109,7 +108,7 @@ def remarks(
     yield from _about_the_removal(counts, scores, findings)
     yield from _about_intervals(scale, scores)
     yield from _about_the_screens(observers, counts)
-    yield from _about_the_model(votes, scale)
+    yield from _about_the_model(votes)
     yield from _about_quality(findings)
     yield from findings.models
 
@@ -221,16 +220,17 @@ def _about_the_screens(observers: pd.DataFrame, counts: Counts) -> Iterator[str]
         )
 
 
-def _about_the_model(votes: pd.DataFrame, scale: Scale) -> Iterator[str]:
+def _about_the_model(votes: pd.DataFrame) -> Iterator[str]:
     fit = p910(votes)
     if not fit.converged:
         yield f"The P.910 model did not converge in {fit.rounds} rounds."
-    limit = ALL_TOO_CONSISTENT * (scale.high - scale.low)
-    rigid = fit.observers[fit.observers["inconsistency"] < limit]
-    if len(rigid):
+    if fit.degenerate:
+        rigid = fit.observers[fit.observers["rigid"]]
         yield (
             f"The P.910 model finds no inconsistency in {_names(pd.Series(observer_name(rigid)))}: "
-            "it then rests on these votes alone; do not use its scores."
+            "it then rests on these votes alone; do not use its scores. They, their intervals and "
+            "its likelihood are left blank; inconsistencies of others are distances from these "
+            "votes."
         )
 
 

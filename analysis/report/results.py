@@ -86,6 +86,11 @@ class Results:
     remarks: tuple[str, ...]
     stimuli: tuple[dict[str, object], ...] = field(default=())
 
+    @property
+    def p910_degenerate(self) -> bool:
+        """Whether P.910's scores are left blank: they rest on the votes of a few observers."""
+        return bool(self.scores["score_p910"].isna().any())
+
 
 def analyse(votes: pd.DataFrame, test: Description, options: Options = Options()) -> Results:
     """Return the tables of a report and its remarks, from a table of votes.

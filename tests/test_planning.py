@@ -11,6 +11,7 @@ from statsmodels.stats.power import TTestIndPower, TTestPower
 
 import analysis
 from analysis.planning import Plan, observers_needed, power_from_pilot, power_of
+from analysis.planning.leastsquares import fit_additive
 from analysis.planning.pilot import _panel
 from analysis.scale import Scale
 from analysis.votes import index_votes
@@ -126,34 +127,125 @@ def pilot(observers=40, difference=-1.0, spread=1.0, seed=1):
 
 
 def test_a_pilots_power_is_that_of_its_spread():
-    """One pair of conditions, observers alike: the noncentral t of difference and sd."""
-    votes = pilot()
+    """One pair of conditions, observers alike: the noncentral t of difference and planted sd."""
     runs = 1500
-    table = power_from_pilot(votes, TEN, observers=(8, 16), runs=runs)
-    fitted = analysis.p910(votes)
-    v = fitted.observers["inconsistency"]
-    sd = np.sqrt(2 * (v**2).mean())
+    table = power_from_pilot(pilot(), TEN, observers=(8, 16), runs=runs)
     for row in table.itertuples():
-        expected = power_of(Plan(abs(row.difference), sd), row.observers)
+        expected = power_of(Plan(abs(row.difference), np.sqrt(2)), row.observers)
         # observers differ a little in their spread: not quite a t distribution
         error = STANDARD_ERRORS * np.sqrt(expected * (1 - expected) / runs)
         assert row.power == pytest.approx(expected, abs=error + 0.02)
 
 
+def planted(observers, stimuli, spread=2.0, *, whole=False):
+    """Votes of observers whose biases have sd 0.5."""
+    rng = np.random.default_rng(4)
+    bias = rng.normal(0, 0.5, (observers, 1))
+    vote = 5 + bias + spread * rng.standard_normal((observers, stimuli))
+    who, what = np.indices(vote.shape).reshape(2, -1)
+    given = np.rint(vote) if whole else vote
+    return pd.DataFrame(
+        {"observer": who.astype(str), "stimulus": what.astype(str), "vote": given.ravel()}
+    )
+
+
+def panel_of(votes):
+    scored = index_votes(votes)
+    return _panel(scored, fit_additive(scored), TEN)
+
+
 def test_what_a_bias_is_uncertain_by_is_no_difference_between_people():
     """Planted: biases of sd 0.5; each is known from 20 votes of sd 2, so to 0.45."""
-    rng = np.random.default_rng(4)
     observers, stimuli = 2000, 20
-    vote = 5 + rng.normal(0, 0.5, (observers, 1)) + rng.normal(0, 2, (observers, stimuli))
-    who, what = np.indices(vote.shape).reshape(2, -1)
-    columns = {"observer": who.astype(str), "stimulus": what.astype(str), "vote": vote.ravel()}
-    panel = _panel(index_votes(pd.DataFrame(columns)), TEN)
+    panel = panel_of(planted(observers, stimuli))
     observed = 0.5**2 + 2**2 / stimuli
     error = STANDARD_ERRORS * observed * np.sqrt(2 / observers)
-    # maximum likelihood takes the spread of 20 residuals for 1 / 20 too small
-    shortfall = 2**2 / stimuli / stimuli
-    assert panel.bias_sd**2 == pytest.approx(0.5**2, abs=error + shortfall)
-    assert observed - 0.5**2 > error + shortfall  # the test can tell
+    assert panel.bias_sd**2 == pytest.approx(0.5**2, abs=error)
+    assert observed - 0.5**2 > error  # the test can tell
+
+
+@pytest.mark.parametrize("spread", [0.6, 1.0])
+def test_rounding_does_not_count_twice(spread):
+    """The spread of whole votes holds their rounding, and simulated votes are rounded again."""
+    votes = planted(800, 8, spread, whole=True)
+    panel = panel_of(votes)
+    error = STANDARD_ERRORS * spread**2 * np.sqrt(2 / (800 * 7))
+    assert float(panel.drawn @ panel.spread**2) == pytest.approx(spread**2, abs=error)
+    assert error < 1.2 / 12  # the test can tell
+
+
+def test_somebody_with_one_vote_is_not_taken_for_consistent():
+    """A single vote lies on score + bias whatever its observer is like."""
+    votes = planted(40, 8)
+    alone = pd.DataFrame({"observer": [f"x{i}" for i in range(60)], "stimulus": "0", "vote": 5.0})
+    panel = panel_of(pd.concat([votes, alone], ignore_index=True))
+    error = STANDARD_ERRORS * 2**2 * np.sqrt(2 / (40 * 7))
+    assert float(panel.drawn @ panel.spread**2) == pytest.approx(2**2, abs=error)
+    with pytest.raises(InputError, match="too few votes to tell how far they spread"):
+        power_from_pilot(alone, TEN, difference=1)
+
+
+def test_scores_of_a_pilot_are_least_squares_with_votes_missing():
+    """The regression on dummies of stimulus and observer; unbiased variances add up to its."""
+    votes = planted(12, 6).sample(frac=0.6, random_state=1)
+    scored = index_votes(votes)
+    found = fit_additive(scored)
+    people, stimuli = len(scored.observers), len(scored.stimuli)
+    design = np.hstack([np.eye(stimuli)[scored.stimulus], np.eye(people)[scored.observer]])
+    expected, _, rank, _ = np.linalg.lstsq(design, scored.vote)
+    shift = expected[stimuli:].mean()
+    np.testing.assert_allclose(found.score, expected[:stimuli] + shift, atol=1e-10)
+    np.testing.assert_allclose(found.bias, expected[stimuli:] - shift, atol=1e-10)
+    left = scored.vote - design @ expected
+    assert np.nansum(found.variance * found.freedom) == pytest.approx(left @ left)
+    assert found.freedom.sum() == pytest.approx(len(left) - rank)
+    # Two tests with nobody in common keep their levels.
+    apart = planted(4, 2)
+    lower = apart.assign(observer="y" + apart["observer"], stimulus="y" + apart["stimulus"])
+    lower["vote"] -= 3
+    both = fit_additive(index_votes(pd.concat([apart, lower], ignore_index=True)))
+    levels = both.score.reshape(2, 2).mean(axis=1)
+    assert levels[0] - levels[1] == pytest.approx(3)
+
+
+def ordinary_panel(seed):
+    """18 observers, 8 stimuli: score + bias + noise of sd 0.6 to 1.4, in whole grades."""
+    rng = np.random.default_rng(seed)
+    quality = [8.2, 5.4, 7.7, 6.9, 8.9, 6.0, 7.1, 4.4]
+    conditions = [(c, n, d) for c in "cb" for n in ("awgn", "sd") for d in ("none", "bilinear")]
+    rows = []
+    for observer in range(18):
+        bias, spread = rng.normal(0, 0.6), rng.uniform(0.6, 1.4)
+        votes = np.clip(np.rint(rng.normal(np.add(quality, bias), spread)), 1, 10)
+        rows += [
+            (f"o{observer}", "__".join(condition), *condition, vote)
+            for condition, vote in zip(conditions, votes, strict=True)
+        ]
+    columns = ["observer", "stimulus", "content", "noise", "demosaic", "vote"]
+    return pd.DataFrame(rows, columns=columns)
+
+
+def test_a_plan_does_not_lean_on_one_observer():
+    """P.910's scores run into one observer's votes; a plan has the paired differences of all."""
+    leaning = [panel for panel in map(ordinary_panel, range(6)) if analysis.p910(panel).degenerate]
+    assert len(leaning) >= 2
+    for votes in leaning[:2]:
+        table = power_from_pilot(votes, TEN, observers=(18,), runs=400)
+        wide = votes.pivot_table(index="observer", columns="stimulus", values="vote")
+        likely = analysis.p910(votes).scores.set_index("stimulus")["score"]
+        off = []
+        for row in table.itertuples():
+            what, content, within = row.comparison.split(", ")
+            plus, minus = (
+                f"{content}__{within}__{side}" if side in ("bilinear", "none")
+                else f"{content}__{side}__{within}"
+                for side in what.split(" - ")
+            )  # fmt: skip
+            paired = float((wide[plus] - wide[minus]).mean())
+            # the end of the scale takes a little from high scores
+            assert row.difference == pytest.approx(paired, abs=0.12)
+            off.append(abs(likely[plus] - likely[minus] - paired))
+        assert max(off) > 0.5  # the test can tell
 
 
 def test_without_a_difference_a_pilot_finds_one_at_the_nominal_rate():
@@ -190,14 +282,32 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     assert main([*command, "--alpha", "0.001", "--groups"]) == 2
     assert "--alpha: is not used with --pilot" in capsys.readouterr().err
     assert main([*command, "--observers", "8", "12", "--seed", "2"]) == 0
-    assert capsys.readouterr().out.startswith("SIMULATED VOTES: ")
+    said = capsys.readouterr().out
+    assert said.startswith("SIMULATED VOTES: ")
     out = tmp_path / "pilot-plan"
     assert pd.read_csv(out / "power.csv")["simulated"].all()
     assert sorted(p.name for p in out.iterdir()) == ["power.csv", "power.png", "power.svg"]
     assert "SIMULATED VOTES" in (out / "power.svg").read_text(encoding="utf-8")
+    assert "Scores and spread of the pilot: least squares" in said
+    assert set(pd.read_csv(out / "power.csv")["scores"]) == {"least squares"}
     before = {p.name: p.read_bytes() for p in out.iterdir()}
     assert main([*command, "--observers", "8", "12", "--seed", "2"]) == 0
     assert {p.name: p.read_bytes() for p in out.iterdir()} == before
     assert not (out / UNFINISHED).exists()
     (out / "mine.txt").touch()
     assert main(command) == 2
+
+
+def test_a_difference_that_the_scale_cuts_short_is_explained(tmp_path, capsys):
+    """Asked for a grade less, votes near the lower end of the scale fall by less."""
+    votes = pilot(observers=6)
+    votes["vote"] = (votes["vote"] - 4).clip(1, 10)
+    for name, given in (("low", votes), ("middle", pilot(observers=6, spread=0.5))):
+        analysis.write_votes(given, tmp_path / f"{name}.csv")
+        command = ["plan", "--pilot", str(tmp_path / f"{name}.csv"), "--scale", "1", "10"]
+        assert main([*command, "--observers", "8", "--difference", "1"]) == 0
+    low, middle = capsys.readouterr().out.split("low-plan")
+    assert "every sequence, 1 lower" in low
+    assert "1 lower comes to 0." in low
+    assert "whose ends cut the difference short" in low
+    assert "comes to" not in middle

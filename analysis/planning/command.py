@@ -1,6 +1,7 @@
 """What `dsis plan` says and writes."""
 
 import argparse
+from collections.abc import Iterator
 from pathlib import Path
 
 import matplotlib as mpl
@@ -19,6 +20,11 @@ from dsis.outdir import UNFINISHED, result_folder
 
 FILES = ("power.csv", "power.svg", "power.png")
 CURVES_DRAWN = 12
+_SCORES = (
+    "Scores and spread of the pilot: least squares, observers' biases taken off, every observer\n"
+    "weighs the same, as in the paired t tests planned here (P.910's scores may lean on a single\n"
+    "one and are not used)."
+)
 
 
 def describe_plan(options: argparse.Namespace) -> str:
@@ -79,8 +85,19 @@ def write_power(options: argparse.Namespace) -> str:
     wide = table.pivot_table(index="comparison", columns="observers", values="power", sort=False)
     mark = simulated_mark(share)
     lines = [f"{mark}: what holds for them may not hold for people"] if mark else []
-    lines += ["power by number of observers", wide.round(2).to_string()]
+    lines += ["power by number of observers", wide.round(2).to_string(), _SCORES]
+    if options.difference is not None:
+        lines += _shortened(abs(options.difference), float(table["difference"].abs().mean()))
     return "\n".join([*lines, *unmarked_robots(index_votes(votes)), f"in {out}"])
+
+
+def _shortened(asked: float, simulated: float) -> Iterator[str]:
+    """Yield why the simulated difference is not the one that was asked for, where it shows."""
+    if f"{simulated:.2f}" != f"{asked:.2f}":
+        yield (
+            f"{asked:g} lower comes to {simulated:.2f} in the votes: they are kept on the scale, "
+            "whose ends cut the difference short."
+        )
 
 
 def _not_ours(out: Path) -> str | None:
@@ -109,9 +126,9 @@ def draw_power(table: pd.DataFrame, wanted: float, simulated_share: float, path:
             )
         axes.axhline(wanted, color=INK, lw=0.8, ls=":")
         axes.set_ylim(0, 1.02)
-        axes.set_xlabel("observers")
+        axes.set_xlabel("observers (pilot: scores and spread by least squares)")
         axes.set_ylabel("power (paired t, Holm)")
         axes.grid(visible=True, axis="y")
         axes.set_axisbelow(True)
-        figure.legend(loc="outside right upper")
+        figure.legend(loc="outside right upper", title="(difference of the simulated votes)")
         save(figure, "Power of a larger test", simulated_share, path)

@@ -1,4 +1,4 @@
-"""Power of a larger test, simulated with the observer model fitted to a pilot's votes."""
+"""Power of a larger test, simulated with scores and observers as a pilot's votes have them."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -11,7 +11,7 @@ from scipy.stats import t
 
 from analysis.holm import holm
 from analysis.inference.design import CELL, Contrast, list_contrasts, not_comparable
-from analysis.models import fit_p910
+from analysis.planning.leastsquares import Additive, fit_additive
 from analysis.scale import Scale
 from analysis.table import Column, Kind
 from analysis.votes import SIMULATED, Indexed, index_votes
@@ -20,15 +20,19 @@ from dsis.errors import InputError
 RUNS = 1000
 OBSERVERS = (8, 12, 15, 18, 24, 30, 40)
 ALPHA = 0.05
-GENERIC = "every sequence"
+SCORES = "least squares"  # the way to scores and spread, as power.csv names it
+_ROUNDING = 1 / 12  # variance that rounding to whole grades adds, grades^2
 
 POWER_COLUMNS = (
     Column("comparison", Kind.TEXT, "", "which stimuli"),
     Column("observers", Kind.WHOLE, "observer", "size of the simulated test"),
-    Column("difference", Kind.NUMBER, "grade", "of the two scores in the simulation"),
+    Column(
+        "difference", Kind.NUMBER, "grade", "mean of the simulated votes; scale ends shorten it"
+    ),
     Column("power", Kind.NUMBER, "", "share of simulated tests that show it: paired t, Holm"),
     Column("power_se", Kind.NUMBER, "", "standard error of that share"),
     replace(SIMULATED, meaning="true: simulated votes are among those of the pilot"),
+    Column("scores", Kind.TEXT, "", "how the pilot's scores and spread were found"),
 )
 
 
@@ -43,10 +47,11 @@ def power_from_pilot(
 ) -> pd.DataFrame:
     """Return power curves: how often tests of so many observers show what the pilot found.
 
-    P.910 is fitted to the pilot. Simulated observers have the inconsistency of one drawn from the
-    panel and a normal bias with the panel's sd; their votes are score + bias + inconsistency X,
-    rounded to whole grades where the pilot's are, and kept on the scale. Each simulated test makes
-    all comparisons, paired t with Holm at 5 %.
+    Score and bias are fitted to the pilot by least squares (`analysis.planning.leastsquares` says
+    why not by P.910's likelihood). Simulated observers have the spread of one drawn from the panel
+    and a normal bias with the panel's sd; their votes are score + bias + spread X, rounded to whole
+    grades where the pilot's are, and kept on the scale. Each simulated test makes all comparisons,
+    paired t with Holm at 5 %.
 
     Parameters
     ----------
@@ -69,16 +74,20 @@ def power_from_pilot(
     Raises
     ------
     InputError
-        Fewer than two observers in the pilot, a size below two, or no pairs of conditions and no
-        `difference`.
+        Fewer than two observers in the pilot, or too few votes to have a spread; a size below two;
+        or no pairs of conditions and no `difference`.
     """
     scored = index_votes(votes)
     if len(scored.observers) < 2:
         raise InputError.of("--pilot", "", "holds votes of one observer, must be at least two")
     if min(observers) < 2:
         raise InputError.of("--observers", "", f"is {min(observers)}, must be at least 2")
-    pairs = _own_pairs(scored) if difference is None else _shifted(scored, difference)
-    panel = _panel(scored, scale)
+    found = fit_additive(scored)
+    if difference is None:
+        pairs = _own_pairs(scored, found.score)
+    else:
+        pairs = _shifted(found.score, difference)
+    panel = _panel(scored, found, scale)
     tables = [
         _simulated(panel, pairs, size, runs, np.random.SeedSequence([seed, size]))
         for size in sorted(set(observers))
@@ -88,10 +97,15 @@ def power_from_pilot(
 
 
 class _Panel(NamedTuple):
-    """The fitted observers and the scale."""
+    """The fitted observers and the scale.
+
+    `drawn` is the chance of each observer's `spread` to be drawn: an observer counts by the degrees
+    of freedom of the spread, so that somebody with few votes is not taken for a consistent one.
+    """
 
     bias_sd: float
-    inconsistency: NDArray[np.float64]
+    spread: NDArray[np.float64]
+    drawn: NDArray[np.float64]
     scale: Scale
     whole: bool
 
@@ -105,22 +119,27 @@ class _Pairs(NamedTuple):
     averaged: bool
 
 
-def _panel(scored: Indexed, scale: Scale) -> _Panel:
-    people = fit_p910(scored).observers
-    whole = bool((scored.vote == np.rint(scored.vote)).all())
-    bias, v = people["bias"].to_numpy(), people["inconsistency"].to_numpy()
+def _panel(scored: Indexed, found: Additive, scale: Scale) -> _Panel:
+    freedom = float(found.freedom.sum())
+    if freedom <= 0:
+        fact = "has too few votes to tell how far they spread: at least two observers must have "
+        raise InputError.of("--pilot", "", f"{fact}judged the same two stimuli")
+    drawn = found.freedom / freedom
+    variance = np.nan_to_num(found.variance)
     # What a bias is uncertain by is no difference between people.
-    noise = float((v**2 / people["n"]).mean())
-    variance = max(float(bias.var(ddof=1)) - noise, 0.0)
-    return _Panel(float(np.sqrt(variance)), v.astype(np.float64), scale, whole)
+    noise = float(drawn @ variance) * float((1 / np.bincount(scored.observer)).mean())
+    between = max(float(found.bias.var(ddof=1)) - noise, 0.0)
+    whole = bool((scored.vote == np.rint(scored.vote)).all())
+    if whole:  # The simulated votes will be rounded too: rounding must not count twice.
+        variance = np.maximum(variance - _ROUNDING, 0.0)
+    return _Panel(float(np.sqrt(between)), np.sqrt(variance), drawn, scale, whole)
 
 
-def _own_pairs(scored: Indexed) -> _Pairs:
+def _own_pairs(scored: Indexed, score: NDArray[np.float64]) -> _Pairs:
     cells = [c for c in list_contrasts(scored) if c.grain == CELL]
     if not cells:
         why = " ".join(not_comparable(scored)).rstrip(".")
         raise InputError.of("--pilot", "", f"{why}: give --difference")
-    score = fit_p910(scored).scores["score"].to_numpy(dtype=np.float64)
     plus = [cell.plus[0] for cell in cells]
     minus = [cell.minus[0] for cell in cells]
     return _Pairs([_called(cell) for cell in cells], score[plus], score[minus], averaged=False)
@@ -131,9 +150,9 @@ def _called(cell: Contrast) -> str:
     return f"{cell.treatment}, {cell.content}, {cell.within}{stops}"
 
 
-def _shifted(scored: Indexed, difference: float) -> _Pairs:
-    score = fit_p910(scored).scores["score"].to_numpy(dtype=np.float64)
-    return _Pairs([GENERIC], score - abs(difference), score, averaged=True)
+def _shifted(score: NDArray[np.float64], difference: float) -> _Pairs:
+    down = abs(difference)
+    return _Pairs([f"every sequence, {down:g} lower"], score - down, score, averaged=True)
 
 
 def _simulated(
@@ -145,7 +164,7 @@ def _simulated(
     found = np.empty((runs, len(pairs.first)))
     for run in range(runs):
         bias = random.normal(0.0, 1.0, size) * panel.bias_sd
-        v = panel.inconsistency[random.integers(len(panel.inconsistency), size=size)]
+        v = random.choice(panel.spread, size=size, p=panel.drawn)
         sides = [_votes(panel, score, bias, v, random) for score in (pairs.first, pairs.second)]
         paired = sides[0] - sides[1]
         found[run] = paired.mean(axis=1)
@@ -162,6 +181,7 @@ def _simulated(
             "difference": difference,
             "power": power,
             "power_se": shown_share.std(axis=0) / np.sqrt(runs),
+            "scores": SCORES,
         }
     )
 

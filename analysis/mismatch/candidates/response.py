@@ -259,8 +259,11 @@ def _nearer(
     count = 1 + (not fixed) + (apart > 0)
     simplex = np.vstack([np.zeros(count), 0.1 * np.eye(count)])
 
+    def missed(moved: Array) -> float:
+        return misfit(*there(moved))
+
     made = fmin(
-        lambda moved: misfit(*there(moved)),
+        missed,
         np.zeros(count),
         initial_simplex=simplex,
         maxfun=150 * count,

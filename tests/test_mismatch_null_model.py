@@ -205,10 +205,10 @@ def test_roots_of_ratios_below_none_are_no_farther_off_than_the_ratios(less: flo
         far["roots"] += int(abs(recorded - mean)[0] > 5 * sd[0])
         far["both"] += int(abs(recorded - mean)[0] > 5 * max(sd[0], least[0]))
     assert far["both"] <= 0.008 * 2000
-    assert far["both"] <= 0.3 * far["roots"]
+    assert far["both"] <= 0.4 * far["roots"]
 
 
 def test_roots_on_one_side_keep_their_spread() -> None:
-    keys = [Key("fixed_smooth_variance", "exposure", "flat-0", "MONO"), Key("level")]
+    keys = [Key("fixed_smooth_variance", "exposure", "flat-0", "MONO"), Key("level", "exposure")]
     made = np.array([[0.9, -1.0], [1.1, -2.0], [1.0, -1.5]])
     assert not _across_none(keys, made, made.mean(0), np.array([3.0, 4.0])).any()

@@ -15,6 +15,7 @@ from analysis.mismatch.instance import LINES, frequency_of
 from analysis.mismatch.judge import INSTEAD, LITTLE, NEEDLESS, NOTHING, Judge
 from analysis.mismatch.memory import Memory
 from analysis.mismatch.named import Named
+from analysis.mismatch.own import eased
 from analysis.mismatch.phase import ABSENT
 from analysis.mismatch.proposed import replicates_for
 from analysis.mismatch.resolved import differ, gained, opened
@@ -25,7 +26,6 @@ _MOST_EFFECTS = 20  # some may have to go again
 _CHOSEN = frozenset({"adc_memory", "dual_gain"})  # a period, a gap between levels
 _ROUNDS, _FEW_ROUNDS = 6, 3  # of a search that goes on; of a large recording
 _FORGIVING = 2  # rounds after which what was dropped may come back
-_LESS = 0.7  # of what is left, at most, where another size explains it
 
 
 @dataclass
@@ -33,7 +33,8 @@ class Search(Choice):
     """The search from a base state; `run` leaves the result in the attributes."""
 
     asked: tuple[State, State] | None = None  # with what differs in all frames, and without
-    together: set[int] = field(default_factory=set)  # places of sizes fitted with what is named
+    # Places of sizes that were fitted with what is named, and what that was.
+    together: set[tuple[int, tuple[str, ...]]] = field(default_factory=set)
 
     def run(self) -> State:
         """Return the final state."""
@@ -164,25 +165,27 @@ class Search(Choice):
         if self.setting.large or not self._depart(state):
             return state
         kinds = [one.kind for one in self.named if one.kind in CANDIDATES]
-        shared = {
+        beside = tuple(sorted(one.name for one in self.named))
+        calls = {
             name for kind in kinds for name in (*CANDIDATES[kind].calls, *CANDIDATES[kind].hints)
         }
-        known = {own.place for own in self.own} | self.together
+        known = {own.place for own in self.own}
         some = [
             own
             for own in self._sizes()
             if own.place not in known and own.value and own.effect.kind not in kinds
-            if shared.intersection(CANDIDATES[own.effect.kind].calls)
+            if (own.place, beside) not in self.together
+            if calls.intersection(CANDIDATES[own.effect.kind].calls)
         ]
         if not some:
             return state
-        self.together |= {own.place for own in some}
+        self.together |= {(own.place, beside) for own in some}
         kept = self.named, self.own, self.camera, self.polished, self.rough
         self.own = sorted([*self.own, *some], key=lambda own: own.place)
         made = self._polished(state)
         places = {own.place for own in some}
         right = all(not own.contradicted for own in self.own if own.place in places)
-        if right or _most(made) > _LESS * _most(state):
+        if right or not eased(calls, state, made):
             self.named, self.own, self.camera, self.polished, self.rough = kept
             return state
         return made
@@ -269,8 +272,3 @@ class Search(Choice):
 
     def _judge(self, state: State) -> Judge:
         return Judge(state, lambda named: self.without(state, named), self.setting.nulls)
-
-
-def _most(state: State) -> float:
-    """Return how far off is what is left most."""
-    return max((abs(one.z) for one in state.mismatches), default=0.0)

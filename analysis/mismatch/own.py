@@ -3,7 +3,7 @@
 A size counts as wrong where another is clearly likelier, and more than chance away from it.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from math import hypot, inf, sqrt
 
@@ -171,6 +171,15 @@ def explained(some: Iterable[Own], before: State, after: State) -> bool:
         if calls and all(now.get(s, 0.0) > _LEFT * then[s] for s in calls):
             return False
     return True
+
+
+def eased(statistics: Collection[str], before: State, after: State) -> bool:
+    """Return whether less than half is left of the farthest that any of some statistics is off."""
+    then, now = (
+        max((abs(m.z) for m in one.mismatches if m.statistic in statistics), default=0.0)
+        for one in (before, after)
+    )
+    return now <= _LEFT * then
 
 
 def resized(camera: Camera, some: Iterable[Own]) -> Camera:

@@ -3,8 +3,8 @@
 The levels' scatter about a line tells little where there are few of them, and nothing where they
 are as many as the coefficients: what is known of every level beforehand, from the number of its
 samples, is propagated through the same fit. Scatter beyond that is real - light that drifts, a
-response that bends - and then it is the scatter that counts, with Student's factor for how few
-levels show it.
+response that bends - and what it adds is stated too, with Student's factor for how few levels show
+it.
 """
 
 from dataclasses import dataclass
@@ -12,8 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
-
-from analysis.photon_transfer.black import P_SCALED
 
 Floats = NDArray[np.float64]
 
@@ -49,32 +47,44 @@ def first_coefficient(design: Floats, y: Floats, covariance: Floats) -> Estimate
     covariance
         Their covariance, of sampling alone.
 
-    Its error is the propagated one, or that of the scatter where this is larger: HC2 (MacKinnon &
-    White, Journal of Econometrics 29, 1985), by which no variance is taken to be equal. Where the
-    scatter is too large for chance, the latter gets Student's factor for the degrees of freedom of
-    Bell & McCaffrey (Survey Methodology 28, 2002), which a level that decides the line makes few.
+    The variance is the propagated one, and what the scatter has beyond it. The scatter is told by
+    HC2 (MacKinnon & White, Journal of Econometrics 29, 1985), by which no variance is taken to be
+    equal; what sampling alone makes of it is taken off, not below nought. No test decides whether
+    the rest is real: few levels show scatter of a few times sampling too rarely. The rest gets
+    Student's factor for the degrees of freedom of Bell & McCaffrey (Survey Methodology 28, 2002),
+    which a level that decides the line makes few.
     """
-    shares = np.linalg.pinv(design)[0]
-    sampled = float(np.sqrt(max(shares @ covariance @ shares, 0.0)))
-    value = float(shares @ y)
-    if y.size <= design.shape[1]:
-        return Estimate(value, sampled, shares)
-    onto = design @ np.linalg.pinv(design)
-    kept = np.eye(y.size) - onto
+    scale = np.abs(design).max(0)
+    scale[scale == 0] = 1.0  # units of light are anyone's: squares of their shares may overflow
+    design = design / scale
+    back = np.linalg.pinv(design)
+    shares = back[0]
+    variance = max(float(shares @ covariance @ shares), 0.0)
+    if y.size > design.shape[1]:
+        kept = np.eye(y.size) - design @ back
+        variance += _excess(shares, kept, y, covariance)
+    unit = scale[0]
+    return Estimate(float(shares @ y) / unit, float(np.sqrt(variance)) / unit, shares / unit)
+
+
+def _excess(shares: Floats, kept: Floats, y: Floats, covariance: Floats) -> float:
+    """Return the variance by scatter beyond sampling, times the square of Student's factor."""
     # A level that alone decides the line keeps nothing of its own scatter.
     weights = shares**2 / np.maximum(np.diag(kept), 1e-12)
-    scattered = float(np.sqrt(weights @ (kept @ y) ** 2))
-    if scattered > 0 and _rare(design, y, covariance):
-        spread = kept @ (weights[:, None] * kept)
-        freedom = float(np.trace(spread) ** 2 / (spread * spread.T).sum())
-        scattered *= float(stats.t.ppf(_TWO_SIGMA, freedom)) / 2
-    return Estimate(value, max(sampled, scattered), shares)
+    seen = float(weights @ (kept @ y) ** 2)
+    spread = kept @ (weights[:, None] * kept)
+    expected, freedom = _chi_square(spread @ covariance)
+    if expected > 0:
+        # Its median: of few degrees of freedom most draws lie below the mean, by which real
+        # scatter would be lost.
+        expected *= float(stats.chi2.median(freedom)) / freedom
+    if seen <= expected:
+        return 0.0
+    factor = float(stats.t.ppf(_TWO_SIGMA, _chi_square(spread)[1])) / 2
+    return factor**2 * (seen - expected)
 
 
-def _rare(design: Floats, y: Floats, covariance: Floats) -> bool:
-    """Tell whether the values scatter about the line more than sampling alone makes them."""
-    least = 1e-12 * max(float(np.trace(covariance)), 1e-12)  # for values without any noise
-    root = np.linalg.cholesky(covariance + least * np.eye(y.size))
-    whitened, seen = np.linalg.solve(root, design), np.linalg.solve(root, y)
-    left = seen - whitened @ np.linalg.lstsq(whitened, seen, rcond=None)[0]
-    return bool(stats.chi2.sf(float(left @ left), y.size - design.shape[1]) < P_SCALED)
+def _chi_square(spread: Floats) -> tuple[float, float]:
+    """Return the mean and degrees of freedom of the chi-square like a quadratic form's draws."""
+    mean, square = float(np.trace(spread)), float((spread * spread.T).sum())
+    return mean, mean**2 / square if square > 0 else 1.0

@@ -26,8 +26,9 @@ def compare_models(votes: pd.DataFrame, rule: Bt500Rule = BT500) -> pd.DataFrame
     BR: the same after the observers' bias, 2 J + I; P.913: of those who pass. P.910: a score per
     stimulus, bias and inconsistency per observer, J + 2 I. Models compare on the same votes: MOS,
     BR and P.910 do; screening makes its model better by leaving out what does not fit. A stimulus
-    on which all agree has no density under a sd of its own and adds nothing there. Where P.910's
-    fit is degenerate its likelihood has no bound: blank.
+    on which all agree has no density under a sd of its own and adds nothing there; nor does, in
+    P.910, a panel that agrees but for biases. Where P.910's fit is degenerate its likelihood has no
+    bound: blank.
 
     Parameters
     ----------
@@ -80,7 +81,8 @@ def _spread_by_observer(votes: pd.DataFrame, scored: Indexed) -> tuple[int, floa
     if fit.degenerate:
         return len(scored.vote), np.nan
     score, people = fit.scores["score"].to_numpy(), fit.observers
-    bias, spread = people["bias"].to_numpy(), people["inconsistency"].to_numpy()
+    bias = people["bias"].to_numpy()
+    spread = people["inconsistency"].where(~people["rigid"], 0.0).to_numpy()
     residual = scored.vote - score[scored.stimulus] - bias[scored.observer]
     return len(scored.vote), float(_log_density(residual, spread[scored.observer]).mean())
 

@@ -92,8 +92,11 @@ class MaximumLikelihood:
 
     @property
     def degenerate(self) -> bool:
-        """Whether the scores rest on rigid observers alone: they and their errors are of no use."""
-        return bool(self.observers["rigid"].any())
+        """Whether the scores rest on some, rigid, observers: they and their errors are of no use.
+
+        Where all are rigid they agree but for their biases, and the scores are plain means.
+        """
+        return bool(self.observers["rigid"].any() and not self.observers["rigid"].all())
 
 
 def p910(votes: pd.DataFrame) -> MaximumLikelihood:
@@ -137,6 +140,8 @@ def _observers(
     scored: Indexed, bias: NDArray[np.float64], spread: NDArray[np.float64]
 ) -> pd.DataFrame:
     n = np.bincount(scored.observer)
+    # Equal votes may leave rounding errors, which are no range.
+    width = max(float(np.ptp(scored.vote)), 1e-9 * float(np.abs(scored.vote).max()))
     half = Z95 * spread / np.sqrt(n)
     return pd.DataFrame(
         {
@@ -149,6 +154,6 @@ def _observers(
             "inconsistency": spread,
             "inconsistency_ci_low": spread * np.sqrt(n / chdtri(n, 0.025)),
             "inconsistency_ci_high": spread * np.sqrt(n / chdtri(n, 0.975)),
-            "rigid": spread <= ALL_TOO_CONSISTENT * np.ptp(scored.vote),
+            "rigid": spread <= ALL_TOO_CONSISTENT * width,
         }
     )

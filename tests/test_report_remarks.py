@@ -145,7 +145,6 @@ PAIRED = table(TYPICAL).assign(
             pd.concat([table(TYPICAL, lab="x"), table(TYPICAL, lab="y")]),
             "Votes of 2 laboratories are pooled",
         ),
-        (table([[4, 5]]), "finds no inconsistency"),
         (table([[1, 5, 1, 2], [2, 1, 2, 3], [3, 3, 2, 4]]), "Screening proposes to reject o2"),
         (
             table([[1, 5, 1, 2], [2, 1, 2, 3], [3, 3, 2, 4]]),
@@ -225,3 +224,26 @@ def test_scores_that_lean_on_one_observer_are_left_blank(tmp_path):
     sound = report(tmp_path, table(TYPICAL), (1, 5), "sound")
     assert pd.read_csv(sound / "mos.csv")["score_p910"].notna().all()
     assert "P.910 is left blank" not in page(sound)
+
+
+@pytest.mark.parametrize(
+    "rows",
+    [
+        [[3] * 16, [4] * 16, [5] * 16, [2] * 16],
+        [[3], [4], [5], [2]],
+        [[0.1] * 7] * 3,
+        [[1, 2, 3], [2, 3, 4], [3, 4, 5]],
+    ],
+    ids=["all alike", "alone", "one vote", "but for biases"],
+)
+def test_scores_of_observers_who_all_agree_are_their_means(rows):
+    """Nobody leans on anybody: P.910 has the MOS, and no remark says otherwise."""
+    results = analyse(table(rows), Description(Scale(0, 10)), Options())
+    assert not results.p910_degenerate
+    scores = analysis.score_table(table(rows))
+    np.testing.assert_allclose(scores["score_p910"], scores["mos"], atol=1e-12)
+    assert scores[["p910_ci_low", "p910_ci_high"]].notna().all(axis=None)
+    assert "finds no inconsistency" not in " ".join(results.remarks)
+    assert (
+        analysis.compare_models(table(rows)).set_index("model").loc["P.910", "loglik_per_vote"] == 0
+    )

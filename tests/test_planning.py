@@ -311,3 +311,17 @@ def test_a_difference_that_the_scale_cuts_short_is_explained(tmp_path, capsys):
     assert "1 lower comes to 0." in low
     assert "whose ends cut the difference short" in low
     assert "comes to" not in middle
+
+
+def test_a_difference_that_rounding_changes_is_explained(tmp_path, capsys):
+    """In the middle of the scale: 0.4 less is the same whole grade for most."""
+    rows = [(f"o{o}", f"s{s}", 5 + s) for s in range(2) for o in range(12)]
+    votes = pd.DataFrame(rows, columns=["observer", "stimulus", "vote"])
+    votes.loc[0, "vote"] = 6
+    analysis.write_votes(votes, tmp_path / "whole.csv")
+    command = ["plan", "--pilot", str(tmp_path / "whole.csv"), "--scale", "1", "10"]
+    assert main([*command, "--observers", "8", "--difference", "0.4"]) == 0
+    said = capsys.readouterr().out
+    assert "0.4 lower comes to 0." in said
+    assert "they are rounded to whole grades and kept on the scale" in said
+    assert "cut the difference short" not in said

@@ -9,7 +9,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from analysis.figures import COLOURS, INK, MARKS, STYLE, save, simulated_mark
-from analysis.planning.pilot import ALPHA, OBSERVERS, POWER_COLUMNS, power_from_pilot
+from analysis.planning.pilot import ALPHA, OBSERVERS, POWER_COLUMNS, power_from_pilot, whole_grades
 from analysis.planning.samplesize import Plan, observers_needed, power_of
 from analysis.report.remarks import count_votes, unmarked_robots
 from analysis.table import to_csv
@@ -83,21 +83,24 @@ def write_power(options: argparse.Namespace) -> str:
         share = count_votes(votes).simulated_share
         draw_power(table, options.power, share, partial / "power")
     wide = table.pivot_table(index="comparison", columns="observers", values="power", sort=False)
-    mark = simulated_mark(share)
+    mark, scored = simulated_mark(share), index_votes(votes)
     lines = [f"{mark}: what holds for them may not hold for people"] if mark else []
     lines += ["power by number of observers", wide.round(2).to_string(), _SCORES]
     if options.difference is not None:
-        lines += _shortened(abs(options.difference), float(table["difference"].abs().mean()))
-    return "\n".join([*lines, *unmarked_robots(index_votes(votes)), f"in {out}"])
+        simulated = float(table["difference"].abs().mean())
+        lines += _changed(abs(options.difference), simulated, whole=whole_grades(scored.vote))
+    return "\n".join([*lines, *unmarked_robots(scored), f"in {out}"])
 
 
-def _shortened(asked: float, simulated: float) -> Iterator[str]:
+def _changed(asked: float, simulated: float, *, whole: bool) -> Iterator[str]:
     """Yield why the simulated difference is not the one that was asked for, where it shows."""
     if f"{simulated:.2f}" != f"{asked:.2f}":
-        yield (
-            f"{asked:g} lower comes to {simulated:.2f} in the votes: they are kept on the scale, "
-            "whose ends cut the difference short."
+        why = (
+            "rounded to whole grades and kept on the scale, which change the difference"
+            if whole
+            else "kept on the scale, whose ends cut the difference short"
         )
+        yield f"{asked:g} lower comes to {simulated:.2f} in the votes: they are {why}."
 
 
 def _not_ours(out: Path) -> str | None:

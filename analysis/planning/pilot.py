@@ -27,7 +27,10 @@ POWER_COLUMNS = (
     Column("comparison", Kind.TEXT, "", "which stimuli"),
     Column("observers", Kind.WHOLE, "observer", "size of the simulated test"),
     Column(
-        "difference", Kind.NUMBER, "grade", "mean of the simulated votes; scale ends shorten it"
+        "difference",
+        Kind.NUMBER,
+        "grade",
+        "mean of the simulated votes; rounding to whole grades and scale ends change it",
     ),
     Column("power", Kind.NUMBER, "", "share of simulated tests that show it: paired t, Holm"),
     Column("power_se", Kind.NUMBER, "", "standard error of that share"),
@@ -110,6 +113,11 @@ class _Panel(NamedTuple):
     whole: bool
 
 
+def whole_grades(vote: NDArray[np.float64]) -> bool:
+    """Return whether all votes are whole grades: simulated ones are then rounded to such."""
+    return bool((vote == np.rint(vote)).all())
+
+
 class _Pairs(NamedTuple):
     """Scores to compare: (pair,) each, and what to call them."""
 
@@ -129,7 +137,7 @@ def _panel(scored: Indexed, found: Additive, scale: Scale) -> _Panel:
     # What a bias is uncertain by is no difference between people.
     noise = float(drawn @ variance) * float((1 / np.bincount(scored.observer)).mean())
     between = max(float(found.bias.var(ddof=1)) - noise, 0.0)
-    whole = bool((scored.vote == np.rint(scored.vote)).all())
+    whole = whole_grades(scored.vote)
     if whole:  # The simulated votes will be rounded too: rounding must not count twice.
         variance = np.maximum(variance - _ROUNDING, 0.0)
     return _Panel(float(np.sqrt(between)), np.sqrt(variance), drawn, scale, whole)

@@ -164,7 +164,7 @@ def test_what_a_bias_is_uncertain_by_is_no_difference_between_people():
     assert observed - 0.5**2 > error  # the test can tell
 
 
-@pytest.mark.parametrize("spread", [0.6, 1.0])
+@pytest.mark.parametrize("spread", [0.3, 0.4, 0.6, 1.0])
 def test_rounding_does_not_count_twice(spread):
     """The spread of whole votes holds their rounding, and simulated votes are rounded again."""
     votes = planted(800, 8, spread, whole=True)
@@ -311,6 +311,7 @@ def test_a_difference_that_the_scale_cuts_short_is_explained(tmp_path, capsys):
     assert "1 lower comes to 0." in low
     assert "whose ends cut the difference short" in low
     assert "comes to" not in middle
+    assert "under half a grade" not in middle
 
 
 def test_a_difference_that_rounding_changes_is_explained(tmp_path, capsys):
@@ -325,3 +326,4 @@ def test_a_difference_that_rounding_changes_is_explained(tmp_path, capsys):
     assert "0.4 lower comes to 0." in said
     assert "they are rounded to whole grades and kept on the scale" in said
     assert "cut the difference short" not in said
+    assert "under half a grade: they do not tell where" in said

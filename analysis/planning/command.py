@@ -9,6 +9,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from analysis.figures import COLOURS, INK, MARKS, STYLE, save, simulated_mark
+from analysis.planning.leastsquares import fit_additive
 from analysis.planning.pilot import ALPHA, OBSERVERS, POWER_COLUMNS, power_from_pilot, whole_grades
 from analysis.planning.samplesize import Plan, observers_needed, power_of
 from analysis.report.remarks import count_votes, unmarked_robots
@@ -20,6 +21,7 @@ from dsis.outdir import UNFINISHED, result_folder
 
 FILES = ("power.csv", "power.svg", "power.png")
 CURVES_DRAWN = 12
+SPREAD_LEAST = 0.5  # grades; below, whole votes hide where between the grades a score lies
 _SCORES = (
     "Scores and spread of the pilot: least squares, observers' biases taken off, every observer\n"
     "weighs the same, as in the paired t tests planned here (P.910's scores may lean on a single\n"
@@ -85,10 +87,17 @@ def write_power(options: argparse.Namespace) -> str:
     wide = table.pivot_table(index="comparison", columns="observers", values="power", sort=False)
     mark, scored = simulated_mark(share), index_votes(votes)
     lines = [f"{mark}: what holds for them may not hold for people"] if mark else []
+    whole = whole_grades(scored.vote)
     lines += ["power by number of observers", wide.round(2).to_string(), _SCORES]
+    spread = fit_additive(scored).spread
+    if whole and spread < SPREAD_LEAST:
+        lines.append(
+            f"The pilot's whole grades spread by {spread:.2f} only, under half a grade: they do "
+            "not tell where between two grades a score lies, and the power may be off."
+        )
     if options.difference is not None:
         simulated = float(table["difference"].abs().mean())
-        lines += _changed(abs(options.difference), simulated, whole=whole_grades(scored.vote))
+        lines += _changed(abs(options.difference), simulated, whole=whole)
     return "\n".join([*lines, *unmarked_robots(scored), f"in {out}"])
 
 

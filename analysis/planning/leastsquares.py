@@ -32,6 +32,13 @@ class Additive(NamedTuple):
     variance: NDArray[np.float64]
     freedom: NDArray[np.float64]
 
+    @property
+    def spread(self) -> float:
+        """Sd of the votes of all about score + bias; nan where nothing is left to tell it from."""
+        freedom = float(self.freedom.sum())
+        squares = float(np.nansum(self.variance * self.freedom))
+        return float(np.sqrt(squares / freedom)) if freedom > 0 else float("nan")
+
 
 def fit_additive(scored: Indexed) -> Additive:
     """Fit vote = score of the stimulus + bias of the observer + residual by least squares.

@@ -139,7 +139,10 @@ def _panel(scored: Indexed, found: Additive, scale: Scale) -> _Panel:
     between = max(float(found.bias.var(ddof=1)) - noise, 0.0)
     whole = whole_grades(scored.vote)
     if whole:  # The simulated votes will be rounded too: rounding must not count twice.
-        variance = np.maximum(variance - _ROUNDING, 0.0)
+        # Off the pooled variance: observer by observer it would be cut at 0 for many, whose share
+        # would then stay in the others' spread.
+        pooled = float(drawn @ variance)
+        variance = variance * (max(pooled - _ROUNDING, 0.0) / pooled if pooled > 0 else 0.0)
     return _Panel(float(np.sqrt(between)), np.sqrt(variance), drawn, scale, whole)
 
 

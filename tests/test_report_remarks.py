@@ -81,15 +81,18 @@ def test_observers_left_out_keep_their_mark(tmp_path):
 def test_votes_of_robots_that_are_not_marked_are_remarked_on():
     votes = table(TYPICAL, simulated=False)
     robots = votes.assign(observer="robot-" + votes["observer"])
+    one = robots.assign(simulated=robots["observer"] == "robot-o1")
     for shown, expected in (
-        (robots.drop(columns="simulated"), True),
-        (robots, True),
-        (robots.assign(simulated=True), False),
-        (pd.concat([robots, votes]), False),
+        (robots.drop(columns="simulated"), "robot-o0, robot-o1"),
+        (robots, "robot-o0, robot-o1"),
+        (robots.assign(simulated=True), ""),
+        (pd.concat([robots, votes]), "robot-o0, robot-o1"),
+        (one, "robot-o0, robot-o2"),
+        (votes, ""),
     ):
         found = " ".join(analyse(shown, Description(Scale(1, 5))).remarks)
-        said = "all observers are called as dsis calls its simulated ones: robot-o0, robot-o1"
-        assert (said in found) is expected
+        said = "Not marked as simulated, but called as dsis calls its simulated observers: "
+        assert f"{said}{expected}" in found if expected else said not in found
 
 
 def test_a_single_person_among_robots_is_not_rounded_away():

@@ -143,13 +143,14 @@ def _about_the_test(votes: pd.DataFrame, scale: Scale, counts: Counts) -> Iterat
 
 
 def unmarked_robots(scored: Indexed) -> Iterator[str]:
-    """Yield a sentence where all observers are called as dsis calls its robots, none marked so."""
-    names = scored.observers["observer"]
-    if names.str.startswith(ROBOT).all() and not scored.observers["simulated"].any():
+    """Yield a sentence on observers who are called as dsis calls its robots and not marked so."""
+    people = scored.observers[~scored.observers["simulated"]]
+    named = people[people["observer"].str.startswith(ROBOT)]
+    if len(named):
         yield (
-            f"No vote is marked as simulated, but all observers are called as dsis calls its "
-            f"simulated ones: {_names(names)}. If they are, the votes lack the column simulated "
-            "(true for each)."
+            "Not marked as simulated, but called as dsis calls its simulated observers: "
+            f"{_names(pd.Series(observer_name(named)))}. If they are, the column simulated must be "
+            "true for their votes."
         )
 
 

@@ -13,6 +13,7 @@ from analysis.votes import scored
 from dsis.errors import Fault, InputError
 
 ROBOTS = "simulated_observers"
+OBSERVERS_LISTED = 8
 
 
 def is_sureal(path: Path) -> bool:
@@ -32,11 +33,12 @@ def read_sureal(path: Path) -> pd.DataFrame:
     Raises
     ------
     InputError
-        It is no such dataset; every place that is wrong is named.
+        It is no such dataset, or somebody without a vote is said to be simulated; every place that
+        is wrong is named.
     """
     dataset = _load(path)
     contents, references = _contents(dataset)
-    robots = _robots(dataset, path)
+    robots = set(_robots(dataset, path))
     faults: list[Fault] = []
     rows = []
     for at, video in enumerate(dataset["dis_videos"]):
@@ -59,6 +61,7 @@ def read_sureal(path: Path) -> pd.DataFrame:
         raise InputError(faults)
     if not rows:
         raise InputError.of(path, "dis_videos", "holds no votes")
+    _check_robots(robots, list(dict.fromkeys(row[0] for row in rows)), path)
     columns = ["observer", "stimulus", "content", "kind", "repetition", "vote", "simulated"]
     return pd.DataFrame(rows, columns=columns).astype({"vote": "float64"})
 
@@ -83,13 +86,26 @@ def _contents(dataset: dict[str, Any]) -> tuple[dict[Any, str], dict[Any, Any]]:
     return names, {v.get("content_id"): v["path"] for v in videos if v.get("path")}
 
 
-def _robots(dataset: dict[str, Any], path: Path) -> set[str]:
+def _robots(dataset: dict[str, Any], path: Path) -> list[str]:
     """Return the observers that the dataset says are simulated."""
     names = dataset.get(ROBOTS, [])
     if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
         fact = f"is {json.dumps(names)[:40]}, must be a list of observers"
         raise InputError.of(path, ROBOTS, fact)
-    return set(names)
+    return names
+
+
+def _check_robots(robots: set[str], observers: list[str], path: Path) -> None:
+    """Refuse a mark that falls on nobody: somebody else's votes would pass for a person's."""
+    strangers = sorted(robots - set(observers))
+    if strangers:
+        known = ", ".join(observers[:OBSERVERS_LISTED])
+        more = len(observers) - OBSERVERS_LISTED
+        allowed = f"{known} and {more} more" if more > 0 else known
+        raise InputError(
+            Fault(str(path), ROBOTS, f"names {json.dumps(name)[:40]}, must be of {allowed}")
+            for name in strangers
+        )
 
 
 def _is_reference(video: dict[str, Any], references: dict[Any, Any]) -> bool:
@@ -127,9 +143,18 @@ def write_sureal(votes: pd.DataFrame, path: Path, scale: Scale, title: str = "ds
 
     sureal knows no missing second vote: repetitions stand in a list, null where one is missing.
     Its reader takes numbers only, so a test without missing repetitions reads back there as well.
+
+    Raises
+    ------
+    InputError
+        Some votes of an observer are simulated and some are not: a dataset marks observers.
     """
     rows = scored(votes)
     names = rows["observer"].where(rows["lab"] == "", rows["lab"] + "/" + rows["observer"])
+    kinds = rows["simulated"].groupby(names).nunique()
+    if (kinds > 1).any():
+        fact = "has simulated votes and others: must be one of both, this file marks observers"
+        raise InputError(Fault(str(path), str(who), fact) for who in kinds.index[kinds > 1])
     contents = {name: number for number, name in enumerate(sorted(set(rows["content"])))}
     videos = []
     references = {name: name for name in contents}

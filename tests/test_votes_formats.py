@@ -160,6 +160,16 @@ def test_a_dataset_of_sureal(tmp_path):
             "simulated_observers",
             'is "a", must be a list of observers',
         ),
+        (
+            '{"dis_videos": [{"os": {"a": 3, "b": 4}}], "simulated_observers": ["a", "c"]}',
+            "simulated_observers",
+            'names "c", must be of a, b',
+        ),
+        (
+            '{"dis_videos": [{"os": [3, 4]}], "simulated_observers": ["robot-001"]}',
+            "simulated_observers",
+            'names "robot-001", must be of o1, o2',
+        ),
         ('{"dis_videos": [{"os": {"a": true}}]}', "dis_videos[0].os", "must be a number"),
         ('{"dis_videos": [{"os": {"a": 7}}]}', "vote 1, vote", "must be from 1 to 5"),
     ],
@@ -242,6 +252,17 @@ def test_every_form_of_votes_says_whose_are_simulated(tmp_path):
         assert len(again) == 4
     analysis.write_wide(votes.assign(simulated=False), tmp_path / "wide.csv")
     assert "simulated" not in (tmp_path / "wide.csv").read_text(encoding="utf-8")
+
+
+def test_an_observer_with_votes_of_both_kinds_is_no_observer_of_a_dataset(tmp_path):
+    rows = [("ann", "a", 3), ("bot", "a", 4), ("ann", "b", 5), ("bot", "b", 6)]
+    votes = pd.DataFrame(rows, columns=["observer", "stimulus", "vote"])
+    file = tmp_path / "votes.json"
+    with pytest.raises(InputError) as caught:
+        analysis.write_sureal(votes.assign(simulated=[0, 1, 0, 0]), file, Scale(1, 10))
+    assert [fault.key for fault in caught.value.faults] == ["bot"]
+    assert "has simulated votes and others" in caught.value.faults[0].fact
+    assert not file.exists()
 
 
 def lab(folder, text, scale="[1, 10]"):

@@ -77,6 +77,17 @@ def misspelt(names: Iterable[object]) -> dict[str, str]:
     return {name: meant for name, meant in plain.items() if meant in absent}
 
 
+def spelling_faults(wrong: dict[str, str]) -> dict[str, str]:
+    """Return {name: what is wrong} of the names that `misspelt` found."""
+    first: dict[str, str] = {}
+    return {
+        name: f"must be spelled {meant}"
+        if first.setdefault(meant, name) == name
+        else f"means {meant}, as {first[meant]} does: take one of them out"
+        for name, meant in wrong.items()
+    }
+
+
 def complete(votes: pd.DataFrame) -> pd.DataFrame:
     """Return the table with every column of `COLUMNS`, in their types and defaults.
 
@@ -85,9 +96,9 @@ def complete(votes: pd.DataFrame) -> pd.DataFrame:
     InputError
         A needed column is missing or misspelt, or a column cannot be brought to its type.
     """
-    wrong = misspelt(votes.columns)
+    wrong = spelling_faults(misspelt(votes.columns))
     if wrong:
-        raise InputError(Fault(TABLE, name, f"must be spelled {wrong[name]}") for name in wrong)
+        raise InputError(Fault(TABLE, name, fact) for name, fact in wrong.items())
     whole = votes.copy()
     for column in COLUMNS:
         if column.required and column.name not in whole:

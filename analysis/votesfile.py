@@ -3,6 +3,7 @@
 import csv
 import io
 import os
+import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
@@ -13,13 +14,15 @@ from analysis.scale import Description, describe_test
 from analysis.storefile import exported, store_folder
 from analysis.surealfile import is_sureal, read_sureal
 from analysis.table import DTYPES, Column, Kind, to_csv
-from analysis.votes import COLUMNS, complete, contradictions, misspelt
+from analysis.votes import COLUMNS, complete, contradictions, misspelt, spelling_faults
 from analysis.widefile import is_wide, lengthen
 from dsis.errors import Fault, InputError
 
 FAULTS_LISTED = 20
 _DELIMITERS = (",", ";", "\t")
 _WHOLE_MAX = 2**53  # beyond it neighbouring whole numbers are one number
+
+_NUMBER = re.compile(r"[0-9]+([.,][0-9]+)?")
 
 _Found = list[tuple[int, str, str]]  # row, column, what is wrong
 
@@ -170,11 +173,17 @@ def _check_shape(
     file: Path, header: list[str], at: int, lines: list[int], rows: list[list[str]]
 ) -> None:
     known, wrong = ", ".join(header), misspelt(header)
-    found: _Found = [(at, name, f"must be spelled {meant}") for name, meant in wrong.items()]
+    wide = is_wide([wrong.get(name, name) for name in header])
+    votes_under = _observers_perhaps(wrong, header, rows) if wide else {}
+    wrong = {name: meant for name, meant in wrong.items() if votes_under.get(name) is not True}
+    found: _Found = [
+        (at, name, f"{fact}; an observer needs another name" if name in votes_under else fact)
+        for name, fact in spelling_faults(wrong).items()
+    ]
     found += [
         (at, column.name, f"column is missing; found here: {known}{_other_names(column, header)}")
         for column in COLUMNS
-        if column.required and column.name not in (*header, *wrong.values()) and not is_wide(header)
+        if column.required and column.name not in (*header, *wrong.values()) and not wide
     ]
     found += [
         (at, name or "header", f"stands {header.count(name)} times" if name else "has no name")
@@ -195,6 +204,31 @@ def _check_shape(
     ]
     if found:
         raise InputError(_faults(str(file), found))
+
+
+def _observers_perhaps(
+    wrong: dict[str, str], header: list[str], rows: list[list[str]]
+) -> dict[str, bool]:
+    """Return which misspelt columns of a wide table hold numbers, as an observer's would.
+
+    True: they are nothing that the column meant can hold, so they are votes.
+    """
+    perhaps = {}
+    for name, meant in wrong.items():
+        at = header.index(name)
+        cells = {row[at] for row in rows if at < len(row)} - {""}
+        if cells and all(_NUMBER.fullmatch(cell) for cell in cells):
+            column = next(c for c in COLUMNS if c.name == meant)
+            perhaps[name] = not any(_can_hold(column, cell) for cell in cells)
+    return perhaps
+
+
+def _can_hold(column: Column, cell: str) -> bool:
+    try:
+        column.parse(cell, decimal_comma="," in cell)
+    except ValueError:
+        return False
+    return True
 
 
 def _other_names(column: Column, header: list[str]) -> str:

@@ -122,6 +122,7 @@ def test_all_faults_come_at_once_with_their_rows(tmp_path):
         ("observer,stimulus,vote,Dropped frames", {"Dropped frames": "dropped_frames"}),
         ("stimulus,Simulated,ann,bob", {"Simulated": "simulated"}),
         ("stimulus,Observer,Vote,x", {"Observer": "observer", "Vote": "vote"}),
+        ("Stimulus,ann,bob,cat", {"Stimulus": "stimulus"}),
     ],
 )
 def test_known_columns_that_are_spelled_otherwise_are_not_passed_over(tmp_path, header, wrong):
@@ -129,6 +130,25 @@ def test_known_columns_that_are_spelled_otherwise_are_not_passed_over(tmp_path, 
     found = faults(write(tmp_path, f"{header}\na,b,5,1\n"))
     assert dict(found) == {
         f"row 1, {name}": f"must be spelled {meant}" for name, meant in wrong.items()
+    }
+
+
+def test_an_observer_of_a_wide_table_may_be_called_like_a_column(tmp_path):
+    """Votes are no kinds; where they could be what the column says, both ways out are said."""
+    votes = analysis.read_votes(write(tmp_path, "stimulus,Kind,ann\na,5,6\nb,,7\n"), PAPER)
+    assert set(votes["observer"]) == {"Kind", "ann"}
+    assert votes.loc[votes["observer"] == "Kind", "vote"].dropna().tolist() == [5]
+    for name in ("Lab", "Level"):
+        found = faults(write(tmp_path, f"stimulus,{name},ann\na,1,6\nb,2,7\n"))
+        fact = f"must be spelled {name.lower()}; an observer needs another name"
+        assert found == [(f"row 1, {name}", fact)]
+
+
+def test_two_spellings_of_a_column_are_not_both_to_be_spelled_alike(tmp_path):
+    found = dict(faults(write(tmp_path, "observer,stimulus,vote,Kind,KIND\na,b,5,test,dummy\n")))
+    assert found == {
+        "row 1, Kind": "must be spelled kind",
+        "row 1, KIND": "means kind, as Kind does: take one of them out",
     }
 
 

@@ -9,9 +9,8 @@ from hypothesis import strategies as st
 from scipy.stats import norm
 from statsmodels.stats.multitest import multipletests
 
-from analysis.mismatch.bank.key import Key
 from analysis.mismatch.bank.scalars import gumbel_score, ratio_root
-from analysis.mismatch.null import _across_none, adjusted
+from analysis.mismatch.null import adjusted
 from analysis.mismatch.rounding import rounded, unrounded
 from analysis.mismatch.split import LEAST_FRAMES, Split
 from dsis.cfa import Cfa
@@ -190,25 +189,3 @@ def test_every_frame_is_in_one_part(frames: list[int]) -> None:
             assert brightest or len(recording.exposures) < 4 or max(frames) < LEAST_FRAMES
         else:
             assert sum(bool(part) for part in parts) == 1
-
-
-@pytest.mark.parametrize("less", [1.2, 1.6, 2.0])
-def test_roots_of_ratios_below_none_are_no_farther_off_than_the_ratios(less: float) -> None:
-    """Of 17 recordings of one law one is held against 16; by the roots' spread 2 % were far off."""
-    rng = np.random.default_rng(1)
-    keys = [Key("fixed_smooth_variance", "exposure", "flat-0", "MONO")]
-    far = {"roots": 0, "both": 0}
-    for drawn in np.cbrt(rng.chisquare(9, (2000, 17)) / 9 - less):
-        made, recorded = drawn[:16, np.newaxis], drawn[16:]
-        mean, sd = made.mean(0), made.std(0, ddof=1) * np.sqrt(17 / 16)
-        least = _across_none(keys, made, mean, recorded)
-        far["roots"] += int(abs(recorded - mean)[0] > 5 * sd[0])
-        far["both"] += int(abs(recorded - mean)[0] > 5 * max(sd[0], least[0]))
-    assert far["both"] <= 0.008 * 2000
-    assert far["both"] <= 0.4 * far["roots"]
-
-
-def test_roots_on_one_side_keep_their_spread() -> None:
-    keys = [Key("fixed_smooth_variance", "exposure", "flat-0", "MONO"), Key("level", "exposure")]
-    made = np.array([[0.9, -1.0], [1.1, -2.0], [1.0, -1.5]])
-    assert not _across_none(keys, made, made.mean(0), np.array([3.0, 4.0])).any()

@@ -113,7 +113,6 @@ def null_of(
     wide = widening(seen.keys, np.where(known, np.nan_to_num(values), 0.0), error, recorded)
     known &= np.isfinite(wide)
     sd = np.where(known, sd * wide, sd)
-    sd = np.maximum(sd, _across_none(seen.keys, np.nan_to_num(values), mean, recorded))
     wander = np.where(known, wandering_dn2(layout, seen.keys, mean, recorded), 0.0)
     sd = np.sqrt(sd**2 + wander)
     wander = np.sqrt(wander) / sd
@@ -170,21 +169,6 @@ def _together(sums: Contrasts, part: Array, keys: Sequence[Key]) -> Array:
     for which in groups.values():
         added += _of_parts(sums.matrix[:, which], part[which])
     return added
-
-
-def _across_none(keys: Sequence[Key], values: Array, mean: Array, recorded: Array) -> Array:
-    """Return the least spread of cube roots where the recording's and the model's have other signs.
-
-    Ratios of variances, less what other causes leave by chance, may be below none. Near none their
-    cube roots are torn apart, and recordings that all lie on one side say little of how far: there
-    no number is farther off than its ratio is. 0 for all other numbers.
-    """
-    roots = np.array([key.is_cube_root for key in keys], bool)
-    ratios = values**3
-    own = ratios.std(0, ddof=1) * np.sqrt(1 + 1 / len(values))
-    apart = np.abs(recorded**3 - ratios.mean(0))
-    torn = roots & (mean * recorded < 0) & (apart > 0)
-    return np.where(torn, np.abs(recorded - mean) * own / np.where(torn, apart, 1.0), 0.0)
 
 
 def _wandering(sums: Contrasts, part: Array, keys: Sequence[Key]) -> Array:

@@ -104,11 +104,16 @@ def single(state: State, effect: Effect) -> Denial | None:
     shares = [_shown(state, effect, rest, seen=step) for rest in rests]
     if any(share is None for share in shares):
         return None
+    # A long decay is nearly smooth: fewer numbers make it.
+    if _beyond_halves not in rests and outlined(state, effect, beyond=True):
+        return None
     return Denial(max(share for share in shares if share is not None), why)
 
 
-def outlined(state: State, effect: Effect) -> bool:
+def outlined(state: State, effect: Effect, *, beyond: bool = False) -> bool:
     """Return whether means of lines tell a decay, of gain or else offset, from any smooth surface.
+
+    `beyond`: without the outermost line of each colour, which may differ for other reasons.
 
     A decay over a tenth of the lines and more is nearly a polynomial of the fourth degree: of what
     is beyond that little is left to see. But it takes two numbers, the polynomial four. The
@@ -131,6 +136,9 @@ def outlined(state: State, effect: Effect) -> bool:
         smooth = np.polynomial.legendre.legvander(place, SMOOTH_DEGREE)[:, 1:]
         shapes = np.column_stack([smooth, np.exp(-distance / length)])
         means = image.mean(1 - axis)
+        if beyond:
+            inner = distance >= 1 + (channel != "MONO")
+            means, shapes = means[inner], shapes[inner]
         scale = layout.regressors(channel).scales["gain"] if gain else 1.0
         # Lines scatter beyond the noise of their pixels, in what neither explains. All channels
         # have one surface and one decay, and each its own mean.

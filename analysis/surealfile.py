@@ -11,9 +11,8 @@ import pandas as pd
 from analysis.scale import Scale
 from analysis.votes import scored
 from dsis.errors import Fault, InputError
-
-ROBOTS = "simulated_observers"
-OBSERVERS_LISTED = 8
+from dsis.outdir import listed
+from dsis.session.sureal import SIMULATED_OBSERVERS
 
 
 def is_sureal(path: Path) -> bool:
@@ -88,10 +87,10 @@ def _contents(dataset: dict[str, Any]) -> tuple[dict[Any, str], dict[Any, Any]]:
 
 def _robots(dataset: dict[str, Any], path: Path) -> list[str]:
     """Return the observers that the dataset says are simulated."""
-    names = dataset.get(ROBOTS, [])
+    names = dataset.get(SIMULATED_OBSERVERS, [])
     if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
         fact = f"is {json.dumps(names)[:40]}, must be a list of observers"
-        raise InputError.of(path, ROBOTS, fact)
+        raise InputError.of(path, SIMULATED_OBSERVERS, fact)
     return names
 
 
@@ -99,11 +98,13 @@ def _check_robots(robots: set[str], observers: list[str], path: Path) -> None:
     """Refuse a mark that falls on nobody: somebody else's votes would pass for a person's."""
     strangers = sorted(robots - set(observers))
     if strangers:
-        known = ", ".join(observers[:OBSERVERS_LISTED])
-        more = len(observers) - OBSERVERS_LISTED
-        allowed = f"{known} and {more} more" if more > 0 else known
+        allowed = listed(observers) or "nobody"
         raise InputError(
-            Fault(str(path), ROBOTS, f"names {json.dumps(name)[:40]}, must be of {allowed}")
+            Fault(
+                str(path),
+                SIMULATED_OBSERVERS,
+                f"names {json.dumps(name)[:40]}, must be of {allowed}",
+            )
             for name in strangers
         )
 
@@ -176,7 +177,7 @@ def write_sureal(votes: pd.DataFrame, path: Path, scale: Scale, title: str = "ds
         "dataset_name": title,
         "yuv_fmt": "notyuv",
         "ref_score": scale.high,
-        ROBOTS: sorted(set(names[rows["simulated"]])),
+        SIMULATED_OBSERVERS: sorted(set(names[rows["simulated"]])),
         "ref_videos": [
             {"content_id": number, "content_name": name, "path": references[name]}
             for name, number in contents.items()

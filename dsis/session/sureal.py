@@ -7,6 +7,9 @@ from dsis.manifest import Manifest
 from dsis.session.columns import Shown
 from dsis.session.plan import SCORED
 
+SIMULATED_OBSERVERS = "simulated_observers"
+"""Key of a dataset, which sureal passes over: the observers that are simulated."""
+
 
 def sureal_dataset(manifest: Manifest, shown: Sequence[Shown]) -> dict[str, Any]:
     """Return the valid votes of the test by stimulus and observer; JSON can hold it.
@@ -34,7 +37,7 @@ def sureal_dataset(manifest: Manifest, shown: Sequence[Shown]) -> dict[str, Any]
         "width": manifest.sequence.width,
         "height": manifest.sequence.height,
         "ref_score": manifest.session.scale[1],
-        "simulated_observers": sorted(robots),
+        SIMULATED_OBSERVERS: sorted(robots),
         "ref_videos": [
             {"content_id": number, "content_name": content, "path": references[content]}
             for number, content in enumerate(contents)

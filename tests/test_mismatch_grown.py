@@ -27,12 +27,15 @@ def _state(
         keys += [Key(statistic, MOSAIC, name, "", "") for name in TIMES]
     drawn = np.cbrt(1 + of_time) + rng.normal(0, sd, len(TIMES))
     values = np.tile(drawn, len(keys) // len(TIMES))
+    layout = SimpleNamespace(
+        exposures=[SimpleNamespace(name=n, exposure_time_s=t) for n, t in TIMES.items()],
+        uniform=(),
+        channels=("MONO",),
+    )
     return SimpleNamespace(
-        setting=SimpleNamespace(
-            layout=SimpleNamespace(
-                exposures=[SimpleNamespace(name=n, exposure_time_s=t) for n, t in TIMES.items()]
-            )
-        ),
+        setting=SimpleNamespace(layout=layout, seen=SimpleNamespace(lines={})),
+        camera=SimpleNamespace(effect=()),
+        calibrated=SimpleNamespace(fit=SimpleNamespace(signal_dn={})),
         vector=SimpleNamespace(keys=tuple(keys), values=values),
         null=SimpleNamespace(
             mean=np.full(len(keys), np.cbrt(1 + OFFSET)),
@@ -80,6 +83,34 @@ def test_what_moves_a_frame_counts_once_in_a_mosaic() -> None:
         state = _state(drift, "frame_variance", seed, sd=0.09, channels=4)
         denied += grown(state, "black_level_drift", without) is not None
     assert denied <= 2
+
+
+@pytest.mark.parametrize("grows", [False, True])
+def test_frames_say_by_their_own_likelihood_whether_a_drift_grows(
+    grows: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Six frames each: of a drift of 0.25 in all, one exposure may show a tenth, one three times.
+
+    Numbers of exposures, whose scatter is said to be normal, took that for growth with time.
+    """
+    count, new, shares = 6, 0.1, dict.fromkeys(TIMES, 1.0)
+    if grows:
+        shares = {name: time / max(TIMES.values()) for name, time in TIMES.items()}
+    denied = 0
+    for seed in range(60):
+        rng = np.random.default_rng(seed)
+        means = {
+            name: FrameMeans(
+                np.arange(count, dtype=float),
+                rng.normal(0, np.hypot(0.25 * share, new), count),
+                new**2,
+            )
+            for name, share in shares.items()
+        }
+        monkeypatch.setattr(module, "means_of", lambda *_, means=means: means)
+        state = _state(np.zeros(len(TIMES)), "frame_variance", seed)
+        denied += grown(state, "black_level_drift", np.ones(len(TIMES))) is not None
+    assert denied >= 20 if grows else denied <= 1
 
 
 def test_one_exposure_time_tells_nothing(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -25,7 +25,7 @@ from dsis.effects.prnu import Prnu
 from dsis.effects.saturation import Saturation
 
 Array = NDArray[np.float64]
-NUMBERS, SURE = 200, 5.0
+NUMBERS, SURE, SIMULATED = 200, 5.0, 16
 ROWS, COLUMNS, FRAMES, SD = 96, 64, 10, 4.0
 
 
@@ -35,8 +35,24 @@ def test_numbers_that_fit_leave_errors_as_they_are() -> None:
     larger = 0
     for _ in range(200):
         slopes, sd = rng.standard_normal((NUMBERS, 2)), rng.uniform(0.5, 2, NUMBERS)
-        larger += bool((_misfit(slopes, sd, sd * rng.standard_normal(NUMBERS)) > 1).any())
+        left, drawn = (sd * rng.standard_normal((n, NUMBERS)) for n in (1, SIMULATED))
+        larger += bool((_misfit(slopes, sd, left, drawn) > 1).any())
     assert larger <= 8
+
+
+def test_numbers_that_move_together_are_no_proof_of_another_law() -> None:
+    """Eight that all are seen five times, in four channels and the whole: chance is that of eight.
+
+    A mean square of chi-squared with so few degrees of freedom leans: three standard deviations of
+    its scatter are exceeded four times as often as of a normal number.
+    """
+    rng = np.random.default_rng(4)
+    slopes, sd = np.ones((40, 1)), np.full(40, 2.0)
+    larger = 0
+    for _ in range(1000):
+        drawn = np.repeat(2 * rng.standard_normal((1 + SIMULATED, 8)), 5, 1)
+        larger += bool((_misfit(slopes, sd, drawn[:1], drawn[1:]) > 1).any())
+    assert larger <= 12  # 1.35 expected by the law, more by a scatter that is known of 16
 
 
 def test_errors_are_larger_by_what_numbers_that_tell_them_are_off() -> None:
@@ -45,8 +61,8 @@ def test_errors_are_larger_by_what_numbers_that_tell_them_are_off() -> None:
     half = np.arange(NUMBERS) < NUMBERS // 2
     slopes = np.stack([half, ~half], 1).astype(float)
     sd = np.full(NUMBERS, 3.0)
-    left = sd * rng.standard_normal(NUMBERS) * np.where(half, 4.0, 1.0)
-    first, other = _misfit(slopes, sd, left)
+    left, drawn = (sd * rng.standard_normal((n, NUMBERS)) for n in (1, SIMULATED))
+    first, other = _misfit(slopes, sd, left * np.where(half, 4.0, 1.0), drawn)
     assert first == pytest.approx(4, rel=SURE * (1 / NUMBERS) ** 0.5)
     assert other == 1
 

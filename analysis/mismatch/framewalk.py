@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 _LEAST = 3  # frames of an exposure
 _PERSISTENCES = np.linspace(0.0, 0.98, 50)
 _WIDEST, _SIZES = 30.0, 121  # of the scatter that is seen, times and over; sizes tried
+_COARSE = 40  # of two at once
 _INTERVAL = 1.92  # of log-likelihood: half of chi-squared at 95 %
 _NORMAL = 1.96
 
@@ -152,6 +153,22 @@ def shown(exposures: Sequence[FrameMeans]) -> float:
     sizes = np.concatenate([[0.0], _sizes(exposures)])
     likely = sum((_loglik(own, sizes) for own in exposures), np.zeros((1, sizes.size)))
     return float(likely.max() - likely[0, 0])
+
+
+def growing(exposures: Sequence[FrameMeans], weights: Array) -> tuple[float, float]:
+    """Return by how much frames are likelier to wander in proportion to weights than alike, nats.
+
+    And by how much they are likelier to do both than that. `weights` are of the exposures, (n,), 0
+    or more, the largest above 0. Each at its likeliest sizes and persistence.
+    """
+    sizes = np.concatenate([[0.0], _sizes(exposures)[:: _SIZES // _COARSE]])
+    shares = np.asarray(weights, float) / np.max(weights)
+    one, other = (grid.ravel() for grid in np.meshgrid(sizes, sizes))
+    likely = np.zeros((_PERSISTENCES.size, one.size))
+    for own, share in zip(exposures, shares, strict=True):
+        likely += _loglik(own, np.hypot(one, share * other))
+    alike, grown = (float(likely[:, size == 0].max()) for size in (other, one))
+    return grown - alike, float(likely.max()) - grown
 
 
 def _loglik(own: FrameMeans, sizes: Array) -> Array:

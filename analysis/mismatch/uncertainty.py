@@ -41,7 +41,7 @@ _PLAIN = ((FALL_SIZE, RING_SIZE, 0.0), ("percent_full_scale", "exponent", 1.0))
 _LARGEST = 0.7  # correction of a logarithm
 _CLEAR = 0.9  # share of what slopes show that is theirs: more sensors are not needed
 _LEAST = 0.05  # of it, from which on errors are said as if it were that much
-_BY_CHANCE = 3.0  # standard deviations of a mean square, that chance makes
+_BY_CHANCE = float(scipy.stats.norm.cdf(3.0))  # quantile of a mean square, that chance makes
 _LEAST_SENSORS = 2  # that show a scatter
 _NORMAL = 1.96
 _FARTHEST = 7.0  # end of a logarithm's interval: beyond a factor of 1000 nothing is known
@@ -92,7 +92,8 @@ def settled(state: State, bare: Camera, proposals: Sequence[Proposal]) -> Settle
     mean, known = state.null.mean, state.null.known
     score, inverse, weights = _information(state, bare, effects, free)
     rest = np.where(known, state.vector.values - mean, 0.0)
-    simulated = np.where(known, np.nan_to_num(state.simulated) - mean, 0.0) @ score.T
+    drawn = np.where(known, np.nan_to_num(state.simulated) - mean, 0.0)
+    simulated = drawn @ score.T
     count = len(simulated)
     covariance = np.atleast_2d(np.cov(simulated, rowvar=False)) * (1 + 1 / count)
     sandwich = inverse @ covariance @ inverse
@@ -101,7 +102,8 @@ def settled(state: State, bare: Camera, proposals: Sequence[Proposal]) -> Settle
     reach = student * np.sqrt(np.diag(sandwich))
     _, sd, _ = state.predictor().weights(mean)
     slopes = np.divide(score, weights, out=np.zeros_like(score), where=weights > 0).T
-    wider = _misfit(slopes, sd, np.where(weights > 0, rest - slopes @ step, 0.0))
+    left = np.where(weights > 0, np.vstack([rest - slopes @ step, drawn]), 0.0)
+    wider = _misfit(slopes, sd, *np.split(left, [1]))
     reach *= wider
     corrected = effects
     for (i, name, signed), delta in zip(free, step, strict=True):
@@ -178,19 +180,22 @@ def _information(
         replicates = min(2 * replicates, most)
 
 
-def _misfit(slopes: Array, sd: Array, left: Array) -> Array:
+def _misfit(slopes: Array, sd: Array, left: Array, drawn: Array) -> Array:
     """Return by how much errors of parameters are larger for numbers that do not fit: (parameter,).
 
-    The mean of the squares of what is left, in standard deviations, each number weighted by what it
-    tells of the parameter (Birge, Phys. Rev. 40, 1932): 1 for a law that holds. A full well, say,
-    where charge is limited by another law, is told by numbers that remain far off. What chance
-    makes of as many numbers counts as 1.
+    The mean of the squares of what is left, (1, number), in standard deviations, each weighted by
+    what it tells of the parameter (Birge, Phys. Rev. 40, 1932): 1 for a law that holds. A full
+    well, say, where charge is limited by another law, is told by numbers that remain far off. What
+    chance makes of as many counts as 1: by the law of chi-squared, of fewer where the mean squares
+    of simulated recordings scatter more, whose numbers are `drawn` about their mean, (recording,
+    number). Channels of a frame that is far off are far off together.
     """
     told = (slopes / sd[:, None]) ** 2
     whole = np.maximum(told.sum(0), 1e-300)
-    birge = (left / sd) ** 2 @ told / whole
+    (birge,), alike = ((own / sd) ** 2 @ told / whole for own in (left, drawn))
     numbers = whole**2 / np.maximum((told**2).sum(0), 1e-300)
-    chance = 1 + _BY_CHANCE * np.sqrt(2 / numbers)
+    numbers = np.minimum(numbers, 2 / np.maximum(alike.var(0, ddof=1), 1e-300))
+    chance = scipy.stats.chi2.ppf(_BY_CHANCE, numbers) / numbers
     return np.sqrt(np.where(birge > chance, birge, 1.0))
 
 

@@ -318,6 +318,7 @@ class FullWell(BaseLink):
     kind: str = "full_well"
     saturation_dn: Positive
     stage: ClassVar[Stage] = Stage.CHARGE
+    responds: ClassVar[bool] = True
     measures: ClassVar[frozenset[str]] = frozenset(
         {"level", "pixel_variance", "skewness", "kurtosis"}
     )

@@ -47,7 +47,8 @@ def link_numbers(chains: Sequence[Sequence[Effect]], read_outs: Sequence[int]) -
     """Return a number for each link of some chains: the same where it makes the same of an image.
 
     `read_outs` are numbers of what each camera's effects know of it. A second link of one kind has
-    fields of its own; one that remembers earlier frames hangs on all links before it.
+    fields of its own; one that remembers earlier frames hangs on all links before it, one that asks
+    for the expected signal as it arrives on those that respond.
     """
     known: dict[Any, list[tuple[Any, int]]] = {}
     found = []
@@ -58,6 +59,8 @@ def link_numbers(chains: Sequence[Sequence[Effect]], read_outs: Sequence[int]) -
         for link in chain:
             count = seen[link.kind] = seen.get(link.kind, 0) + 1
             before = tuple(numbers) if link.looks_back else ()
+            if link.asks_what_arrives:
+                before += tuple(n for n, own in zip(numbers, chain, strict=False) if own.responds)
             same = known.setdefault((link.kind, count, read_out, before), [])
             number = next((own for other, own in same if other == link), None)
             if number is None:
@@ -144,8 +147,18 @@ class Shutter:
         # Before the first frame the counter runs backwards: it has 32 bits.
         number = (self.frame - back) % 2**32
         earlier = partial(self._before, drawn, place, back)
-        known = (expected, drawn.read_out, earlier, self.exposure_time_s, self.threads)
+        arriving = partial(self._arriving, drawn, place, back, expected)
+        known = (expected, drawn.read_out, earlier, self.exposure_time_s, self.threads, arriving)
         return Exposure(self.grid, number, temporal, sensor, *known)
+
+    def _arriving(self, drawn: Drawn, links: int, back: int, expected: Image) -> Image:
+        """Return what those of the first links that respond make of the expected signal."""
+        image = expected
+        for place in range(links):
+            link = drawn.steps[place][0]
+            if link.responds:
+                image = link.apply(image, self._exposure(drawn, place, back, expected))
+        return image
 
     def _before(self, drawn: Drawn, links: int, back: int, k: int) -> Image:
         return self._after(drawn, links, back + k)

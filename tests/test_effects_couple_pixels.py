@@ -12,6 +12,7 @@ from pydantic import ValidationError
 
 from dsis.cfa import Cfa
 from dsis.draw import Draw
+from dsis.effects import Effect
 from dsis.effects.effect import OperatingPoint
 from dsis.grid import PixelGrid
 from exposing import BLACK_DN, SIDE, Z_MAX, apply, camera, effect, recorded, white
@@ -176,14 +177,17 @@ def test_image_lag_correlates_shot_noise_in_time_and_leaves_a_trail() -> None:
     np.testing.assert_array_equal(trail, 100.0)
 
 
-def test_readout_memory_remembers_a_shifted_mean() -> None:
-    """Charge cut 100 DN below what the light gives: a tenth of it is missing once more."""
+def test_readout_memory_remembers_offsets_and_no_cut() -> None:
+    """Offsets of columns are seen again two columns on; charge that a full well cuts is not."""
     memory = effect("readout_memory", fraction=0.1, lag_pixels=2)
-    full = camera(memory, slope=0.0, intercept=4.0).model_copy(update={"saturation_dn": 900.0})
-    stack = recorded(full, 1000.0, 20)
-    rest = stack[:, :, 2:]
-    assert abs(rest.mean() - 890) < Z_MAX * 2.1 * 1.1 / np.sqrt(rest.size)
-    assert abs(stack[:, :, :2].mean() - 900) < Z_MAX * 2.1 / np.sqrt(stack[:, :, :2].size)
+    offsets = effect("column_fpn", sigma_dn=30.0)
+    full, bare = (
+        camera(offsets, *own).model_copy(update={"saturation_dn": 900.0}) for own in ((memory,), ())
+    )
+    (stack,), (plain,) = recorded(full, 1000.0, 1), recorded(bare, 1000.0, 1)
+    again = 0.1 * (plain[:, :-2] - 900)
+    np.testing.assert_allclose(stack[:, 2:] - plain[:, 2:], again, atol=1.1)  # both are rounded
+    np.testing.assert_array_equal(stack[:, :2], plain[:, :2])
 
 
 @pytest.mark.parametrize(("along", "lag"), [("rows", (0, 3)), ("columns", (3, 0))])
@@ -285,3 +289,34 @@ def test_a_converter_carries_its_residue_over(
     for other in [(0, 1), (1, 0), (1, 1), (0, 2), (2, 0)]:
         if other != lag:
             assert abs(correlation(made, *other)) < Z_MAX * 1.5 / 1024
+
+
+RESPONSES = [
+    effect("nonlinearity", percent_full_scale=-3.0),
+    effect("saturation", full_well_dn=1500.0, softness_dn=400.0),
+    effect("dual_gain_mismatch", gain_error_percent=4.0),
+    effect("tap_mismatch", gain_percent=2.0, regions="left_right"),
+    effect("crosstalk", fraction=0.03),
+]
+
+
+@pytest.mark.parametrize("response", RESPONSES, ids=lambda own: own.kind)
+def test_memory_of_noise_leaves_the_level_that_a_response_gives(response: Effect) -> None:
+    """Without noise there is none to remember, whatever bends, cuts or scales the signal.
+
+    Of what noise there is the share is remembered: frames are whole codes, and so is the noise.
+    """
+    shares = np.tile([[1.0, 0.7], [0.7, 0.4]], (SIDE // 2, SIDE // 2))
+    light, grid = (1800 * shares).astype(np.float32), PixelGrid(SIDE, SIDE, Cfa.RGGB)
+    memory = effect("readout_memory", fraction=0.3, lag_pixels=3, along="columns")
+
+    def frame(*effects: Effect, slope: float = 0.0) -> np.ndarray:
+        own = camera(*effects, slope=slope, cfa=Cfa.RGGB, switch=1000.0)
+        return own.expose(light, Draw(1), Draw(2), 0, grid)
+
+    still, noisy = frame(response), frame(response, slope=0.1)
+    assert not np.array_equal(still, frame())
+    np.testing.assert_array_equal(frame(response, memory), still)
+    remembered = frame(response, memory, slope=0.1) - noisy
+    np.testing.assert_allclose(remembered[3:], 0.3 * (noisy - still)[:-3], atol=1.3)
+    np.testing.assert_array_equal(remembered[:3], 0)

@@ -20,7 +20,9 @@ from dsis.effects import Effect, Exposure
 from dsis.effects.adc_dnl import AdcDnl
 from dsis.effects.flicker import Flicker
 from dsis.effects.image_lag import ImageLag
+from dsis.effects.nonlinearity import Nonlinearity
 from dsis.effects.periodic_noise import PeriodicNoise
+from dsis.effects.readout_memory import ReadoutMemory
 from dsis.effects.row_noise import RowNoise
 from dsis.effects.saturation import Saturation
 from dsis.exposing import Shared, link_numbers
@@ -29,6 +31,7 @@ from effect_examples import KINDS, camera_with, example_of
 from mismatch_recordings import camera, recorded, state_of
 
 LIGHT, ROWS, DNL = Flicker(sigma_percent=1.0), RowNoise(sigma_dn=2.0), AdcDnl(rms_lsb=0.3)
+BENT = Nonlinearity(percent_full_scale=2.0)
 WAVE = PeriodicNoise(amplitude_dn=1.0, frequency=(0.21, 0.13))
 OTHER = PeriodicNoise(amplitude_dn=1.5, frequency=(0.21, 0.13))
 SCENE = np.linspace(100, 2000, 96 * 128, dtype=np.float32).reshape(96, 128)
@@ -125,6 +128,13 @@ def test_links_have_a_number_for_what_they_make() -> None:
     assert first == again
     assert not set(first).intersection(other)  # the lag has no light before it, ROWS are second
     assert not set(first).intersection(darker)
+
+
+def test_memory_of_noise_hangs_on_what_responds_before_it() -> None:
+    memory = ReadoutMemory(fraction=0.1, lag_pixels=1)
+    chains = [(LIGHT, *own, ROWS, memory) for own in ((), (BENT,), (BENT,))]
+    straight, bent, again = (own[-1] for own in link_numbers(chains, [0, 0, 0]))
+    assert straight != bent == again
 
 
 @pytest.mark.parametrize("signal", [0.0, 700.0])

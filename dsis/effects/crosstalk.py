@@ -24,6 +24,7 @@ class Crosstalk(Effect):
     stage: ClassVar[Stage] = Stage.CHARGE
     rank: ClassVar[int] = -20
     draws: ClassVar[bool] = False
+    responds: ClassVar[bool] = True
     reference: ClassVar[str] = (
         "Moore, Ninkov & Forrest, Quantum efficiency overestimation and deterministic cross talk "
         "resulting from interpixel capacitance, Optical Engineering 45, 2006"

@@ -26,6 +26,7 @@ class DualGainMismatch(Effect):
     stage: ClassVar[Stage] = Stage.READ_OUT
     rank: ClassVar[int] = -50  # the path's amplifier scales its read noise; lines come later
     draws: ClassVar[bool] = False
+    responds: ClassVar[bool] = True
     reference: ClassVar[str] = (
         "Seybold et al., CIC 22, 2014, section 'Camera noise characteristics' (dual-gain read-out)"
     )

@@ -96,6 +96,9 @@ class Exposure(NamedTuple):
         Exposure time, s.
     threads
         Threads that a kernel may use.
+    arriving
+        The expected signal as it enters this effect; None: as the light alone gives it. See
+        `arriving_dn`.
     """
 
     grid: PixelGrid
@@ -107,6 +110,12 @@ class Exposure(NamedTuple):
     earlier: Callable[[int], Image]
     exposure_time_s: float = 0.0
     threads: int = 1
+    arriving: Callable[[], Image] | None = None
+
+    @property
+    def arriving_dn(self) -> Image:
+        """The expected signal as it enters the effect: what effects that `respond` make of it."""
+        return self.expected_dn if self.arriving is None else self.arriving()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -236,6 +245,11 @@ class Effect(Model, ABC):
         Whether it draws, or redraws, anything at random; what does not is the same on every sensor.
     looks_back
         Whether it asks for earlier frames: cameras share what others make of the same image.
+    responds
+        Whether behind the light it is a law of the signal alone, that makes of the expected signal
+        what it makes of a frame's, on average: bends it, cuts it, scales it, shares it out.
+    asks_what_arrives
+        Whether it asks for the expected signal as it arrives: it hangs on what `responds` before.
     """
 
     kind: str
@@ -248,6 +262,8 @@ class Effect(Model, ABC):
     grows_with_time: ClassVar[bool] = False
     draws: ClassVar[bool] = True
     looks_back: ClassVar[bool] = False
+    responds: ClassVar[bool] = False
+    asks_what_arrives: ClassVar[bool] = False
 
     @abstractmethod
     def apply(self, image: Image, exposure: Exposure) -> Image:

@@ -36,6 +36,7 @@ class Nonlinearity(Effect):
     stage: ClassVar[Stage] = Stage.CHARGE
     rank: ClassVar[int] = 90
     draws: ClassVar[bool] = False
+    responds: ClassVar[bool] = True
     reference: ClassVar[str] = "EMVA Standard 1288, release 3.1, section 6 (linearity)"
     measures: ClassVar[frozenset[str]] = frozenset({"level", "pixel_variance"})
     confounders: ClassVar[str] = (

@@ -20,9 +20,10 @@ class ReadoutMemory(Effect):
     Of its noise, v'(i) = v(i) + f n(i - lag), n = v - S the deviation from the expected signal,
     which the clamp, the correlated double sampling or the converter bank has in common. A negative
     fraction takes noise away. Correlation f / (1 + f^2) at that lag and at no other; the first
-    samples of a line have nothing to remember. S is what the light alone gives: where charge is
-    bent, exchanged or cut (nonlinearity, crosstalk, saturation) or offsets are fixed, v - S has a
-    mean, of which f is remembered like the noise, and the level shifts.
+    samples of a line have nothing to remember. S is what reaches the read-out of the expected
+    signal, bent, shared out, cut and amplified as all of it is (nonlinearity, crosstalk,
+    saturation, gains of amplifiers). Offsets that are fixed are remembered like the noise; so is
+    what a limit that noise alone reaches takes from the mean.
 
     Or, where it `remembers` the signal, of all of it: v'(i) = v(i) + f (v(i - lag) - v(i)), as of
     an amplifier that has not settled, or of charge that stays behind. A flat of one colour keeps
@@ -42,13 +43,14 @@ class ReadoutMemory(Effect):
     stage: ClassVar[Stage] = Stage.READ_OUT
     rank: ClassVar[int] = 50
     draws: ClassVar[bool] = False
+    asks_what_arrives: ClassVar[bool] = True
     reference: ClassVar[str] = (
         "White, Lampe, Blaha & Mack, Characterization of surface channel CCD image arrays at low "
         "light levels, IEEE J. Solid-State Circuits 9, 1974"
     )
     measures: ClassVar[frozenset[str]] = frozenset(
         {
-            "level",  # where other effects moved the mean from the expected signal, or colours mix
+            "level",  # where offsets or a limit moved the mean, or colours mix
             "pixel_variance",
             "row_variance",
             "column_variance",
@@ -89,7 +91,7 @@ class ReadoutMemory(Effect):
         lag = self.lag_pixels * (image[0, 0].size if along_rows else 1)
         return _remembering(
             np.ascontiguousarray(image).reshape(rows, -1),
-            np.ascontiguousarray(exposure.expected_dn).reshape(rows, -1),
+            np.ascontiguousarray(exposure.arriving_dn).reshape(rows, -1),
             np.float32(self.fraction),
             (0, lag) if along_rows else (lag, 0),
         ).reshape(image.shape)

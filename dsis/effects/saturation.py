@@ -32,6 +32,7 @@ class Saturation(Effect):
 
     stage: ClassVar[Stage] = Stage.CHARGE
     draws: ClassVar[bool] = False  # its size, the mean, is the same on every sensor
+    responds: ClassVar[bool] = True
     reference: ClassVar[str] = "Janesick, Photon Transfer, SPIE Press, 2007"
     measures: ClassVar[frozenset[str]] = (
         frozenset(

@@ -30,6 +30,7 @@ class TapMismatch(Effect):
     stage: ClassVar[Stage] = Stage.READ_OUT
     rank: ClassVar[int] = -200  # before the read noise of the amplifier
     draws: ClassVar[bool] = False
+    responds: ClassVar[bool] = True
     reference: ClassVar[str] = "Janesick, Scientific Charge-Coupled Devices, SPIE Press, 2001"
     measures: ClassVar[frozenset[str]] = frozenset(
         {

@@ -29,12 +29,13 @@ def _state(
     *others: Any,
     left: tuple[float, float] = (20.0, 0.0),
     seed: int = 1,
+    noise: float = NOISE_DN,
 ) -> Any:
     """Return a state with a map of what grows with time, as it is measured: its mean is zero."""
     images = {}
     for k, channel in enumerate(("R", "B")):
-        image = growth_dn + np.random.default_rng([seed, k]).normal(0, NOISE_DN, (64, 96))
-        images[channel, "time"] = (image - image.mean(), NOISE_DN)
+        image = growth_dn + np.random.default_rng([seed, k]).normal(0, noise, (64, 96))
+        images[channel, "time"] = (image - image.mean(), noise)
     regressors = SimpleNamespace(scales={"time": TIME_S})
     return SimpleNamespace(
         setting=SimpleNamespace(
@@ -69,6 +70,17 @@ def test_a_glow_is_no_dark_current(extent: float) -> None:
 def test_dark_current_is_believed_alone_and_beside_a_glow(growth: Any) -> None:
     state = _state(RATE * TIME_S + growth)
     assert uneven(state, registry()["dark_current"](dn_per_s=RATE)) is None
+
+
+@pytest.mark.parametrize(("share", "denied"), [(0.5, False), (1.0, True)])
+def test_a_glow_that_fades_slowly_grows_all_over_the_sensor(share: float, denied: bool) -> None:
+    """At its far end by a third of its mean, half of a dark current, within the error there."""
+    fading = np.exp(-(63 - np.arange(64)[:, np.newaxis]) / (0.6 * 64)) * np.ones(96)
+    growth = RATE * TIME_S * (1 - share + share * fading / fading.mean())
+    said = uneven(_state(growth, noise=3.0), DARK_CURRENT)
+    assert (said is not None) is denied
+    if said is not None:
+        assert "may as well be a glow" in said.why
 
 
 def test_noise_of_whole_rows_is_no_glow() -> None:

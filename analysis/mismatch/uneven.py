@@ -1,5 +1,6 @@
 """Dark current that parts of a sensor do not have: something else grows with exposure time."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from math import log
@@ -26,8 +27,10 @@ _AROUND, _FAR_OUT = 3, 5.0  # pixels; standard deviations
 _PARTS = 4  # along each side
 _LEAST_SHARE = 0.5  # of a dark current, that every part of the sensor must show
 _SURE = 3.0  # standard errors: the least of sixteen
+_SHARES = tuple(np.linspace(0, 0.95, 20).tolist())  # of what grows, that a glow may have
 _POWERS = (0.5, 0.75, 1.0, 1.5, 2.0, 3.0)
 _LENGTHS = (0.005, 0.01, 0.02, *EXTENTS)
+_FINER = tuple(np.geomspace(min(EXTENTS), max(EXTENTS), 3 * len(EXTENTS) - 2).tolist())
 _TAIL = 1 / 3  # of a glow's height, that it may have where it is least
 _SEEN = 3.5  # of a surface: chance has that among the map's few numbers in 1 % of recordings
 _SMOOTH = "fixed_smooth"
@@ -39,11 +42,12 @@ def uneven(state: State, effect: Effect | None) -> Denial | None:
     The map of what grows with time has a mean of zero: how much of the mean that grows is a smooth
     surface's - a glow's, say - it does not tell. Where such a surface is left unexplained, the part
     of the sensor that grows least must grow for sure, by half of a dark current; else all may be
-    the surface's. Where none is certain by itself, a glow of the same mean must be denied by the
-    map, at odds of 20. Beside a glow or hot pixels that are named nothing is said, for the map has
-    their mean too - but that a glow may fall off more slowly than exponentially: as 1 / r it has a
-    third of its height left at twice its length, all over the sensor. In any case most pixels must
-    grow: see `_of_few`.
+    the surface's, and a glow of the same mean must be denied beside one that has a share of it: at
+    the far end of one that fades slowly all may grow by a third of its mean. Where no part is
+    certain by itself, a glow of the same mean must be denied by the map, at odds of 20. Beside a
+    glow or hot pixels that are named nothing is said, for the map has their mean too - but that a
+    glow may fall off more slowly than exponentially: as 1 / r it has a third of its height left at
+    twice its length, all over the sensor. In any case most pixels must grow: see `_of_few`.
     """
     if not isinstance(effect, DarkCurrent) or not effect.dn_per_s:
         return None
@@ -73,7 +77,7 @@ def _of_parts(state: State, effect: DarkCurrent) -> Denial | None:
     share = float(np.mean(shares, axis=0).min())
     error = float(np.sqrt(np.mean(np.square(errors)) / len(errors)))
     if share - _SURE * error > 0 and share + _SURE * error >= _LEAST_SHARE:
-        return None
+        return _glowing(state, effect, _SHARES, _FINER)
     least = f"{max(share, 0):.0%} +- {error:.0%}"
     return Denial(share, f"a part of the sensor grows with exposure time by {least} of it")
 
@@ -161,7 +165,12 @@ def _behind_powers(state: State, effect: DarkCurrent, glow: AmpGlow) -> float:
     return max(along - square / 2 for square, along in slower) - own
 
 
-def _glowing(state: State, effect: DarkCurrent) -> Denial | None:
+def _glowing(
+    state: State,
+    effect: DarkCurrent,
+    shares: Sequence[float] = (0.0,),
+    extents: Sequence[float] = EXTENTS,
+) -> Denial | None:
     """Return how a dark current is denied by a glow of the same mean; None: the map denies one.
 
     Of a glow of shape g and mean m the map is m (g / mean(g) - 1) and noise: m is known as well as
@@ -169,9 +178,11 @@ def _glowing(state: State, effect: DarkCurrent) -> Denial | None:
     it is over all places and extents that a glow is looked for in, each as likely. Noise is that of
     the map's pixels where they scatter more than frames alone make them, and of its rows and
     columns where these do: noise of whole lines is not averaged along them. Where all frames will
-    be asked, only a glow that is likelier denies.
+    be asked, only a glow that is likelier denies. It is held against glows that have `shares` of
+    the mean beside a dark current that has the rest, each as likely: 0, none.
     """
     layout, ratios = state.setting.layout, []
+    beside: list[float] = []
     images = {c: own for (c, name), own in state.setting.seen.images.items() if name == "time"}
     alike = min(len(images), 2)  # channels that share a line, and its noise
     maps = {c: _Map.of(*own, alike) for c, own in images.items()}
@@ -181,7 +192,7 @@ def _glowing(state: State, effect: DarkCurrent) -> Denial | None:
         own.image.size * (effect.dn_per_s * layout.regressors(c).scales["time"]) ** 2 / own.mean_dn2
         for c, own in maps.items()
     )
-    for place, extent in product(PLACES, EXTENTS):
+    for place, extent in product(PLACES, extents):
         square = along = 0.0
         for channel, own in maps.items():
             glow = glowing(own.image.shape, place, extent)
@@ -190,7 +201,8 @@ def _glowing(state: State, effect: DarkCurrent) -> Denial | None:
             square += of_shape
             along += of_both
         ratios.append(_ratio(square, along, pixels))
-    behind = float(logsumexp(ratios)) - log(len(ratios))
+        beside += [_ratio(own**2 * square, own * along, pixels) for own in shares]
+    behind = float(logsumexp(ratios) - logsumexp(beside)) + log(len(shares))
     if state.setting.asked_again and behind <= 0:
         return None
     return rival(behind, "of the sensor what grows with exposure time may as well be a glow")

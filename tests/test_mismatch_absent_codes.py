@@ -69,6 +69,7 @@ def test_absent_codes_stay_unexplained(converted: Callable[[Array], Array]) -> N
     assert any("adc_dnl: codes between others never occur" in one for one in found.remarks)
 
 
+@pytest.mark.long
 def test_widths_that_scatter_are_named_absent_codes_among_them() -> None:
     """Of a normal law a code in twenty has no width where they scatter by 0.6."""
     recording = coded(scattered(0.6))

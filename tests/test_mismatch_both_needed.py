@@ -35,7 +35,10 @@ def _recorded(crosstalk: float, filtering: float, seed: int) -> InMemory:
     return recording
 
 
-@pytest.mark.parametrize(("crosstalk", "filtering"), [(0.042, 0.017), (0.028, 0.0), (0.0, 0.028)])
+@pytest.mark.parametrize(
+    ("crosstalk", "filtering"),
+    [pytest.param(0.042, 0.017, marks=pytest.mark.long), (0.028, 0.0), (0.0, 0.028)],
+)
 def test_both_are_named_with_their_numbers_and_one_alone_where_there_is_one(
     crosstalk: float, filtering: float
 ) -> None:

@@ -237,6 +237,7 @@ def test_in_a_mosaic_it_is_named_with_its_numbers(tmp_path: Path) -> None:
     assert own.heldout_gain.ci95[0] > 0
 
 
+@pytest.mark.long
 def test_beside_memory_of_the_noise_a_residue_is_told_by_what_follows_codes() -> None:
     """What both make alike is left, for a filter may as well: neither of these is claimed."""
     residue = effect("adc_memory", period_codes=64, at_code=39.0, step_dn=1.5, along="rows")

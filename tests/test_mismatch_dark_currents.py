@@ -93,6 +93,7 @@ def test_hot_pixels_beside_a_spread_are_both_found(beside_hot: Finding) -> None:
     assert not beside_hot.unexplained
 
 
+@pytest.mark.long
 def test_hot_pixels_that_are_taken_in_first_give_back_what_a_spread_explains() -> None:
     """Measured alone they are half as many again, and less hot: warm ones of the spread are none.
 
@@ -111,6 +112,7 @@ def test_hot_pixels_that_are_taken_in_first_give_back_what_a_spread_explains() -
     assert not found.unexplained
 
 
+@pytest.mark.long
 def test_equal_dark_currents_have_no_spread() -> None:
     """Hot pixels beside them are hot pixels, and the dark current has one number."""
     found = numbers(find_mismatch(camera(), recording(0.0, 0.004), vocabulary=WORDS))
@@ -156,6 +158,7 @@ def test_a_users_other_mean_is_a_wrong_number_and_the_spread_about_it_is_right()
     assert not found.unexplained
 
 
+@pytest.mark.long
 def test_dark_currents_far_apart_have_a_median_far_below_their_mean() -> None:
     """Most pixels grow by a quarter of the mean, and that is as the law has it."""
     found = numbers(find_mismatch(camera(), recording(1.6, 0.0), vocabulary=WORDS))

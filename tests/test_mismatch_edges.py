@@ -234,6 +234,7 @@ def test_two_edges_are_two_effects_and_offset_and_gain_have_lengths_of_their_own
             assert abs(fitted.value - value) < 4 * fitted.standard_error  # type: ignore[operator] # one number
 
 
+@pytest.mark.long
 def test_without_its_word_nothing_else_is_named() -> None:
     one = effect("line_settling", gain_percent=1.4, length_pixels=5.0)
     words = frozenset({"column_prnu", "column_fpn", "shading", "amp_glow", "tap_mismatch"})

@@ -42,6 +42,7 @@ def test_charge_that_colours_exchange_is_named_before_any_covariance_shows(tmp_p
     assert not found.unexplained
 
 
+@pytest.mark.long
 def test_charge_shared_along_columns_makes_the_greens_differ(tmp_path: Path) -> None:
     """Correlations of neighbours tell charge that is shared from light that is not."""
     case = draw_case(4, "small", Choice(cfa="GRBG", segments=1, light=True, times="darks"))

@@ -48,6 +48,7 @@ def test_greens_that_differ_are_no_amplifiers_where_they_have_no_word(tmp_path: 
     assert "channel_ratio" in {one.statistic for one in found.unexplained}
 
 
+@pytest.mark.long
 def test_amplifiers_whose_noise_tells_them_are_no_greens_that_differ(tmp_path: Path) -> None:
     """Gains that differ by a sixth scale the noise with the signal: light does not."""
     taps = Planted("tap_mismatch", {"gain_percent": 17.0, "regions": "even_odd_rows"})

@@ -144,6 +144,7 @@ def of_bands() -> State:
     return State.of(setting, model, lambda: None)
 
 
+@pytest.mark.long
 def test_a_model_s_own_recordings_do_not_differ(of_bands: State) -> None:
     """With bands of rows: by 16 simulations, and by 64 then, in 2 % of them at most."""
     made = of_bands.replicates.vectors

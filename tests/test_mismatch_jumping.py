@@ -117,7 +117,7 @@ def test_a_pixel_that_one_exposure_shows_stands_for_itself() -> None:
 WEAK = {"pixel_fraction": 0.004, "amplitude_dn": 7.0, "switch_probability": 0.4}
 
 
-@pytest.mark.parametrize("known", [True, False])
+@pytest.mark.parametrize("known", [pytest.param(True, marks=pytest.mark.long), False])
 def test_few_weak_jumps_are_named_or_located(known: bool) -> None:
     recording = recorded(camera(RTS(**WEAK)), 0, levels=(250.0, 900.0))
     words = VOCABULARY if known else VOCABULARY - {"rts"}

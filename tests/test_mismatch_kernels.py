@@ -69,6 +69,7 @@ def test_smoothing_along_rows_and_memory_are_told_apart_by_no_slope() -> None:
     assert any(m.statistic == "correlation_0_1" for m in found.unexplained)
 
 
+@pytest.mark.long
 def test_smoothing_along_both_axes_is_named() -> None:
     """No memory of a sample before, along one line, makes neighbours along both alike."""
     true = camera(effect("spatial_filtering", fraction=0.028))

@@ -100,6 +100,7 @@ def test_it_is_located_where_no_bin_of_a_spectrum_is() -> None:
     assert np.mean([few - other for few, other in scores]) > 1
 
 
+@pytest.mark.long
 def test_a_weak_pattern_of_eight_pixels_is_named_with_its_size() -> None:
     found = find_mismatch(
         camera(), recorded(_striped(0.21), 12, rows=97, levels=TWO_LEVELS), seed=1

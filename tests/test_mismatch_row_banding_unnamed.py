@@ -24,6 +24,7 @@ def test_it_takes_no_place_of_what_has_no_word(kind: str) -> None:
     assert found.unexplained
 
 
+@pytest.mark.long
 def test_without_its_word_its_correlation_stays_unexplained() -> None:
     true = camera(effect("row_banding", sigma_dn=1.3, length_rows=3.0))
     found = diagnosed(true, camera(), 9, ROWS - {"row_banding"} | {"crosstalk"})

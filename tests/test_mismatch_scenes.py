@@ -121,6 +121,7 @@ def test_where_between_two_flats_a_segment_begins_is_not_asked_of_a_scene(
     assert curve.x.size > len(LEVELS)
 
 
+@pytest.mark.long
 def test_row_noise_is_located_in_scenes_too(tmp_path: Path) -> None:
     def rows(rng: np.random.Generator, name: str, light: Array) -> Array:
         return white(rng, name, light) + 4.0 * rng.normal(size=(ROWS, 1))

@@ -31,7 +31,9 @@ def test_products_of_pairs_tell_noisy_pixels_from_tails() -> None:
     assert abs(_persistence("heavy_tailed_read_noise")) < 4
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(
+    "kind", [pytest.param(own, marks=[pytest.mark.long] * (own == "rts")) for own in KINDS]
+)
 def test_noise_of_single_pixels_is_named(kind: str) -> None:
     true = camera(registry()[kind](**KINDS[kind]))
     finding = find_mismatch(camera(), recorded(true, 6, frames=2, levels=LEVELS))

@@ -95,6 +95,7 @@ def test_errors_are_those_of_their_own_exposure(
         assert (ratio > 0.5).all()
 
 
+@pytest.mark.long
 def test_a_current_is_named_beside_light_that_flickers() -> None:
     """A level of 0.3 DN in the dark, beside flats that move by 26 DN from frame to frame."""
     flicker, current = (registry()[kind] for kind in ("flicker", "dark_current"))

@@ -50,7 +50,6 @@ def test_hot_pixels_whose_heights_are_lognormal_are_hot_pixels() -> None:
     assert _found(_warmed(recording, rate, rng), camera()) == {"hot_pixels"}
 
 
-@pytest.mark.long
 def test_a_kink_is_seen_beside_one_flat_below_it() -> None:
     """Five flats above lie on a line that meets that of the one below, and black, at the switch."""
     paths = ((0.5, 20.0, 150.0), (0.5, 60.0, None))

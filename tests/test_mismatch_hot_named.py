@@ -18,7 +18,6 @@ pytestmark = pytest.mark.usefixtures("unproven")
 WORDS = frozenset({"hot_pixels", "dsnu", "dark_current", "rts", "amp_glow", "impulse", "prnu"})
 
 
-@pytest.mark.long
 def test_a_handful_of_warm_pixels_is_named(tmp_path: Path) -> None:
     choice = Choice(cfa="GRBG", segments=1, light=True, times="darks")
     case = draw_case(4, "small", choice)

@@ -23,7 +23,6 @@ def _found(levels: tuple[float, ...], *beside: Effect) -> Finding:
     return find_mismatch(camera(), recording, seed=1, vocabulary=WORDS)
 
 
-@pytest.mark.long
 def test_a_strong_bend_is_fitted_until_no_level_departs() -> None:
     found = _found(FEW_LEVELS)
     (named,) = found.omitted_physics

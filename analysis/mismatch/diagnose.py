@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.apart import wrong_spread
+from analysis.mismatch.beside import fitted_beside
 from analysis.mismatch.candidates import CANDIDATES
 from analysis.mismatch.confirmed import proven, undenied_by_all, undenied_by_many
 from analysis.mismatch.description import remarks_on_description
@@ -311,7 +312,8 @@ def _finding(
     proof: Proof,
 ) -> Finding:
     """Return the finding."""
-    errors = parameter_errors(camera, final.calibrated, final.setting.layout, final.replicates.fits)
+    fits = final.replicates.fits, fitted_beside(final, search.named)
+    errors = parameter_errors(camera, final.calibrated, final.setting.layout, *fits)
     errors += wrong_sizes(search.own) + wrong_spread(search.unlike, final.camera)
     missing = [named for named in search.named if named.name not in search.changes]
     own = changes(base, final, missing, partial(search.without, final))

@@ -16,13 +16,18 @@ P_PARAMETERS = 0.004  # chance that numbers without error are called wrong
 
 
 def parameter_errors(
-    camera: Camera, calibrated: Calibrated, layout: Layout, simulated: Sequence[BaseFit]
+    camera: Camera,
+    calibrated: Calibrated,
+    layout: Layout,
+    simulated: Sequence[BaseFit],
+    beside: Sequence[BaseFit] = (),
 ) -> tuple[ParameterError, ...]:
     """Return the numbers of the camera model that the recording contradicts.
 
     Judged together (chi-squared over all numbers, at `P_PARAMETERS`) and one by one (Bonferroni).
     The errors are those of the fit; larger ones where fits of simulated recordings scatter more,
-    as row noise, drift and fixed patterns make them.
+    as row noise, drift and fixed patterns make them; and with those that sizes of effects have
+    which numbers go with, as `beside` says: the fits beside each of these off by its error.
     """
     fit = calibrated.fit
     rows: list[tuple[str, float, float, float]] = []
@@ -31,13 +36,16 @@ def parameter_errors(
     for number, (piece, segment) in enumerate(zip(fit.pieces, camera.noise.segment, strict=False)):
         at = f"noise.segment[{number}]" if many else "noise"
         others = [one.pieces[number] for one in simulated]
+        off = [one.pieces[number] for one in beside if number < len(one.pieces)]
         if isfinite(piece.slope_error):
             error = _wider(piece.slope_error, [p.slope for p in others])
+            error = _with(error, [p.slope - piece.slope for p in off])
             rows.append(
                 (f"{at}.slope", segment.slope, piece.slope, hypot(error, segment.slope_se or 0.0))
             )
         if isfinite(piece.intercept_error):
             error = _wider(piece.intercept_error, [p.intercept for p in others])
+            error = _with(error, [p.intercept - piece.intercept for p in off])
             error = hypot(error, segment.intercept_se or 0.0)
             rows.append((f"{at}.intercept", segment.intercept, piece.intercept, error))
     errors = [e for e in fit.black_error_dn.values() if isfinite(e)]
@@ -45,12 +53,18 @@ def parameter_errors(
         recorded = layout.black_dn + _mean_black(fit)
         error = sqrt(sum(e**2 for e in errors)) / len(errors)
         error = _wider(error, [_mean_black(one) for one in simulated])
+        error = _with(error, [_mean_black(one) - _mean_black(fit) for one in beside])
         rows.append(("black_level", camera.black_level, recorded, error))
     return _contradicted(rows, camera, calibrated)
 
 
 def _mean_black(fit: BaseFit) -> float:
     return float(np.mean(list(fit.black_dn.values())))
+
+
+def _with(error: float, off: Sequence[float]) -> float:
+    """Return an error with what numbers are off by beside effects that are off by theirs."""
+    return hypot(error, *(one for one in off if isfinite(one)))
 
 
 def _wider(error: float, values: Sequence[float]) -> float:

@@ -297,6 +297,7 @@ RESPONSES = [
     effect("dual_gain_mismatch", gain_error_percent=4.0),
     effect("tap_mismatch", gain_percent=2.0, regions="left_right"),
     effect("crosstalk", fraction=0.03),
+    effect("brighter_fatter", per_dn=5e-6),
 ]
 
 

@@ -1,6 +1,7 @@
 """How far the base model's numbers go with what is known of effects that are named beside them."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from math import isfinite
 
@@ -12,37 +13,64 @@ from analysis.mismatch.named import Named
 from analysis.mismatch.state import State
 from dsis.camera import Camera
 
+_STEP = 0.2  # of a size: what base numbers do is straight so far
+_SIDES = (1, -1)
 
-def fitted_beside(state: State, some: Sequence[Named]) -> list[BaseFit]:
-    """Return the base numbers beside each size of named effects that is one standard error off.
+
+@dataclass(frozen=True)
+class Beside:
+    """Base numbers beside an effect as it is, and beside one of another size.
+
+    Attributes
+    ----------
+    before, after
+        The fits.
+    errors
+        How many steps, from one to the other, the size's standard error is.
+    """
+
+    before: BaseFit
+    after: BaseFit
+    errors: float
+
+
+def fitted_beside(state: State, some: Sequence[Named]) -> list[Beside]:
+    """Return how base numbers go with each size of named effects that has an error.
 
     Numbers are fitted beside effects as they were fitted. Of two that go together the error of one
-    has a part that is the other's: what it moves by with the other, times its error.
+    has a part that is the other's: what it moves by with the other, times its error. A step is an
+    error, or a fifth of the size where that is less.
     """
-    cameras = [camera for own in some for camera in _off(state.camera, own)]
-    return side_by_side(partial(_fitted, state), cameras, state.setting.jobs)
+    off = [one for own in some for one in _off(state.camera, own)]
+    if not off:
+        return []
+    cameras = [state.camera, *(camera for camera, _ in off)]
+    # Each begins where the state's fit ended, which another round may still move.
+    before, *after = side_by_side(partial(_fitted, state), cameras, state.setting.jobs)
+    return [Beside(before, fit, steps) for fit, (_, steps) in zip(after, off, strict=True)]
 
 
 def _fitted(state: State, camera: Camera) -> BaseFit:
     return state.setting.calibrated(camera, state.calibrated).fit
 
 
-def _off(camera: Camera, named: Named) -> Iterator[Camera]:
-    """Yield cameras with one size of an effect off by its error: above, or else below."""
+def _off(camera: Camera, named: Named) -> Iterator[tuple[Camera, float]]:
+    """Yield cameras with one size of an effect off by a step, and how many its error is."""
     effect = named.effect
     if effect is None or effect not in camera.effect or named.proposal is None:
         return
     place = camera.effect.index(effect)
-    values = effect.model_dump()
-    for name, error in {**named.proposal.errors, **named.errors}.items():
-        value = values.get(name)
+    errors: Mapping[str, float] = {**named.proposal.errors, **named.errors}
+    for name, error in errors.items():
+        value = getattr(effect, name, None)
         if not isinstance(value, float) or not error > 0 or not isfinite(error):
             continue
-        for off in (value + error, value - error):
+        step = min(error, _STEP * abs(value) or error)
+        for side in _SIDES:
             try:
-                other = type(effect)(**{**values, name: off})
+                other = type(effect)(**{**effect.model_dump(), name: value + side * step})
             except ValidationError:
                 continue
             effects = (*camera.effect[:place], other, *camera.effect[place + 1 :])
-            yield camera.model_copy(update={"effect": effects})
+            yield camera.model_copy(update={"effect": effects}), error / step
             break

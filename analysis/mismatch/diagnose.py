@@ -312,8 +312,10 @@ def _finding(
     proof: Proof,
 ) -> Finding:
     """Return the finding."""
-    fits = final.replicates.fits, fitted_beside(final, search.named)
-    errors = parameter_errors(camera, final.calibrated, final.setting.layout, *fits)
+    fits = camera, final.calibrated, final.setting.layout, final.replicates.fits
+    errors = parameter_errors(*fits)
+    if errors and search.named:
+        errors = parameter_errors(*fits, fitted_beside(final, search.named))
     errors += wrong_sizes(search.own) + wrong_spread(search.unlike, final.camera)
     missing = [named for named in search.named if named.name not in search.changes]
     own = changes(base, final, missing, partial(search.without, final))

@@ -23,7 +23,8 @@ Array = NDArray[np.float64]
 _LEAST = 3  # frames of an exposure
 _PERSISTENCES = np.linspace(0.0, 0.98, 50)
 _WIDEST, _SIZES = 30.0, 121  # of the scatter that is seen, times and over; sizes tried
-_COARSE = 40  # of two at once
+_COARSE, _FINE = 60, 400  # of two at once; of one
+_SMALL = 0.01  # of the least, that is as good as none
 _INTERVAL = 1.92  # of log-likelihood: half of chi-squared at 95 %
 _NORMAL = 1.96
 
@@ -87,8 +88,9 @@ class FrameMeans:
             return None
         new = [own.moving.mean() / own.moving.size for own in (rows, columns)]
         pixels = rows.noise_dn2 / rows.moving.size  # which both have
-        means = rows.parts.mean(1)
-        return cls(np.array(numbers, float), means, float(sum(new) - pixels + light_dn**2))
+        means, new_dn2 = rows.parts.mean(1), float(sum(new) - pixels + light_dn**2)
+        # Frames without noise tell no law by which their means scatter.
+        return cls(np.array(numbers, float), means, new_dn2) if new_dn2 > 0 else None
 
 
 def means_of(
@@ -161,12 +163,18 @@ def growing(exposures: Sequence[FrameMeans], weights: Array) -> tuple[float, flo
     And by how much they are likelier to do both than that. `weights` are of the exposures, (n,), 0
     or more, the largest above 0. Each at its likeliest sizes and persistence.
     """
-    sizes = np.concatenate([[0.0], _sizes(exposures)[:: _SIZES // _COARSE]])
+    least = _sizes(exposures)
+    if not least[-1] > 0:
+        return 0.0, 0.0
+    sizes = np.concatenate([[0.0], least[:: _SIZES // _COARSE]])
     shares = np.asarray(weights, float) / np.max(weights)
     one, other = (grid.ravel() for grid in np.meshgrid(sizes, sizes))
+    # Likelihoods change smoothly with the size: between those of many sizes they are interpolated.
+    known = np.concatenate([[0.0], np.geomspace(_SMALL * least[0], 2 * least[-1], _FINE)])
     likely = np.zeros((_PERSISTENCES.size, one.size))
     for own, share in zip(exposures, shares, strict=True):
-        likely += _loglik(own, np.hypot(one, share * other))
+        at = np.hypot(one, share * other)
+        likely += np.stack([np.interp(at, known, row) for row in _loglik(own, known)])
     alike, grown = (float(likely[:, size == 0].max()) for size in (other, one))
     return grown - alike, float(likely.max()) - grown
 

@@ -85,14 +85,24 @@ def mean_frame(
 
     What is drawn at random has no expected shape, and codes hide small ones. Light is steady.
     """
-    image = light
+    image = arriving = light
     for own in sorted(effects, key=lambda one: (one.stage, one.rank, one.kind)):
         if not _moves(own):
             continue
         alike = partial(_alike, image)
-        exposure = Exposure(grid, 0, Draw(0), Draw(0), light, read_out, alike, time_s)
+        exposure = Exposure(
+            *(grid, 0, Draw(0), Draw(0), light, read_out, alike, time_s),
+            arriving=partial(_itself, arriving),
+        )
         image = own.apply(image, exposure)
-        light = image if own.stage is Stage.LIGHT else light
+        if own.stage is Stage.LIGHT:
+            light = arriving = image
+        elif own.responds:
+            arriving = own.apply(arriving, exposure)
+    return image
+
+
+def _itself(image: Image) -> Image:
     return image
 
 

@@ -1,18 +1,35 @@
 """Which of the camera model's numbers the recording contradicts."""
 
-from collections.abc import Sequence
-from math import hypot, isfinite, sqrt
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from math import hypot, isfinite, nan, sqrt
 
 import numpy as np
 import scipy.stats
 
 from analysis.mismatch.basefit import BaseFit
+from analysis.mismatch.beside import Beside
 from analysis.mismatch.finding import ParameterError
 from analysis.mismatch.layout import Layout
 from analysis.mismatch.recalibrate import Calibrated
 from dsis.camera import Camera
 
+Errors = tuple[float, float]
+"""Of the fit, and of the user's number."""
+
 P_PARAMETERS = 0.004  # chance that numbers without error are called wrong
+
+
+@dataclass(frozen=True)
+class _Row:
+    """A number: the user's, as recorded, its own error, and what it moves by with each effect's."""
+
+    name: str
+    own: float
+    recorded: float
+    error: float
+    moves: tuple[float, ...]
 
 
 def parameter_errors(
@@ -20,51 +37,52 @@ def parameter_errors(
     calibrated: Calibrated,
     layout: Layout,
     simulated: Sequence[BaseFit],
-    beside: Sequence[BaseFit] = (),
+    beside: Sequence[Beside] = (),
 ) -> tuple[ParameterError, ...]:
     """Return the numbers of the camera model that the recording contradicts.
 
     Judged together (chi-squared over all numbers, at `P_PARAMETERS`) and one by one (Bonferroni).
     The errors are those of the fit; larger ones where fits of simulated recordings scatter more,
-    as row noise, drift and fixed patterns make them; and with those that sizes of effects have
-    which numbers go with, as `beside` says: the fits beside each of these off by its error.
+    as row noise, drift and fixed patterns make them; and with those of sizes of effects that
+    numbers go with, as `beside` says, all of them together with each.
     """
     fit = calibrated.fit
-    rows: list[tuple[str, float, float, float]] = []
+    rows: list[_Row] = []
     many = len(fit.pieces) > 1
+
+    def row(name: str, own: float, of: Callable[[BaseFit], float], errors: Errors) -> None:
+        error = _wider(errors[0], [of(one) for one in simulated])
+        moves = [one.errors * (of(one.after) - of(one.before)) for one in beside]
+        known = tuple(one if isfinite(one) else 0.0 for one in moves)
+        rows.append(_Row(name, own, of(fit), hypot(error, errors[1]), known))
+
     # A segment that the camera model does not have is physics, no wrong number.
     for number, (piece, segment) in enumerate(zip(fit.pieces, camera.noise.segment, strict=False)):
         at = f"noise.segment[{number}]" if many else "noise"
-        others = [one.pieces[number] for one in simulated]
-        off = [one.pieces[number] for one in beside if number < len(one.pieces)]
         if isfinite(piece.slope_error):
-            error = _wider(piece.slope_error, [p.slope for p in others])
-            error = _with(error, [p.slope - piece.slope for p in off])
-            rows.append(
-                (f"{at}.slope", segment.slope, piece.slope, hypot(error, segment.slope_se or 0.0))
-            )
+            errors = piece.slope_error, segment.slope_se or 0.0
+            row(f"{at}.slope", segment.slope, partial(_slope, number), errors)
         if isfinite(piece.intercept_error):
-            error = _wider(piece.intercept_error, [p.intercept for p in others])
-            error = _with(error, [p.intercept - piece.intercept for p in off])
-            error = hypot(error, segment.intercept_se or 0.0)
-            rows.append((f"{at}.intercept", segment.intercept, piece.intercept, error))
-    errors = [e for e in fit.black_error_dn.values() if isfinite(e)]
-    if errors:
-        recorded = layout.black_dn + _mean_black(fit)
-        error = sqrt(sum(e**2 for e in errors)) / len(errors)
-        error = _wider(error, [_mean_black(one) for one in simulated])
-        error = _with(error, [_mean_black(one) - _mean_black(fit) for one in beside])
-        rows.append(("black_level", camera.black_level, recorded, error))
+            errors = piece.intercept_error, segment.intercept_se or 0.0
+            row(f"{at}.intercept", segment.intercept, partial(_intercept, number), errors)
+    black = [e for e in fit.black_error_dn.values() if isfinite(e)]
+    if black:
+        error = sqrt(sum(e**2 for e in black)) / len(black)
+        offset = layout.black_dn
+        row("black_level", camera.black_level, lambda one: offset + _mean_black(one), (error, 0.0))
     return _contradicted(rows, camera, calibrated)
+
+
+def _slope(number: int, fit: BaseFit) -> float:
+    return fit.pieces[number].slope if number < len(fit.pieces) else nan
+
+
+def _intercept(number: int, fit: BaseFit) -> float:
+    return fit.pieces[number].intercept if number < len(fit.pieces) else nan
 
 
 def _mean_black(fit: BaseFit) -> float:
     return float(np.mean(list(fit.black_dn.values())))
-
-
-def _with(error: float, off: Sequence[float]) -> float:
-    """Return an error with what numbers are off by beside effects that are off by theirs."""
-    return hypot(error, *(one for one in off if isfinite(one)))
 
 
 def _wider(error: float, values: Sequence[float]) -> float:
@@ -77,19 +95,24 @@ def _wider(error: float, values: Sequence[float]) -> float:
 
 
 def _contradicted(
-    rows: list[tuple[str, float, float, float]], camera: Camera, calibrated: Calibrated
+    rows: Sequence[_Row], camera: Camera, calibrated: Calibrated
 ) -> tuple[ParameterError, ...]:
     found = []
     if rows:
-        z = np.array([(recorded - own) / error for _, own, recorded, error in rows])
+        off = np.array([one.recorded - one.own for one in rows])
+        moves = np.array([one.moves for one in rows]).reshape(len(rows), -1)
+        covariance = np.diag([one.error**2 for one in rows]) + moves @ moves.T
+        errors = np.sqrt(np.diag(covariance))
+        z = off / errors
         single = float(scipy.stats.norm.isf(P_PARAMETERS / 4 / len(rows)))
-        joint = float(scipy.stats.chi2.sf((z**2).sum(), len(rows)))
+        square = float(off @ np.linalg.solve(covariance, off))
+        joint = float(scipy.stats.chi2.sf(square, len(rows)))
         least = single
         if joint < P_PARAMETERS / 2:
             least = min(single, max(2.0, float(np.abs(z).max())))
         found = [
-            ParameterError(name, own, recorded, error)
-            for (name, own, recorded, error), departure in zip(rows, z, strict=True)
+            ParameterError(one.name, one.own, one.recorded, float(error))
+            for one, error, departure in zip(rows, errors, z, strict=True)
             if abs(departure) >= least
         ]
     stated = [s.upper_dn for s in camera.noise.segment if s.upper_dn is not None]

@@ -194,7 +194,8 @@ def _misfit(slopes: Array, sd: Array, left: Array, drawn: Array) -> Array:
     whole = np.maximum(told.sum(0), 1e-300)
     (birge,), alike = ((own / sd) ** 2 @ told / whole for own in (left, drawn))
     numbers = whole**2 / np.maximum((told**2).sum(0), 1e-300)
-    numbers = np.minimum(numbers, 2 / np.maximum(alike.var(0, ddof=1), 1e-300))
+    scatter = alike.var(0, ddof=1) if len(alike) > 1 else np.zeros(alike.shape[1])
+    numbers = np.maximum(np.minimum(numbers, 2 / np.maximum(scatter, 1e-300)), 1.0)
     chance = scipy.stats.chi2.ppf(_BY_CHANCE, numbers) / numbers
     return np.sqrt(np.where(birge > chance, birge, 1.0))
 

@@ -30,7 +30,10 @@ _SURE = 3.0  # standard errors: the least of sixteen
 _SHARES = tuple(np.linspace(0, 0.95, 20).tolist())  # of what grows, that a glow may have
 _POWERS = (0.5, 0.75, 1.0, 1.5, 2.0, 3.0)
 _LENGTHS = (0.005, 0.01, 0.02, *EXTENTS)
-_FINER = tuple(np.geomspace(min(EXTENTS), max(EXTENTS), 3 * len(EXTENTS) - 2).tolist())
+_FINER = tuple(np.geomspace(0.05, 1.0, 20).tolist())
+_FALLS = (0.0, 1.0, 2.0)  # exponentially, and by powers
+_TWICE = 2
+_SIDE = 64  # of a map, that tells a smooth surface
 _TAIL = 1 / 3  # of a glow's height, that it may have where it is least
 _SEEN = 3.5  # of a surface: chance has that among the map's few numbers in 1 % of recordings
 _SMOOTH = "fixed_smooth"
@@ -42,12 +45,13 @@ def uneven(state: State, effect: Effect | None) -> Denial | None:
     The map of what grows with time has a mean of zero: how much of the mean that grows is a smooth
     surface's - a glow's, say - it does not tell. Where such a surface is left unexplained, the part
     of the sensor that grows least must grow for sure, by half of a dark current; else all may be
-    the surface's, and a glow of the same mean must be denied beside one that has a share of it: at
-    the far end of one that fades slowly all may grow by a third of its mean. Where no part is
-    certain by itself, a glow of the same mean must be denied by the map, at odds of 20. Beside a
-    glow or hot pixels that are named nothing is said, for the map has their mean too - but that a
-    glow may fall off more slowly than exponentially: as 1 / r it has a third of its height left at
-    twice its length, all over the sensor. In any case most pixels must grow: see `_of_few`.
+    the surface's, and a glow of the same mean, that somewhere has less than half of it, must be
+    denied beside those that have a share of it: at the far end of one that fades slowly all may
+    grow by a third. Where no part is certain by itself, a glow of the same mean must be denied by
+    the map, at odds of 20. Beside a glow or hot pixels that are named nothing is said, for the map
+    has their mean too - but that a glow may fall off more slowly than exponentially: as 1 / r it
+    has a third of its height left at twice its length, all over the sensor. In any case most pixels
+    must grow: see `_of_few`.
     """
     if not isinstance(effect, DarkCurrent) or not effect.dn_per_s:
         return None
@@ -77,7 +81,7 @@ def _of_parts(state: State, effect: DarkCurrent) -> Denial | None:
     share = float(np.mean(shares, axis=0).min())
     error = float(np.sqrt(np.mean(np.square(errors)) / len(errors)))
     if share - _SURE * error > 0 and share + _SURE * error >= _LEAST_SHARE:
-        return _glowing(state, effect, _SHARES, _FINER)
+        return _glowing(state, effect, _SHARES, _FINER, _FALLS)
     least = f"{max(share, 0):.0%} +- {error:.0%}"
     return Denial(share, f"a part of the sensor grows with exposure time by {least} of it")
 
@@ -170,6 +174,7 @@ def _glowing(
     effect: DarkCurrent,
     shares: Sequence[float] = (0.0,),
     extents: Sequence[float] = EXTENTS,
+    falls: Sequence[float] = (0.0,),
 ) -> Denial | None:
     """Return how a dark current is denied by a glow of the same mean; None: the map denies one.
 
@@ -185,24 +190,27 @@ def _glowing(
     beside: list[float] = []
     images = {c: own for (c, name), own in state.setting.seen.images.items() if name == "time"}
     alike = min(len(images), 2)  # channels that share a line, and its noise
-    maps = {c: _Map.of(*own, alike) for c, own in images.items()}
+    maps = {c: _Map.of(*own, alike).coarser() for c, own in images.items()}
     if not maps:
         return None
     pixels = sum(
         own.image.size * (effect.dn_per_s * layout.regressors(c).scales["time"]) ** 2 / own.mean_dn2
         for c, own in maps.items()
     )
-    for place, extent in product(PLACES, extents):
-        square = along = 0.0
+    for place, extent, fall in product(PLACES, extents, falls):
+        square = along = least = 0.0
         for channel, own in maps.items():
-            glow = glowing(own.image.shape, place, extent)
+            glow = glowing(own.image.shape, place, extent, fall)
             growth = effect.dn_per_s * layout.regressors(channel).scales["time"]
             of_shape, of_both = own.products(growth * (glow / glow.mean() - 1))
             square += of_shape
             along += of_both
-        ratios.append(_ratio(square, along, pixels))
+            least = max(least, float(glow.min() / glow.mean()))
+        # What grows everywhere by half of its mean is as good as a dark current beside a surface.
+        if least < _LEAST_SHARE or len(shares) == 1:
+            ratios.append(_ratio(square, along, pixels))
         beside += [_ratio(own**2 * square, own * along, pixels) for own in shares]
-    behind = float(logsumexp(ratios) - logsumexp(beside)) + log(len(shares))
+    behind = float(logsumexp(ratios) - logsumexp(beside)) + log(len(beside) / len(ratios))
     if state.setting.asked_again and behind <= 0:
         return None
     return rival(behind, "of the sensor what grows with exposure time may as well be a glow")
@@ -234,6 +242,16 @@ class _Map:
             seen = typical_square(beyond_smooth(drawn.mean(axis))) * image.shape[axis]
             lines.append(pixel + alike * max(seen - pixel, 0.0))
         return cls(drawn, pixel, *lines)
+
+    def coarser(self) -> "_Map":
+        """Return a map of means over squares of pixels, as fine as a smooth surface needs it."""
+        step = min(self.image.shape) // _SIDE
+        if step < _TWICE:
+            return self
+        rows, columns = (size // step for size in self.image.shape)
+        squares = self.image[: rows * step, : columns * step].reshape(rows, step, columns, step)
+        variances = (self.pixel_dn2, self.row_dn2, self.column_dn2)
+        return _Map(squares.mean((1, 3)), *(own / step**2 for own in variances))
 
     def of_smoother(self, image: Array) -> "_Map":
         """Return this with an image without pixels that stand out of those around them."""

@@ -28,6 +28,7 @@ class BrighterFatter(Effect):
     stage: ClassVar[Stage] = Stage.CHARGE
     rank: ClassVar[int] = -50
     draws: ClassVar[bool] = False
+    responds: ClassVar[bool] = True
     reference: ClassVar[str] = (
         "Antilogus et al., The brighter-fatter effect and pixel correlations in CCD sensors, JINST "
         "9, 2014; Astier et al., The shape of the photon transfer curve, A&A 629, 2019; Guyonnet "

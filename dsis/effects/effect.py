@@ -248,8 +248,6 @@ class Effect(Model, ABC):
     responds
         Whether behind the light it is a law of the signal alone, that makes of the expected signal
         what it makes of a frame's, on average: bends it, cuts it, scales it, shares it out.
-    asks_what_arrives
-        Whether it asks for the expected signal as it arrives: it hangs on what `responds` before.
     """
 
     kind: str
@@ -263,7 +261,6 @@ class Effect(Model, ABC):
     draws: ClassVar[bool] = True
     looks_back: ClassVar[bool] = False
     responds: ClassVar[bool] = False
-    asks_what_arrives: ClassVar[bool] = False
 
     @abstractmethod
     def apply(self, image: Image, exposure: Exposure) -> Image:
@@ -287,6 +284,11 @@ class Effect(Model, ABC):
     def drawn(self) -> bool:
         """Whether this one draws anything at random: as `draws` says, of its form."""
         return self.draws
+
+    @property
+    def asks_what_arrives(self) -> bool:
+        """Whether it asks for the expected signal as it arrives: it hangs on what responds."""
+        return False
 
     @property
     def exchanges(self) -> bool:

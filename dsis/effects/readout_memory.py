@@ -22,8 +22,9 @@ class ReadoutMemory(Effect):
     fraction takes noise away. Correlation f / (1 + f^2) at that lag and at no other; the first
     samples of a line have nothing to remember. S is what reaches the read-out of the expected
     signal, bent, shared out, cut and amplified as all of it is (nonlinearity, crosstalk,
-    saturation, gains of amplifiers). Offsets that are fixed are remembered like the noise; so is
-    what a limit that noise alone reaches takes from the mean.
+    brighter-fatter, saturation, gains of amplifiers). Offsets that are fixed are remembered like
+    the noise; so are what a limit that noise alone reaches takes from the mean, what lines have
+    that have not settled, and the trail that image lag leaves.
 
     Or, where it `remembers` the signal, of all of it: v'(i) = v(i) + f (v(i - lag) - v(i)), as of
     an amplifier that has not settled, or of charge that stays behind. A flat of one colour keeps
@@ -43,7 +44,6 @@ class ReadoutMemory(Effect):
     stage: ClassVar[Stage] = Stage.READ_OUT
     rank: ClassVar[int] = 50
     draws: ClassVar[bool] = False
-    asks_what_arrives: ClassVar[bool] = True
     reference: ClassVar[str] = (
         "White, Lampe, Blaha & Mack, Characterization of surface channel CCD image arrays at low "
         "light levels, IEEE J. Solid-State Circuits 9, 1974"
@@ -95,6 +95,11 @@ class ReadoutMemory(Effect):
             np.float32(self.fraction),
             (0, lag) if along_rows else (lag, 0),
         ).reshape(image.shape)
+
+    @property
+    def asks_what_arrives(self) -> bool:
+        """Whether it takes what is expected from samples: where it remembers their noise."""
+        return self.remembers == _NOISE
 
     @property
     def exchanges(self) -> bool:

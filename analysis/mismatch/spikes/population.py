@@ -14,7 +14,7 @@ from dsis.recording import Recording
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
-LOW = 5.0  # noises of the pixel, from which spikes are put aside where they are many
+LOW = 5.0  # noises of the pixel, from which spikes are put aside where strong ones are there
 SPIKE = 8.0  # noises of the pixel: what is taken for a spike where there are any
 STRONG = 30.0  # noises: no law of noise
 _ELECTRONS = 20.0  # of a strong spike: one electron of few may be far out of the noise
@@ -23,13 +23,14 @@ _LIT = 2.0  # times the variance of the darkest exposure: light tells what an el
 _LEAST = 3
 _BY_TAIL = 0.02  # chance that so many are strong
 _MOST = 5e-3  # of the samples
-_MANY = 1e-4  # of the samples: from there on lower ones matter
+_MANY = 1e-4  # of the samples: from there on none may be left
 _COMPLETE = 0.8  # of the spikes, where noise is least, that are strong
 _TAIL = 0.25  # as many would be of a tail that falls with the square of the distance, and more
 _FALLING = 2.0  # power of the distance with which a tail falls at least, if noise has a variance
 _MOSTLY = 0.5  # of the spikes that are strong, where distances of all say that they are no tail
 _BY_FALL = 1e-3  # chance that those of a tail are as large
 _NEGATIVE = 0.1  # of the spikes
+_NORMALLY = 0.99  # chance that normal noise has no more so low
 _RETURNING = 0.2  # pixels that come back, beside the spikes
 _BLINKING = 0.05  # of them, where they rise as high: others may do so once
 _TWICE = 1e-3  # chance that so many pixels are hit twice, or one so often
@@ -78,15 +79,14 @@ class Spikes:
 def spikes_of(recording: Recording, source: Source, camera: Camera) -> Spikes | None:
     """Return rare strong spikes; None: there are none that a law of noise could not make.
 
-    Of many, lower ones are told as well, or all are left where they are: where lines move by more
-    than pixels, no pixel tells them. A camera that has impulses already is asked nothing.
+    Lower ones are told as well, for few below the limit are tails of noise that nothing simulates.
+    Of many all are left where they are where lines move by more than pixels: no pixel tells the
+    lower ones. A camera that has impulses already is asked nothing.
     """
     if any(effect.kind == "impulse" for effect in camera.effect):
         return None
     found = _beyond(recording, source, camera, FAR)
-    if found is None or found.lowest > LOW:
-        return found
-    return _beyond(recording, source, camera, LOW) or found
+    return None if found is None else _beyond(recording, source, camera, LOW) or found
 
 
 def _beyond(recording: Recording, source: Source, camera: Camera, farthest: float) -> Spikes | None:
@@ -124,7 +124,8 @@ def _beyond(recording: Recording, source: Source, camera: Camera, farthest: floa
         return None
     spikes = hits.of(once & (hits.ratio > 0))
     spikes = spikes.of(np.argsort(-spikes.ratio, kind="stable"))
-    lower = _lower(hits.of(alone & ~once & (farthest <= LOW)), electron)
+    told = hits.of(alone & ~once & (farthest <= LOW))
+    lower = _lower(told, electron, count)
     white = recording.sensor.white_level
     quiet = {
         number: np.where(own.level_dn + SPIKE * own.noise_dn < white, own.noise_dn, np.inf)
@@ -133,18 +134,21 @@ def _beyond(recording: Recording, source: Source, camera: Camera, farthest: floa
     both = Hits.joined([spikes, hits.of(echo & ~again)])
     following = _echoes(both, recording)
     following[: spikes.frame.size] = False
-    lowest = LOW if many else SPIKE
+    left = farthest > LOW or lower.frame.size < (told.ratio > 0).sum()
+    lowest = SPIKE if left and not many else LOW
     return Spikes(spikes, both.of(following), lower, quiet, lowest)
 
 
-def _lower(hits: Hits, electron_dn: float) -> Hits:
-    """Return samples that spikes hit as well, though noise may be as far: lower ones of many.
+def _lower(hits: Hits, electron_dn: float, samples: int) -> Hits:
+    """Return samples that spikes hit as well, though noise may be as far: lower ones.
 
-    None of them, unless nearly all are on the side of spikes.
+    None of them, unless nearly all are on the side of spikes, but what normal noise of so many
+    samples has on the other.
     """
     up = (hits.ratio > 0) & (hits.height_dn > _FEW_ELECTRONS * electron_dn)
     down = hits.ratio < 0
-    return hits.of(up & (down.sum() <= _NEGATIVE * up.sum()))
+    by_chance = scipy.stats.poisson.ppf(_NORMALLY, samples * scipy.stats.norm.sf(LOW))
+    return hits.of(up & (down.sum() <= _NEGATIVE * up.sum() + by_chance))
 
 
 def _electron_dn(camera: Camera, uniform: dict[int, Looked]) -> float:

@@ -77,3 +77,18 @@ def test_lines_of_mean_frames_are_not_said_to_be_fixed() -> None:
     says = sentence(key.statistic, key, 50.7, Where(("flat-2",)))
     assert says.startswith("The mean frames differ from row to row, alike at all signals")
     assert says.endswith("(clearest in flat-2).")
+
+
+def test_a_sentence_holds_no_label_of_the_bank() -> None:
+    where = Where(exposures=("dark-0",))
+    said = {
+        detail: sentence(name, Key(name, "contrast", "", "", detail), 9.0, where)
+        for name, detail in (
+            ("line_correlation", "all rows 1"),
+            ("column_variance_spread", "all"),
+            ("variance_spread", "with the signal"),
+        )
+    }
+    assert "(all" not in " ".join(said.values())
+    assert "(1 pixel of one colour apart along rows)" in said["all rows 1"]
+    assert "(with the signal)" in said["with the signal"]

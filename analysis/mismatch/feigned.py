@@ -11,6 +11,7 @@ from analysis.mismatch.bank.sawtooth import PLACES, sawteeth
 from analysis.mismatch.bank.seams import SMOOTH_DEGREE, beyond_smooth, seam_shapes
 from analysis.mismatch.coloured import MAPS, coloured
 from analysis.mismatch.contradicted import Denial, rival
+from analysis.mismatch.darkstart import begins_darker
 from analysis.mismatch.displaced import displaced
 from analysis.mismatch.edged import STATISTIC, edged, single
 from analysis.mismatch.fading import fading
@@ -95,6 +96,7 @@ def of_another(state: State, effect: Effect, without: Array) -> Denial | None:
         or coded(state, kind, without)
         or underlaid(state, kind, without)
         or lopsided(state, kind)
+        or begins_darker(state, effect)
         or spiked(state, kind)
         or far_below(state, effect)
         or untold_slope(state, effect)

@@ -17,9 +17,9 @@ _WORDS = {
     "kurtosis_within_pixels": "single pixels have tails that a Gaussian has not",
     "variance_spread": "pixels differ in how noisy they are",
     "variance_persistence": "the same pixels are noisy in every exposure",
-    "smooth_variance_spread": "parts of the sensor are noisier than others, in every exposure",
-    "row_variance_spread": "some rows are noisier than others, in every exposure",
-    "column_variance_spread": "some columns are noisier than others, in every exposure",
+    "smooth_variance_spread": "parts of the sensor differ in how noisy they are, in every exposure",
+    "row_variance_spread": "rows differ in how noisy they are, in every exposure",
+    "column_variance_spread": "columns differ in how noisy they are, in every exposure",
     "noisy_pixels": "a few pixels are far noisier than the others, in every exposure",
     "one_off_outliers": "single pixels are far noisier than the others",
     "outlying_pixels": "a few pixels stand far out of the fixed pattern",
@@ -60,6 +60,7 @@ _WORDS = {
     "half_seam": "the two halves of the sensor meet in a step",
     "parity": "even and odd lines differ",
 }
+_ALL = "all"  # channels together: says nothing to who reads
 _SCOPES = {
     "offset": ", alike at all signals",
     "offset alone": ", alike at all signals",
@@ -73,18 +74,19 @@ def sentence(statistic: str, key: Key, z: float, where: Where) -> str:
     """Return what a mismatch says: what, how, where, how clearly."""
     what = _WORDS.get(statistic, statistic)
     how = _SCOPES.get(key.scope, "")
-    if key.scope == "contrast" and key.detail not in ("", "at all levels"):
-        how = f" ({key.detail})"
+    detail = "" if key.detail == _ALL else key.detail
+    if key.scope == "contrast" and detail not in ("", "at all levels"):
+        how = f" ({detail})"
     if statistic == "line_correlation":
-        *_, axis, lag = key.detail.split(" ")  # of all channels together, "all" comes first
+        *_, axis, lag = detail.split(" ")  # of all channels together, "all" comes first
         colour = "" if key.channel == "MONO" else " of one colour"
         if not float(lag).is_integer():  # from one colour to another
             lag, colour = f"{2 * float(lag):.0f}", ""
         pixels = "pixel" if lag == "1" else "pixels"
-        how += f" ({lag} {pixels}{colour} apart along {axis})"
-    elif key.detail and key.scope not in ("contrast", "exposure", SCENE):
-        how += f" ({key.detail})"
-    if key.detail and key.scope == SCENE and where.signal_dn is not None:
+        how = f" ({lag} {pixels}{colour} apart along {axis})"
+    elif detail and key.scope not in ("contrast", "exposure", SCENE):
+        how += f" ({detail})"
+    if detail and key.scope == SCENE and where.signal_dn is not None:
         how += " (between {:.3g} and {:.3g} DN)".format(*where.signal_dn)
     places = ", ".join(where.exposures[:4]) + (" ..." if len(where.exposures) > 4 else "")
     if how in _SCOPES.values() and how and len(where.exposures) == 1:

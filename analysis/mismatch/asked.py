@@ -8,6 +8,7 @@ from analysis.mismatch.burst import Bursts, bursts_of
 from analysis.mismatch.columncodes import ColumnCodes, column_codes
 from analysis.mismatch.jumping import LEAST, Jumping
 from analysis.mismatch.layout import Layout
+from analysis.mismatch.ordinary import Ordinary, ordinary_pixels
 from analysis.mismatch.paired import Pairs, pairs_of
 from analysis.mismatch.projections import FramesOf
 from analysis.mismatch.rank import TOLD_APART
@@ -96,6 +97,13 @@ class FramesAsked:
     def pairs(self) -> Pairs:
         """What successive frames share, of even and of odd numbers."""
         return pairs_of(self.layout, self.frames_of)
+
+    @cached_property
+    def ordinary(self) -> Ordinary:
+        """Whether ordinary pixels differ in how noisy they are; of a large recording: unknown."""
+        if self.layout.large:
+            return Ordinary()
+        return ordinary_pixels(self.layout, self.frames_of)
 
     @cached_property
     def bursts(self) -> Bursts:

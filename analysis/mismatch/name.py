@@ -259,6 +259,12 @@ class Search(Choice):
             return True
         if named.kind == "rts" and why.startswith((NEEDLESS, LITTLE)) and self._jumping:
             return True  # numbers of few pixels scatter
+        if (
+            named.kind == "read_noise_spread"
+            and why.startswith((NEEDLESS, LITTLE))
+            and self._spreads
+        ):
+            return True  # and that of all others is lost in it
         if why != NEEDLESS or (own := named.proposal) is None:
             return False
         gain = gained(state, bare, own.effect, replicates_for(self.setting, [own.effect]))
@@ -269,6 +275,11 @@ class Search(Choice):
     def _jumping(self) -> bool:
         """Whether whole frames show pixels that jump."""
         return self.lines is not None and self.lines.jumping(self.least_odds)
+
+    @property
+    def _spreads(self) -> bool:
+        """Whether whole frames show ordinary pixels that differ in how noisy they are."""
+        return self.lines is not None and self.lines.ordinary.differ
 
     def _judge(self, state: State) -> Judge:
         return Judge(state, lambda named: self.without(state, named), self.setting.nulls)

@@ -6,7 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from analysis.mismatch import find_mismatch
 from analysis.mismatch.ordinary import Ordinary, ordinary_pixels
+from dsis.effects import registry
+from mismatch_recordings import camera, recorded
 
 SHAPE, FRAMES = (96, 128), 12
 
@@ -58,3 +61,30 @@ def test_few_frames_and_no_noise_say_nothing() -> None:
         uniform=[SimpleNamespace(name="dark", kind="dark", numbers=range(6))], large=False
     )
     assert ordinary_pixels(still, lambda _: np.zeros((6, 8, 8))) == Ordinary()
+
+
+@pytest.mark.parametrize("spread", [0.1, 0.2, 0.4])
+def test_its_size_is_told_beside_jumps(spread: float) -> None:
+    told = [_darks(seed, spread=spread, jumping=0.015).spread() for seed in range(8)]
+    values, errors = np.transpose(told)
+    assert abs(values.mean() - spread) < 4 * values.std(ddof=1) / len(told) ** 0.5
+    assert values.std(ddof=1) == pytest.approx(errors.mean(), rel=4 / (2 * len(told)) ** 0.5)
+
+
+@pytest.mark.long
+def test_spread_is_named_beside_jumps_that_hide_it_and_only_where_it_is() -> None:
+    words = registry()
+    jumps = words["rts"](pixel_fraction=0.003, amplitude_dn=14.0, switch_probability=0.3)
+    for spread in (0.2, 0.0):
+        own = (words["read_noise_spread"](log_sigma=spread),) if spread else ()
+        recording = recorded(
+            camera(jumps, *own), 1, frames=12, rows=96, columns=128, levels=(100.0, 900.0, 3000.0)
+        )
+        named = find_mismatch(camera(), recording).omitted_physics
+        found = {one.effect: one.parameters for one in named}
+        assert ("read_noise_spread" in found) is bool(spread)
+        assert "rts" in found
+        if spread:
+            told = found["read_noise_spread"]["log_sigma"]
+            assert isinstance(told.value, float)
+            assert abs(told.value - spread) < 4 * told.standard_error < 0.05

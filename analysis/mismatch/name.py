@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.mismatch.candidates import CANDIDATES
+from analysis.mismatch.candidates import CANDIDATES, Proposal
 from analysis.mismatch.choice import Choice
 from analysis.mismatch.credited import kept_up
 from analysis.mismatch.fitted import WEAK
@@ -17,14 +17,17 @@ from analysis.mismatch.memory import Memory
 from analysis.mismatch.named import Named
 from analysis.mismatch.own import eased
 from analysis.mismatch.phase import ABSENT
+from analysis.mismatch.polish import with_effects
 from analysis.mismatch.proposed import replicates_for
 from analysis.mismatch.resolved import differ, gained, opened
 from analysis.mismatch.state import State
+from dsis.effects.read_noise_spread import ReadNoiseSpread
 
 Array = NDArray[np.float64]
 _MOST_EFFECTS = 20  # some may have to go again
 _CHOSEN = frozenset({"adc_memory", "dual_gain"})  # a period, a gap between levels
 _ROUNDS, _FEW_ROUNDS = 6, 3  # of a search that goes on; of a large recording
+_SPREAD = "read_noise_spread"
 _FORGIVING = 2  # rounds after which what was dropped may come back
 
 
@@ -154,7 +157,26 @@ class Search(Choice):
         if not state.mismatches:
             self.ties = []  # what was undecided on the way is explained
             self.doubted = {}
-        return state
+        return state if strong else self._with_spread(state)
+
+    def _with_spread(self, state: State) -> State:
+        """Return the state with read noise that spreads, where jumps hide it and frames show it.
+
+        Numbers, which jumping pixels make up, gain nothing by it: its size is that of the frames.
+        """
+        there = {own.kind for own in state.camera.effect}
+        if "rts" not in there or _SPREAD in there or _SPREAD not in self._left():
+            return state
+        if self.lines is None or not self.lines.ordinary.differ:
+            return state
+        size, error = self.lines.ordinary.spread()
+        proposal = Proposal(ReadNoiseSpread(log_sigma=size), (), errors={"log_sigma": error})
+        camera = with_effects(state.camera, [proposal.effect])
+        if camera is None:
+            return state
+        errors = {"log_sigma": error}
+        self._take(Named(_SPREAD, proposal, errors, self.lines.ordinary.gain, ()))
+        return State.of(self.setting, camera, self.step, draft=True, near=state)
 
     def _with_sizes(self, state: State) -> State:
         """Return the state with user's effects of the sizes that stand beside what is named.

@@ -164,10 +164,10 @@ class Search(Choice):
 
         Numbers, which jumping pixels make up, gain nothing by it: its size is that of the frames.
         """
-        there = {own.kind for own in state.camera.effect}
-        if "rts" not in there or _SPREAD in there or _SPREAD not in self._left():
+        if self.lines is None or _SPREAD not in self._left():
             return state
-        if self.lines is None or not self.lines.ordinary.differ:
+        there = {own.kind for own in state.camera.effect}
+        if "rts" not in there or _SPREAD in there or not self.lines.ordinary.differ:
             return state
         size, error = self.lines.ordinary.spread()
         proposal = Proposal(ReadNoiseSpread(log_sigma=size), (), errors={"log_sigma": error})

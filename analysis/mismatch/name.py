@@ -167,14 +167,14 @@ class Search(Choice):
         if self.lines is None or _SPREAD not in self._left():
             return state
         there = {own.kind for own in state.camera.effect}
-        if "rts" not in there or _SPREAD in there or not self.lines.ordinary.differ:
+        if "rts" not in there or _SPREAD in there or not self._spreads:
             return state
         size, error = self.lines.ordinary.spread()
-        proposal = Proposal(ReadNoiseSpread(log_sigma=size), (), errors={"log_sigma": error})
+        errors = {"log_sigma": error}
+        proposal = Proposal(ReadNoiseSpread(log_sigma=size), (), errors=errors)
         camera = with_effects(state.camera, [proposal.effect])
         if camera is None:
             return state
-        errors = {"log_sigma": error}
         self._take(Named(_SPREAD, proposal, errors, self.lines.ordinary.gain, ()))
         return State.of(self.setting, camera, self.step, draft=True, near=state)
 

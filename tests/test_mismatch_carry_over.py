@@ -153,6 +153,7 @@ def test_white_noise_has_no_slope() -> None:
     assert max(one.chi2 for one in sawteeth(tuple(samples), whole=True)) < 30
 
 
+@pytest.mark.long
 def test_the_best_of_many_residues_pays_for_the_others() -> None:
     """Of white noise alone it gains 3 nats more than its price once in 20 times (e to the -3)."""
     gains, free = [], 1

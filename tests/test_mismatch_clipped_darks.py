@@ -149,6 +149,7 @@ class _Darks(InMemory):
         return cls(own.sensor, darks, own.rows, own.columns, own.folder, own.stacks)
 
 
+@pytest.mark.long
 def test_darks_of_which_half_is_cut_off_prove_nothing() -> None:
     """Nothing is left to be proven on; what differs is located."""
     recording = _with_offsets(0.0, 14)

@@ -134,6 +134,7 @@ def test_a_glow_beside_a_spread_leaves_it_its_mean() -> None:
     assert not found.unexplained
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("users", [0.0, 0.3])
 def test_a_users_other_spread_is_a_wrong_number(users: float) -> None:
     """Nothing is omitted but counted photons: the model has the current, otherwise apart."""

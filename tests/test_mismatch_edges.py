@@ -197,6 +197,7 @@ def _found(true: Camera, words: frozenset[str]) -> Finding:
     return find_mismatch(camera(), recording, seed=1, vocabulary=words)
 
 
+@pytest.mark.long
 def test_lines_that_have_not_settled_are_named_with_their_numbers() -> None:
     own = {"offset_dn": -1.4, "gain_percent": 1.4, "length_pixels": 5.0}
     true = camera(effect("line_settling", edge="right", **own))
@@ -213,6 +214,7 @@ def test_lines_that_have_not_settled_are_named_with_their_numbers() -> None:
     assert where.rows is None
 
 
+@pytest.mark.long
 def test_two_edges_are_two_effects_and_offset_and_gain_have_lengths_of_their_own() -> None:
     left = {
         "offset_dn": -17.0,

@@ -245,6 +245,7 @@ def test_only_uneven_gains_are_asked_of_the_map() -> None:
         assert rivalled(_state(one), one) is None
 
 
+@pytest.mark.long
 def test_a_decay_without_its_word_is_no_uneven_light() -> None:
     own = {"offset_dn": 0.0, "gain_percent": 0.5, "length_pixels": 4.0, "edge": "bottom"}
     words = frozenset({"shading", "tap_mismatch", "smooth_prnu", "row_prnu", "column_prnu"})

@@ -132,6 +132,7 @@ def test_light_that_a_camera_has_but_not_there_is_measured_beside_it() -> None:
     assert _measured(light) is None  # of a camera without it few numbers have it
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("fall", [0.10, 0.13])
 def test_light_of_the_users_camera_may_be_of_another_size_alone(fall: float) -> None:
     square = np.linspace(-1, 1, ROWS)[:, None] ** 2 * ROWS**2 + (
@@ -147,6 +148,7 @@ def test_light_of_the_users_camera_may_be_of_another_size_alone(fall: float) -> 
     assert wrong.recorded == pytest.approx(100 * fall, abs=0.5)
 
 
+@pytest.mark.long
 def test_two_amplifiers_behind_a_lens_are_told() -> None:
     light = _lens(0.5, (6.0, -15.0))
     light[:, COLUMNS // 2 :] *= 1.03

@@ -54,6 +54,7 @@ def test_memory_that_begins_at_black_is_named_and_nothing_else(
     assert not found.unexplained
 
 
+@pytest.mark.long
 def test_an_amplifier_that_follows_itself_is_memory_of_the_sample_before() -> None:
     """A pole at 0.042: beyond one sample two thousandths are left."""
     found = find_mismatch(camera(), _filtered("MONO", [0.958], [1.0, -0.042], 2))

@@ -87,6 +87,7 @@ def test_right_sizes_stay_as_they_are() -> None:
     assert found.camera.effect == own
 
 
+@pytest.mark.long
 def test_right_sizes_stay_as_they_are_beside_physics_that_is_left_out() -> None:
     own = (_prnu(1.0), _column_fpn(1.5))
     rows = _effect("row_fpn", sigma_dn=2.0)

@@ -216,6 +216,7 @@ def test_frames_tell_1_f_noise_from_bands(more: dict[str, float]) -> None:
         assert likelier * odds > TOLD_APART
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("cause", "sigma"), [(_pink, 0.06), (_bands(7.0), 0.04)])
 def test_what_is_weak_is_told_wrongly_no_more_often_than_is_said(cause: Rows, sigma: float) -> None:
     """Odds of 9 are wrong in one of 9 at most; `benchmarks/mismatch_row_odds.py` asks hundreds."""

@@ -182,6 +182,7 @@ def test_moments_are_those_of_the_local_noise(tmp_path: Path) -> None:
             assert statistic == "kurtosis" or expected > 2 * error
 
 
+@pytest.mark.long
 def test_what_only_scenes_show_stays_unexplained(tmp_path: Path) -> None:
     def noisier(rng: np.random.Generator, name: str, light: Array) -> Array:
         return white(rng, name, light) * (1.2 if name == "street" else 1.0)

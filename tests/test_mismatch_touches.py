@@ -25,6 +25,7 @@ def test_random_lines_lean_to_no_side_and_light_does() -> None:
     assert not touched(KEYS, []).any()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("effect", [RowFpn(sigma_dn=0.4), ColumnFpn(sigma_dn=0.35)])
 def test_weak_lines_of_a_mosaic_are_named(effect: RowFpn | ColumnFpn) -> None:
     """Whatever the few sensors lean to, by chance, that they are compared with."""

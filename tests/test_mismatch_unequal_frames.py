@@ -65,6 +65,7 @@ def test_pixels_that_are_noisier_in_every_exposure_are_no_frames() -> None:
     assert _denial(_recorded(SPREAD, most=1.6), SPREAD) is None
 
 
+@pytest.mark.long
 def test_neither_is_named_beside_them() -> None:
     found = find_mismatch(camera(), _recorded(most=1.5), seed=1)
     assert not found.omitted_physics

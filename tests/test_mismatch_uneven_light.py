@@ -34,6 +34,7 @@ def _shading(**percent: float) -> object:
     return registry()["shading"](**{"falloff_percent": 0.0, **percent})
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "percent",
     [

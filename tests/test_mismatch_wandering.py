@@ -52,6 +52,7 @@ def test_what_frames_share_adds_up_over_their_channels() -> None:
     assert _wandering(sums, part, keys) == pytest.approx(scatter, rel=0.08, abs=1e-9)
 
 
+@pytest.mark.long
 def test_a_drift_without_its_word_is_no_dark_current() -> None:
     true = camera(DRIFT, cfa="RGGB")
     found = find_mismatch(

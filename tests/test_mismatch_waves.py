@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.stats import norm
 
-from analysis.mismatch.bank.waves import Waves, WaveSums
+from analysis.mismatch.bank.waves import Waves, WaveSums, _by_place
 from dsis.cfa import Cfa
 from dsis.measures import measure_exposure
 
@@ -26,11 +26,13 @@ def summed(
     cfa: Cfa,
     shape: tuple[int, int] = (ROWS, COLUMNS),
     variances: tuple[float, ...] = (1.0,),
+    *,
+    keep: bool = False,
 ) -> WaveSums:
     step = 1 if cfa is Cfa.MONO else 2
     sums = WaveSums(shape, step)
     for stack, variance in zip(stacks, itertools.cycle(variances)):
-        waves = Waves(shape)
+        waves = Waves(shape, keep=keep)
         measured = measure_exposure(waves.watching(stack), cfa, 0.0, 65535.0)
         sums.add(waves, measured.channels, dict.fromkeys(ALL, variance))
     return sums
@@ -89,10 +91,11 @@ def test_a_wave_halfway_between_bins_keeps_most_of_its_power(down: int, right: i
     assert kept == pytest.approx(HALFWAY ** (down + right), rel=0.01)
 
 
+@pytest.mark.parametrize("keep", [False, True])
 @pytest.mark.parametrize("cfa", [Cfa.MONO, Cfa.RGGB])
-def test_white_noise_has_one_everywhere_and_rare_peaks_rarely(cfa: Cfa) -> None:
+def test_white_noise_has_one_everywhere_and_rare_peaks_rarely(cfa: Cfa, *, keep: bool) -> None:
     rng = np.random.default_rng(3)
-    many = [summed([noise(rng), noise(rng)], cfa) for _ in range(60)]
+    many = [summed([noise(rng), noise(rng)], cfa, keep=keep) for _ in range(60)]
     for down in (0, 1):
         for right in (0, 1):
             parts = [one.power[down, right, 3:-3, 3:-3] / one.weight for one in many]
@@ -153,8 +156,9 @@ def test_a_mono_sensor_has_no_lags_between_colours() -> None:
     assert summed([noise(np.random.default_rng(1))], Cfa.MONO).odd_lags() == {}
 
 
+@pytest.mark.parametrize("keep", [False, True])
 @pytest.mark.parametrize("uneven", ["pixel", "vignette", "middle"])
-def test_noise_that_is_uneven_over_the_sensor_is_no_wave(uneven: str) -> None:
+def test_noise_that_is_uneven_over_the_sensor_is_no_wave(uneven: str, *, keep: bool) -> None:
     """Between bins the middle of the sensor counts more than its edges."""
     rng = np.random.default_rng(9)
     y, x = (np.linspace(-1, 1, size) for size in (ROWS, COLUMNS))
@@ -167,7 +171,7 @@ def test_noise_that_is_uneven_over_the_sensor_is_no_wave(uneven: str) -> None:
     if uneven == "pixel":
         sd[ROWS // 2, COLUMNS // 2] = 50.0
     stacks = [1000 + sd * rng.normal(0, 1, (FRAMES, ROWS, COLUMNS)) for _ in range(6)]
-    assert summed(stacks, Cfa.MONO).number()[0] < 4.0
+    assert summed(stacks, Cfa.MONO, keep=keep).number()[0] < 4.0
 
 
 @settings(max_examples=12, deadline=None)
@@ -176,82 +180,92 @@ def test_noise_that_is_uneven_over_the_sensor_is_no_wave(uneven: str) -> None:
     down=st.floats(4, 19),
     sign=st.sampled_from([1, -1]),
     mosaic=st.booleans(),
+    keep=st.booleans(),
     seed=st.integers(0, 2**16),
 )
 def test_a_wave_is_found_where_it_is(
-    across: float, down: float, sign: int, mosaic: bool, seed: int
+    across: float, down: float, sign: int, mosaic: bool, keep: bool, seed: int
 ) -> None:
     rng = np.random.default_rng(seed)
     own = wave(rng, across / COLUMNS, sign * down / ROWS, 12.0)
-    sums = summed([noise(rng) + own], Cfa.RGGB if mosaic else Cfa.MONO)
+    sums = summed([noise(rng) + own], Cfa.RGGB if mosaic else Cfa.MONO, keep=keep)
     assert sums.number()[0] > SURE
     peak = sums.peak()
     assert peak is not None
     found = np.array([peak.fx * COLUMNS, peak.fy * ROWS]) / sums.step
-    assert found[0] == pytest.approx(across, abs=0.4)
+    assert found[0] == pytest.approx(across, abs=0.25 if keep else 0.4)
     # Of a mosaic a plane's frequencies go beyond half a cycle per pixel, and are not folded.
-    assert found[1] == pytest.approx(sign * down, abs=0.4)
+    assert found[1] == pytest.approx(sign * down, abs=0.25 if keep else 0.4)
 
 
-def test_a_mosaic_sees_a_wave_as_clearly_as_a_mono_sensor() -> None:
+@pytest.mark.parametrize("keep", [False, True])
+def test_a_mosaic_sees_a_wave_as_clearly_as_a_mono_sensor(*, keep: bool) -> None:
     """Its channels add by amplitude: each alone has a quarter of the power."""
     rng = np.random.default_rng(4)
     own = noise(rng) + wave(rng, 0.21, 0.13, 8.0)
-    mono, mosaic = (summed([own], cfa).number()[0] for cfa in (Cfa.MONO, Cfa.GBRG))
+    mono, mosaic = (summed([own], cfa, keep=keep).number()[0] for cfa in (Cfa.MONO, Cfa.GBRG))
     assert mosaic == pytest.approx(mono, abs=0.5)
 
 
-def test_what_rows_columns_colours_and_frames_share_is_no_wave() -> None:
+@pytest.mark.parametrize("keep", [False, True])
+def test_what_rows_columns_colours_and_frames_share_is_no_wave(*, keep: bool) -> None:
     rng = np.random.default_rng(5)
     stack = noise(rng)
     stack += rng.normal(0, 1, (FRAMES, ROWS, 1)) + rng.normal(0, 1, (FRAMES, 1, COLUMNS))
     stack[:, ::2, ::2] += rng.normal(0, 3, (FRAMES, 1, 1))  # one colour's light
     stack[:, ::2] += rng.normal(0, 1, (FRAMES, 1, COLUMNS))  # columns of two colours
-    assert summed([stack], Cfa.RGGB).number()[0] < SURE
+    assert summed([stack], Cfa.RGGB, keep=keep).number()[0] < SURE
 
 
-def test_a_checkerboard_has_a_number_of_its_own() -> None:
+@pytest.mark.parametrize("keep", [False, True])
+def test_a_checkerboard_has_a_number_of_its_own(*, keep: bool) -> None:
     rng = np.random.default_rng(6)
     board = (-1.0) ** np.add.outer(np.arange(ROWS), np.arange(COLUMNS))
     stack = noise(rng) + 0.3 * rng.choice([-1, 1], (FRAMES, 1, 1)) * board
-    sums = summed([stack], Cfa.MONO)
+    sums = summed([stack], Cfa.MONO, keep=keep)
     assert sums.number()[0] < SURE
     peak = sums.peak()
     assert peak is not None
     assert (peak.fx, abs(peak.fy)) == (0.5, 0.5)
 
 
+@pytest.mark.parametrize("keep", [False, True])
 @pytest.mark.parametrize("shape", [(15, 21), (16, 21), (15, 20), (16, 20)])
-def test_odd_sensors_look_at_places_that_are_measured(shape: tuple[int, int]) -> None:
+def test_odd_sensors_look_at_places_that_are_measured(
+    shape: tuple[int, int], *, keep: bool
+) -> None:
     rng = np.random.default_rng(7)
-    sums = [summed([noise(rng, shape)], Cfa.MONO, shape) for _ in range(20)]
-    for parts in zip(*(one._parts() for one in sums), strict=True):
+    sums = [summed([noise(rng, shape)], Cfa.MONO, shape, keep=keep) for _ in range(20)]
+    for parts in zip(*(_by_place(one.power, one._told()) for one in sums), strict=True):
         assert np.min(parts) > 0
         assert np.mean(parts) / sums[0].weight == pytest.approx(1, abs=0.1)
     assert all(one.number()[0] < SURE for one in sums)
 
 
+@pytest.mark.parametrize("keep", [False, True])
 @pytest.mark.parametrize("shape", [(2, 2), (4, 4), (6, 6)])
 @pytest.mark.parametrize("cfa", [Cfa.MONO, Cfa.RGGB])
-def test_the_smallest_sensors_are_no_error(shape: tuple[int, int], cfa: Cfa) -> None:
+def test_the_smallest_sensors_are_no_error(shape: tuple[int, int], cfa: Cfa, *, keep: bool) -> None:
     if cfa is not Cfa.MONO and min(shape) < 4:
         return
-    sums = summed([noise(np.random.default_rng(7), shape)], cfa, shape)
+    sums = summed([noise(np.random.default_rng(7), shape)], cfa, shape, keep=keep)
     value, _ = sums.number()
     assert np.isnan(value) or value < SURE
     sums.peak()
 
 
-def test_frames_without_noise_say_nothing() -> None:
-    sums = summed([np.full((3, ROWS, COLUMNS), 7.0)], Cfa.MONO)
+@pytest.mark.parametrize("keep", [False, True])
+def test_frames_without_noise_say_nothing(*, keep: bool) -> None:
+    sums = summed([np.full((3, ROWS, COLUMNS), 7.0)], Cfa.MONO, keep=keep)
     assert np.isnan(sums.number()[0])
     assert sums.peak() is None
 
 
+@pytest.mark.parametrize("keep", [False, True])
 @pytest.mark.parametrize("fy", [0.25, 0.13])
-def test_a_wave_that_alternates_along_a_row_does_so_exactly(fy: float) -> None:
+def test_a_wave_that_alternates_along_a_row_does_so_exactly(fy: float, *, keep: bool) -> None:
     rng = np.random.default_rng(8)
-    peak = summed([noise(rng) + wave(rng, 0.5, fy, 12.0)], Cfa.MONO).peak()
+    peak = summed([noise(rng) + wave(rng, 0.5, fy, 12.0)], Cfa.MONO, keep=keep).peak()
     assert peak is not None
     assert peak.fx == 0.5
     assert abs(peak.fy) * ROWS == pytest.approx(fy * ROWS, abs=0.4)

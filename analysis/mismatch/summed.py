@@ -134,7 +134,9 @@ class SensorSums:
 
     def looked(self, exposure: str, frames: int, seen: Iterable[NDArray[np.generic]]) -> "Looked":
         """Return what an exposure's frames show; nothing is summed yet."""
-        lines, after, cells = Waves(self.shape), CarryOver(keep=self.samples), Periods()
+        few = self.shape[0] * self.shape[1] <= _MANY_PIXELS and not self.layout.large
+        lines, after = Waves(self.shape, keep=few), CarryOver(keep=self.samples)
+        cells = Periods()
         if SPECTRA not in self.made:
             lines.frames = frames
         else:

@@ -14,9 +14,11 @@ import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
+from analysis.mismatch.bank.between import Kept, Top, highest, log_chance_of
 from analysis.mismatch.bank.coherent import LAGS
 from analysis.mismatch.bank.lines import any_of, log_chance, without_lines
-from analysis.mismatch.bank.peaks import Peak, frequency, top, white_level
+from analysis.mismatch.bank.peaks import Peak, frequency, white_level
+from analysis.mismatch.bank.peaks import top as parabola
 from analysis.mismatch.bank.scalars import UNKNOWN, Number, score_of_log
 from dsis.compiled import inlined, kernel
 from dsis.measures import Channel
@@ -32,10 +34,14 @@ _PAIRED = {"rows": (("R", "Gr"), ("Gb", "B")), "columns": (("R", "Gb"), ("Gr", "
 
 
 class Waves:
-    """Amplitudes of the frames of one exposure, less the first, summed on bins and between them."""
+    """Amplitudes of the frames of one exposure, less the first, summed on bins and between them.
 
-    def __init__(self, shape: tuple[int, int]) -> None:
+    With `keep` they are kept besides, of every frame.
+    """
+
+    def __init__(self, shape: tuple[int, int], *, keep: bool = False) -> None:
         rows, columns = shape
+        self.kept: list[Amplitudes] | None = [] if keep else None
         self.pixels, self.half = rows * columns, (rows, columns // 2 + 1)
         self.power: Array | None = None  # of two frames the second's amplitudes say it all
         self.total: Amplitudes
@@ -68,6 +74,8 @@ class Waves:
     def take(self, transform: Amplitudes) -> None:
         """Take the transform (row, column // 2 + 1) of a frame less the first."""
         self.frames = max(self.frames, 1) + 1
+        if self.kept is not None:
+            self.kept.append(transform)
         if self.frames == 2:
             self.total = transform
             return
@@ -83,7 +91,7 @@ class Waves:
 
         `power`: (half a bin down, half a bin right, row, column // 2 + 1). Needs two frames.
         """
-        per_bin = self._per_bin(weight)
+        per_bin = self.per_bin(weight)
         if self.power is None:
             add_power(self.total, per_bin / 2, power)
         else:
@@ -92,14 +100,15 @@ class Waves:
 
     def add_bins_to(self, power: Array, weight: float) -> None:
         """Add the power of the bins alone, (row, column // 2 + 1), in the same units."""
-        per_bin = self._per_bin(weight)
+        per_bin = self.per_bin(weight)
         whole = self.total.real**2 + self.total.imag**2
         if self.power is None:
             power += per_bin / 2 * whole
         else:
             power += per_bin * (self.power[0, 0] - whole / self.frames)
 
-    def _per_bin(self, weight: float) -> float:
+    def per_bin(self, weight: float) -> float:
+        """Return by what squares are multiplied: see `add_to`."""
         return weight / (self.pixels * (self.frames - 1))
 
 
@@ -148,6 +157,8 @@ class WaveSums:
         self.relative = np.zeros(self.power.shape[2:] if step == 2 else (0, 0))
         self.seen, self.uneven = 0, dict.fromkeys(_PAIRED, 0.0)
         self._moving: Moving | None = None  # every map asks for it
+        self._kept: list[Kept] = []
+        self._highest: Top | None = None
 
     def add(
         self, waves: Waves, channels: Mapping[str, Channel], variance_dn2: Mapping[str, float]
@@ -158,9 +169,12 @@ class WaveSums:
             return
         seen = waves.frames - 1
         weight = seen / expected
-        self._moving = None
+        self._moving = self._highest = None
         if self.taken:
             waves.add_to(self.power, weight / white)
+            if waves.kept:
+                own = Kept(np.stack(waves.kept), waves.per_bin(weight / white))
+                self._kept.append(own)
         self.weight += weight
         self.squares += weight**2 / seen
         if self.step == 2:
@@ -176,9 +190,11 @@ class WaveSums:
         """Return the normal score of the largest power, on bins or between them.
 
         Of the least of so many chances, as of independent ones (Sidak, 1967): it is standard normal
-        in white noise, and its upper tail, by which a line is told, no lighter than that.
+        in white noise, and its upper tail, by which a line is told, no lighter than that. Where
+        amplitudes of frames are kept, of the largest power at any frequency.
         """
-        parts = [part for part in self._parts() if part.size]
+        seen = self._told()
+        parts = [part for part in _by_place(self.power, seen) if part.size]
         if not (self.taken and self.weight and parts):
             return UNKNOWN
         degrees = self._degrees
@@ -187,11 +203,23 @@ class WaveSums:
         whites = [white_level(part, degrees) for part in parts]
         if not min(whites) > 0:
             return UNKNOWN
+        top = self._top()
+        if top is not None:
+            bins = sum(part.size for part in parts) / len(parts)
+            return score_of_log(log_chance_of(top.power / whites[0], bins, degrees)), 1.0
         least = min(
             log_chance(float(part.max()) / white, 1, part.size, degrees)
             for part, white in zip(parts, whites, strict=True)
         )
         return score_of_log(any_of(least, len(parts))), 1.0
+
+    def _top(self) -> Top | None:
+        """Return where the power at any frequency is largest; None: no amplitudes were kept."""
+        if self._highest is None and self._kept:
+            fine = self._fine(self._told())
+            if fine is not None:
+                self._highest = highest(self._kept, fine, self.shape[1], self.step)
+        return self._highest
 
     def moving(self) -> Moving | None:
         """Return the power itself; None where no frames were taken."""
@@ -238,35 +266,52 @@ class WaveSums:
 
     def peak(self) -> Peak | None:
         """Return where the power is largest: cycles per pixel of a plane, power as one shows it."""
+        fine = self._fine(looked_at(self.shape, self.step))
+        if fine is None:
+            return None
+        rows, columns = self.shape
+        y, x = (int(i) for i in np.unravel_index(int(fine.argmax()), fine.shape))
+        top = self._top() if self._told()[y, x] else None
+        if top is not None:
+            along, across, power = top.down, top.across, top.power
+        else:
+            # At half a cycle per pixel both sides are alike: each is the other's conjugate.
+            across = x / 2 + (parabola(np.pad(fine[y], 1), x + 1) / 2 if x < columns else 0.0)
+            along = y / 2 + parabola(np.pad(fine[:, x], 1), y + 1) / 2
+            power = float(fine[y, x])
+        fx, fy = frequency(across, columns), frequency(along, rows)
+        fy -= float(fy > 1 / 2)
+        power = 1 + (power / self.weight - 1) / self.step**2
+        return Peak(self.step * fx, self.step * fy, power)
+
+    def _fine(self, seen: NDArray[np.bool_]) -> Array | None:
+        """Return the power of halves of bins, noise between bins as loud as on them; None: none.
+
+        0 where it is not looked for: (2 rows, columns + 2).
+        """
         middles = [median(own) for own in self.power.reshape(4, -1)]
         if not self.weight or not min(middles) > 0:
             return None
-        rows, columns = self.shape
-        fine = np.zeros((2 * rows, 2 * self.power.shape[3]))
+        fine = np.zeros((2 * self.shape[0], 2 * self.power.shape[3]))
         for down in (0, 1):
             for right in (0, 1):
                 own = self.power[down, right]
                 fine[down::2, right::2] = own * (middles[0] / middles[2 * down + right])
-        fine[~looked_at(self.shape, self.step)] = 0.0
-        y, x = (int(i) for i in np.unravel_index(int(fine.argmax()), fine.shape))
-        # At half a cycle per pixel both sides are alike: each is the other's conjugate.
-        across = x / 2 + (top(np.pad(fine[y], 1), x + 1) / 2 if x < columns else 0.0)
-        along = y / 2 + top(np.pad(fine[:, x], 1), y + 1) / 2
-        fx = frequency(across, columns)
-        fy = frequency(along, rows)
-        fy -= float(fy > 1 / 2)
-        power = 1 + (float(fine[y, x]) / self.weight - 1) / self.step**2
-        return Peak(self.step * fx, self.step * fy, power)
+        fine[~seen] = 0.0
+        return fine
 
-    def _parts(self) -> list[Array]:
-        """Return the powers that are looked at, by where they lie in the bins."""
+    def _told(self) -> NDArray[np.bool_]:
+        """Return which half bins tell a line: not what alternates along both axes."""
         seen = looked_at(self.shape, self.step)
         rows, columns = self.shape
-        if rows % 2 == 0 and columns % 2 == 0:  # what alternates along both axes: has its own
+        if rows % 2 == 0 and columns % 2 == 0:  # has a number of its own
             seen[rows - 1 : rows + 2, columns - 1 : columns + 2] = False
-        return [
-            self.power[down, right][seen[down::2, right::2]] for down in (0, 1) for right in (0, 1)
-        ]
+        return seen
+
+
+def _by_place(power: Array, seen: NDArray[np.bool_]) -> list[Array]:
+    """Return the powers that are looked at, by where they lie in the bins."""
+    return [power[down, right][seen[down::2, right::2]] for down in (0, 1) for right in (0, 1)]
 
 
 def of_sensor(

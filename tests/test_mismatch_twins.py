@@ -137,3 +137,16 @@ def test_two_paths_apart_are_not_told_from_a_bend_that_has_no_word(
     assert twin(_state(), best, {"nonlinearity"}, Memory(), lambda: None) is None
     found = twin(_state(), best, {"saturation"}, Memory(), lambda: None)
     assert found is (None if told else other)
+
+
+def test_levels_that_step_where_a_path_begins_are_no_bend(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nor the other way round; where both have a word their gains tell, see `ties`."""
+    state, both = _state(), ("nonlinearity", "dual_gain_mismatch")
+    for named, other in (both, both[::-1]):
+        step = _ranked(other, 16.8, (4.0, 2.0))
+        monkeypatch.setattr(ties, "ranked", lambda *_, own=step: [own])
+        best = _ranked(named, 11.6, (4.5, 0.0))
+        assert twin(state, best, {named}, Memory(), lambda: None) is step
+        assert twin(state, best, set(both), Memory(), lambda: None) is None
+    saturated = (_ranked("dual_gain_mismatch", 20.0, MEMORY), _ranked("saturation", 19.0, MEMORY))
+    assert "nonlinearity" not in ties.akin([saturated])

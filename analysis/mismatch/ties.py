@@ -27,10 +27,11 @@ _BY_CODES = "quantisation"
 _FAR_AHEAD = 25.0  # nats, that no numbers have by chance
 _KEEPS_VARIANCE = ("spatial_filtering", {"spatial_filtering", "readout_memory"})
 _OF_LAGS = "readout_memory"
-_OF_SWITCH = "dual_gain_mismatch"
+_OF_LEVELS = frozenset({"dual_gain_mismatch", "nonlinearity"})
 _SOME = 0.2  # cosine of what two effects change, above which one may hide in the other
 _TWINS = {
     "dual_gain_mismatch": ("nonlinearity",),
+    "nonlinearity": ("dual_gain_mismatch",),
     "tap_mismatch": ("channel_imbalance",),
     "readout_memory": ("crosstalk", "spatial_filtering"),
     "spatial_filtering": ("readout_memory",),
@@ -141,7 +142,7 @@ def akin(pairs: Sequence[tuple[Ranked, Ranked | Path]]) -> frozenset[str]:
     """
     kinds = {one.kind for pair in pairs for one in pair}
     found = {kind for kind, own in _TWINS.items() if kinds.intersection(own)}
-    return frozenset(found - (kinds & {_OF_LAGS}) - ({_OF_SWITCH} - kinds))
+    return frozenset(found - (kinds & {_OF_LAGS}) - (_OF_LEVELS - kinds))
 
 
 def of_tied_lag(pairs: Sequence[tuple[Ranked, Ranked | Path]], effect: Effect) -> bool:

@@ -74,7 +74,7 @@ def highest(kept: Sequence[Kept], fine: Array, columns: int, step: int) -> Top:
     for own in kept:
         _add_about(own.amplitudes, own.weight, places, _ABOUT, columns, step, found)
     half = places[:, 1] == columns / 2  # both sides are alike: each is the other's conjugate
-    found[np.ix_(half, range(_ABOUT.size), np.flatnonzero(_ABOUT))] = 0.0
+    found[np.ix_(half, np.arange(_ABOUT.size), np.flatnonzero(_ABOUT))] = 0.0
     k, i, j = (int(n) for n in np.unravel_index(int(found.argmax()), found.shape))
     down, across = (float(v) for v in places[k] + (_ABOUT[i], _ABOUT[j]))
     return Top(down, across, float(found[k, i, j]))

@@ -142,6 +142,7 @@ def test_two_paths_apart_are_not_told_from_a_bend_that_has_no_word(
 def test_levels_that_step_where_a_path_begins_are_no_bend(monkeypatch: pytest.MonkeyPatch) -> None:
     """Nor the other way round; where both have a word their gains tell, see `ties`."""
     state, both = _state(), ("nonlinearity", "dual_gain_mismatch")
+    monkeypatch.setattr(ties, "smooth_as_well", lambda *_: False)
     for named, other in (both, both[::-1]):
         step = _ranked(other, 16.8, (4.0, 2.0))
         monkeypatch.setattr(ties, "ranked", lambda *_, own=step: [own])

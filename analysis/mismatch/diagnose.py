@@ -18,19 +18,18 @@ from analysis.mismatch.finding import (
     Alternative,
     Change,
     Finding,
-    FittedParameter,
     Gain,
-    OmittedEffect,
     Proof,
     Verdict,
 )
-from analysis.mismatch.instance import kind_of, unmeasured
+from analysis.mismatch.instance import kind_of
 from analysis.mismatch.jumping import Jumping
 from analysis.mismatch.layout import Layout
 from analysis.mismatch.model import both, processes
 from analysis.mismatch.name import Search
 from analysis.mismatch.named import Named
 from analysis.mismatch.observe import observe
+from analysis.mismatch.omitted import omitted_effect
 from analysis.mismatch.own import wrong_sizes
 from analysis.mismatch.parameters import parameter_errors
 from analysis.mismatch.phase import WholeFrames
@@ -39,7 +38,7 @@ from analysis.mismatch.reading import read
 from analysis.mismatch.recalibrate import Calibrated
 from analysis.mismatch.remarks import remark_on_sizes, remarks_on, remarks_on_words
 from analysis.mismatch.rowtold import EITHER, SINGLE_ROWS, as_likely, beside_undecided
-from analysis.mismatch.segments import as_settled, second_path
+from analysis.mismatch.segments import second_path
 from analysis.mismatch.settle import would_settle
 from analysis.mismatch.source import Source
 from analysis.mismatch.spikes import left_dn4, told_besides, with_spikes
@@ -58,7 +57,6 @@ from dsis.recording import Recording
 
 Progress = Callable[[int, int, str], None]
 VOCABULARY = frozenset({*CANDIDATES, "dual_gain"})
-_NEAR = 8.0  # of log-likelihood: a rival worth naming a recording that would decide
 _SMALL = 1e6  # samples
 
 
@@ -327,7 +325,7 @@ def _finding(
         for name, after in [explanations[m.statistic]]
     )
     omitted = tuple(
-        _omitted(n, because(explanations, n.name), gains[n.name], final) for n in search.named
+        omitted_effect(n, because(explanations, n.name), gains[n.name], final) for n in search.named
     )
     verdict: Verdict = "match"
     if omitted:
@@ -361,37 +359,3 @@ def _finding(
         final.camera,
         search.considered(tied),
     )
-
-
-def _omitted(named: Named, why: tuple[str, ...], gain: Gain, final: State) -> OmittedEffect:
-    parameters, choices = {}, {}
-    if named.proposal is not None:
-        effect = named.proposal.effect
-        for name, value in effect.model_dump(exclude={"kind"}).items():
-            if isinstance(value, str):
-                choices[name] = value
-            elif name == "field":
-                choices |= {name: "as measured"} if value else {}
-            elif named.light is not None and name not in named.proposal.errors:
-                continue  # the field has it
-            elif isinstance(value, tuple):
-                least = unmeasured(value, final.setting.layout) if name == "frequency" else 0.0
-                parameters[name] = FittedParameter(value, named.proposal.errors.get(name, least))
-            elif isinstance(value, (int, float)) and not isinstance(value, bool):
-                own = named.proposal
-                known = np.inf if name in own.free else own.errors.get(name, 0.0)
-                error = named.errors.get(name, known)
-                parameters[name] = FittedParameter(float(value), error)
-    else:
-        switch = as_settled(final.calibrated, named.switch_dn, named.errors["switch_dn"])
-        parameters["switch_dn"] = FittedParameter(*switch)
-    rivals = tuple(
-        Alternative(
-            kind,
-            None,
-            f"explains the numbers {worse:.3g} nats worse",
-            would_settle(named.kind, kind) if worse < _NEAR else "",
-        )
-        for kind, worse in named.rivals
-    )
-    return OmittedEffect(named.kind, parameters, why, gain, rivals, choices)

@@ -27,6 +27,7 @@ def _recording(well: float, seed: int) -> InMemory:
     return made
 
 
+@pytest.mark.long
 def test_light_beyond_white_that_a_full_well_keeps_below_is_a_full_well() -> None:
     """The model has every sample of the brightest flat at white: what is recorded lies below."""
     found = find_mismatch(camera(black=BLACK), _recording(WELL, 1), seed=1)

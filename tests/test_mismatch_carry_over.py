@@ -257,6 +257,7 @@ def test_beside_memory_of_the_noise_a_residue_is_told_by_what_follows_codes() ->
     assert "carry_over" not in {m.statistic for m in found.unexplained}
 
 
+@pytest.mark.long
 def test_levels_that_are_off_call_for_a_trial(tmp_path: Path) -> None:
     """Each level has the mean residue of its codes: that may be all that is located."""
     _planted(tmp_path, "MONO")

@@ -47,6 +47,7 @@ def found_in(recording: InMemory, model: Camera) -> Finding:
     return find_mismatch(model, recording, seed=1, vocabulary=VOCABULARY)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("step", "phase", "cfa"),
     [(2, 1, "MONO"), (6, 5, "MONO"), (6, 0, "MONO"), (5, 4, "GRBG"), (8, 3, "GRBG")],

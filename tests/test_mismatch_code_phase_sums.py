@@ -119,6 +119,7 @@ def test_what_codes_gain_is_that_of_uneven_widths_alone() -> None:
     assert untold_order(camera(registry()["adc_dnl"](rms_lsb=0.1)), keys).tolist() == [True, False]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("rms", [0.042, 0.0])
 def test_a_bit_of_wrong_weight_is_named_and_proven(rms: float) -> None:
     """Four hundredths of a code, that repeat every sixteen: no single exposure is sure of them."""

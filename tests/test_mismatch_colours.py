@@ -71,6 +71,7 @@ def test_what_colours_share_makes_the_greens_differ(axis: int, sign: int) -> Non
     assert "other colours" in denial.why
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("axis", "along", "sign"), [(2, "rows", 1), (1, "columns", -1)])
 def test_what_samples_remember_of_other_colours_makes_the_greens_differ(
     axis: int, along: str, sign: int

@@ -105,6 +105,7 @@ def test_a_bit_that_sticks_in_some_columns_is_theirs(every: int) -> None:
     assert found.denial() is not None
 
 
+@pytest.mark.long
 def test_it_is_named_no_converter_of_all_samples() -> None:
     found = find_mismatch(camera(), _stuck(_recorded(), 16), seed=1)
     assert "adc_dnl" not in {own.effect.kind for own in found.omitted_physics}

@@ -56,6 +56,7 @@ def test_noise_that_grows_or_bursts_is_seen() -> None:
     assert _score(burst) > 3
 
 
+@pytest.mark.long
 def test_a_sensor_that_warms_is_located_and_named_nothing() -> None:
     """Read noise that grows by 11 % from the first frame of each exposure to the last."""
     recording = recorded(camera(), 6, rows=64, columns=96, levels=FEW_LEVELS)

@@ -73,6 +73,7 @@ def test_what_is_there_is_found() -> None:
     assert certain(10.0, 2, simulations=16, there=True)[0].mean() > 0.98
 
 
+@pytest.mark.long
 def test_nats_are_those_of_the_further_frames() -> None:
     """z of two of eight frames: the expected log-likelihood ratio is z^2 / 2 (Kullback 1951)."""
     z = 3.0

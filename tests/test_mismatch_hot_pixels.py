@@ -65,6 +65,7 @@ def test_intervals_hold_what_was_planted(share: float, mean_dn: float) -> None:
     assert held.min() >= binom.ppf(0.001, seeds, 0.95)
 
 
+@pytest.mark.long
 def test_noise_alone_gains_what_a_parameter_gains_by_chance() -> None:
     gains = [_laws(_maps(seed, 0.0, 0.0))[0].gain for seed in range(20)]
     # Of a share at its bound, and a mean that then says nothing: chi-squared of two at most.

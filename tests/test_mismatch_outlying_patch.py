@@ -62,6 +62,7 @@ def test_what_is_no_patch_does_not_stand_out() -> None:
         assert _score(image) < 4
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("cfa", ["MONO", "RGGB"])
 def test_a_speck_of_dust_is_located_and_named_nothing(cfa: str) -> None:
     """Of the light 0.4 % are missing over 113 pixels; no effect of the vocabulary does that."""

@@ -31,6 +31,7 @@ def _found(true: Camera, model: Camera, levels: tuple[float, ...] = FEW_LEVELS) 
     return find_mismatch(model, recorded(true, 11, levels=levels), seed=5)
 
 
+@pytest.mark.long
 def test_a_wrong_size_is_a_parameter_error() -> None:
     found = _found(camera(_column_fpn(1.0)), camera(_column_fpn(2.0)))
     assert found.verdict == "parameters"

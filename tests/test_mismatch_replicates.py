@@ -102,6 +102,7 @@ def test_a_draft_is_too_few_for_a_null(beside: Beside) -> None:
     assert beside.of(_lined(1.01), draft, draft=True)[1] == FEW
 
 
+@pytest.mark.long
 def test_many_small_steps_are_a_large_one(beside: Beside, near: State) -> None:
     """What was moved is not moved again: noise of rows goes up by half, 6 % at a time."""
     state, counts = near, []

@@ -61,6 +61,7 @@ def test_two_lines_are_two_effects(tmp_path: Path) -> None:
     assert {m.explained_by for m in found.mismatches} <= {"periodic_noise", None}
 
 
+@pytest.mark.long
 def test_lines_without_an_effect_for_them_are_no_memory(tmp_path: Path) -> None:
     found = _found(tmp_path, *LIKE_LINES, "bistable_pattern")
     assert not found.omitted_physics

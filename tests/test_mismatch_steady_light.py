@@ -79,6 +79,7 @@ def test_light_that_is_given_stays() -> None:
     assert with_steady_light(recording, Source(recording)) is recording
 
 
+@pytest.mark.long
 def test_a_bend_is_named_by_the_times() -> None:
     found = find_mismatch(
         made.camera(), _recording(7, _bent), seed=1, vocabulary=frozenset({"nonlinearity"})

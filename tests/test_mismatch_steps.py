@@ -134,6 +134,7 @@ def test_the_effect_gives_whole_codes_of_its_steps(step: float, phase: float) ->
     assert np.mean(np.abs(codes - expected) < 1e-3) > 0.999  # float32 at the edges of steps
 
 
+@pytest.mark.long
 def test_a_digital_gain_is_named_as_steps_of_codes() -> None:
     """Ten codes become eleven: of numpy's noise, coded here, one in eleven never occurs."""
     found = find_mismatch(BASE, coded(multiplied), seed=1)

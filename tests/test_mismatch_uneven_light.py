@@ -102,6 +102,7 @@ def test_a_camera_that_knows_its_lens_matches_its_own_recording(fall: float) -> 
     assert any("No physics was looked for" in remark for remark in found.remarks)
 
 
+@pytest.mark.long
 def test_a_fall_is_told_beside_a_decay_that_the_camera_has() -> None:
     """The lines of an edge lean and bend the map: what they make of it is no uneven light."""
     edge = registry()["line_settling"](gain_percent=3.0, length_pixels=6.0, edge="left")

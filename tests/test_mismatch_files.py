@@ -169,6 +169,8 @@ def test_command_writes_a_model_that_simulates(
     assert read_camera(found) == CAMERA
     assert "row_noise: sigma 3.20 ± 0.10 DN" in found.read_text(encoding="utf-8")
     assert "not allowed to be named: dsnu, prnu" in found.read_text(encoding="utf-8")
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert page.count("pixels; simulated from camera model") == 3  # as its frames are
     made = str(tmp_path / "made")
     like = ["camera", "simulate", str(found), "--like", str(recording), "-o", made]
     assert main([*like, "--same-sensor"]) == 0

@@ -11,7 +11,14 @@ from dsis.draw import Draw
 from dsis.effects import Effect, Exposure, Image, Stage, registry
 from dsis.errors import InputError
 from dsis.grid import PixelGrid
-from dsis.recording import ExposurePlan, Recording, Sensor, read_recording, write_recording
+from dsis.recording import (
+    ExposurePlan,
+    Recording,
+    Sensor,
+    origin_of,
+    read_recording,
+    write_recording,
+)
 from dsis.simulate import Shot, dark, flat, simulate, simulate_like, simulated_frames
 from folder_bytes import every_byte
 from simulated_stacks import (
@@ -325,3 +332,16 @@ class TestRefused:
         simulate(camera_of(), SHOTS, 8, 8, tmp_path / "r", progress=lambda *said: told.append(said))
         assert [done for done, _, _ in told] == list(range(1, 19))
         assert told[-1] == (18, 18, "colours")
+
+
+@pytest.mark.parametrize("mark", [None, "", "[]", "{}", '{"origin": 7}', '"text"', "{", "\xff\xfe"])
+def test_how_frames_came_about_is_known_or_not(tmp_path: Path, mark: str | None) -> None:
+    shots = [dark("d", frames=1, exposure_time_s=0.01)]
+    made = recorded(tmp_path / "made", shots)
+    assert origin_of(made).startswith("simulated from camera model")
+    place = made.folder / "provenance.json"
+    if mark is None:
+        place.unlink()
+    else:
+        place.write_bytes(mark.encode("latin-1"))
+    assert origin_of(made) == ""

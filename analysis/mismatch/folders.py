@@ -14,7 +14,7 @@ from analysis.mismatch.model import processes
 from dsis.camera import Camera, read_camera
 from dsis.cfa import Cfa
 from dsis.errors import Fault, InputError
-from dsis.recording import Recording, read_recording
+from dsis.recording import Recording, origin_of, read_recording
 from dsis.simulate.maps import MAPS, SensorMaps, owner_of, read_maps
 from dsis.workers import completed, workers
 
@@ -243,12 +243,17 @@ def _check_kept(camera_file: Path, folders: Iterable[Path]) -> None:
 
 
 def _origin(recording: Recording, camera_file: Path, seed: int, without: Sequence[str]) -> str:
-    """Return what was compared; the same files give the same words wherever they lie."""
+    """Return what was compared, and that frames are simulated where the recording says so.
+
+    The same files give the same words wherever they lie.
+    """
     sensor, name = recording.sensor.name, recording.folder.resolve().name
     frames = sum(len(exposure.frames) for exposure in recording.exposures)
+    made = origin_of(recording)
+    how = f"; {made}" if made else ""
     said = (
         f"Recording {name} of sensor {sensor} ({len(recording.exposures)} exposures, {frames} "
-        f"frames of {recording.columns} x {recording.rows} pixels) against {camera_file.name}"
+        f"frames of {recording.columns} x {recording.rows} pixels{how}) against {camera_file.name}"
     )
     left_out = f"; not allowed to be named: {', '.join(without)}" if without else ""
     return f"{said}\nSeed {seed}{left_out}"

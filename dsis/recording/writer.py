@@ -68,6 +68,16 @@ def write_recording(
     return read_recording(out)
 
 
+def origin_of(recording: Recording) -> str:
+    """Return how a recording's frames came about, as `write_recording` was told; "": not known."""
+    try:
+        mark = json.loads((recording.folder / PROVENANCE).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return ""
+    told = mark.get("origin", "") if isinstance(mark, dict) else ""
+    return told if isinstance(told, str) else ""
+
+
 def _write_frames(
     folder: Path,
     sensor: Sensor,

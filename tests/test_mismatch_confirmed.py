@@ -323,21 +323,26 @@ def test_what_no_frames_show_has_a_size_beyond_its_error(
 
 
 @pytest.mark.parametrize(
-    ("error", "left", "refused"),
+    ("error", "left", "of", "refused"),
     [
-        (0.81, 6.6, True),  # of 25 that it explains a quarter
-        (0.81, 5.0, False),
-        (0.81, 0.0, False),  # all else is explained
-        (0.4, 6.6, False),  # known by its size
-        (np.inf, 6.6, True),  # frames gain, and no number says by what size
-        (np.inf, 5.0, False),
+        (0.81, 6.6, "frame_variance", True),  # of 25 that it explains a quarter
+        (0.81, 5.0, "frame_variance", False),
+        (0.81, 0.0, "", False),  # all else is explained
+        (0.4, 6.6, "frame_variance", False),  # known by its size
+        (0.81, 6.6, "fixed_row_variance", False),  # that it leaves alone; its logarithm is told
+        (0.95, 6.6, "fixed_row_variance", True),
+        (np.inf, 6.6, "frame_variance", True),  # frames gain, and no number says by what size
+        (np.inf, 6.6, "fixed_row_variance", True),
+        (np.inf, 5.0, "frame_variance", False),
     ],
 )
-def test_an_effect_of_no_clear_size_leaves_little(error: float, left: float, refused: bool) -> None:
+def test_an_effect_of_no_clear_size_leaves_little(
+    error: float, left: float, of: str, refused: bool
+) -> None:
     """Flicker without its word is no drift of 0.99 +- 0.81, whatever frames gain by one."""
     own = effect("black_level_drift", sigma_dn=0.99)
     errors = {"sigma_dn": error}
-    proposal = Stub(free=("sigma_dn",), effect=own, errors={})
+    proposal = Stub(free=("sigma_dn",), effect=own, errors={}, signed=frozenset())
     named: Any = Stub(
         kind=own.kind, name=own.kind, effect=own, measured=False, errors=errors, proposal=proposal
     )
@@ -345,7 +350,7 @@ def test_an_effect_of_no_clear_size_leaves_little(error: float, left: float, ref
     values = np.array([26.0, 5.0, 1.0])  # one is explained, one overshot: of that 4 count
     null = Stub(mean=np.array([26.0, 40.0, 1.0]), sd=np.ones(3), known=np.ones(3, bool))
     state: Any = Stub(
-        mismatches=[Stub(statistic="frame_variance", z=-left)] if left else [],
+        mismatches=[Stub(statistic=of, z=-left)] if left else [],
         null=null,
         vector=Stub(values=values),
         predictor=lambda: Stub(mean=lambda _: without),

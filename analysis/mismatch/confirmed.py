@@ -1,6 +1,6 @@
 """What a search found, confirmed or dropped: by all frames together, and by the locked ones."""
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from dataclasses import replace
 from functools import partial
 from math import isfinite
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.mismatch.allframes import shown_by_all
-from analysis.mismatch.candidates import CANDIDATES
+from analysis.mismatch.candidates import CANDIDATES, calls_of
 from analysis.mismatch.explain import changes
 from analysis.mismatch.explaining import DOUBTFUL, hollow, idle, uncalled
 from analysis.mismatch.finding import Gain
@@ -20,7 +20,7 @@ from analysis.mismatch.judge import Judge
 from analysis.mismatch.locate import FAMILY
 from analysis.mismatch.model import side_by_side
 from analysis.mismatch.name import Search
-from analysis.mismatch.named import APART, Named, unclear, vague
+from analysis.mismatch.named import APART, Named, told_by_itself, unclear, vague
 from analysis.mismatch.relit import relit
 from analysis.mismatch.state import State
 from analysis.mismatch.trial import Gained, Trial, denied
@@ -144,16 +144,28 @@ def unsized(search: Search, everything: State) -> tuple[Named, str] | None:
 
 
 def _unsized(search: Search, state: State, named: Named) -> str:
-    """Return why an effect has no clear size, where much is left; empty: it has, or little is."""
+    """Return why an effect has no clear size, where much is left; empty: it has, or little is.
+
+    Where its logarithm is told, that is left of what calls for it alone: frames that wander are
+    none the less for rows that differ.
+    """
     if named.kind in LINES or named.measured or not (why := vague(named, APART, unknown=True)):
         return ""
-    much = _much_left(search, state, named)
+    calls = calls_of(named.kind) if told_by_itself(named) else None
+    much = _much_left(search, state, named, calls)
     return f"{why}, and much is left unexplained beside it" if much else ""
 
 
-def _much_left(search: Search, state: State, named: Named) -> bool:
-    """Return whether what is left is off by a quarter of what an effect explains, or more."""
-    left = max((abs(m.z) for m in state.mismatches), default=0.0)
+def _much_left(
+    search: Search, state: State, named: Named, calls: Container[str] | None = None
+) -> bool:
+    """Return whether what is left is off by a quarter of what an effect explains, or more.
+
+    Of the statistics `calls`; None: of all.
+    """
+    left = max(
+        (abs(m.z) for m in state.mismatches if calls is None or m.statistic in calls), default=0.0
+    )
     if not left or named.proposal is None:
         return False
     null, without = state.null, state.predictor().mean(search.without(state, named))

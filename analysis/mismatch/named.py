@@ -197,6 +197,23 @@ def vague(named: Named, errors: float = 1.0, *, unknown: bool = False) -> str:
     return f"no size of it exceeds {times}its standard error ({_said(sizes)})"
 
 
+def told_by_itself(named: Named) -> bool:
+    """Return whether a size is away from none by 1.96 errors of what was fitted, its logarithm.
+
+    Of few frames the size is never known well, however clear it is that they wander: 1.96 of its
+    own errors reach to the farther end of its interval.
+    """
+    effect, own = named.effect, named.proposal
+    if effect is None or own is None:
+        return False
+    sizes = {name: float(getattr(effect, name)) for name in own.free if name not in SHAPES}
+    return any(
+        _errors_of(value, named.errors.get(name, inf), signed=name in own.signed) >= APART
+        for name, value in sizes.items()
+        if isfinite(named.errors.get(name, inf))
+    )
+
+
 def _said(sizes: Mapping[str, tuple[float, float]]) -> str:
     return ", ".join(
         f"{name.replace('_', ' ')} {value:.3g} ± {error:.2g}"

@@ -94,7 +94,6 @@ def test_sensitivity_and_ground_are_no_bend() -> None:
     assert np.abs(sums).max() < 4
 
 
-@pytest.mark.long
 def test_chance_bends_no_level_more_often_than_it_should() -> None:
     seen = []
     for seed in range(10, 18):

@@ -197,7 +197,6 @@ def _found(true: Camera, words: frozenset[str]) -> Finding:
     return find_mismatch(camera(), recording, seed=1, vocabulary=words)
 
 
-@pytest.mark.long
 def test_lines_that_have_not_settled_are_named_with_their_numbers() -> None:
     own = {"offset_dn": -1.4, "gain_percent": 1.4, "length_pixels": 5.0}
     true = camera(effect("line_settling", edge="right", **own))

@@ -88,7 +88,6 @@ def test_the_unit_of_a_map_says_nothing(scale: float) -> None:
     assert evidences(scale * image) == pytest.approx(evidences(image))
 
 
-@pytest.mark.long
 def test_noise_has_odds_no_oftener_than_one_in_so_many() -> None:
     """Noise of lines beside it, in half of the maps."""
     rng, tries = np.random.default_rng(3), 120

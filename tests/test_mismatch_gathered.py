@@ -50,7 +50,6 @@ def test_noise_of_a_place_stays_unexplained(where: str) -> None:
     assert any(f"pixels of one {where} are noisy alike" in one for one in found.remarks)
 
 
-@pytest.mark.long
 def test_noise_of_pixels_is_named() -> None:
     """Light that falls off by 30 % makes shot noise a matter of place as well."""
     spread = np.exp(0.15 * np.random.default_rng(2).standard_normal((64, 80)))

@@ -19,7 +19,10 @@ SURE = 5.0  # standard errors
 def test_what_is_kept_of_a_wave_at_any_frequency(across: float, down: float, sign: int) -> None:
     """Without noise: of bins and halves of them it may be little more than half."""
     own = wave(np.random.default_rng(1), across / COLUMNS, sign * down / ROWS, 1.0)
-    kept = Kept(np.fft.rfft2(own - own[0])[1:], 1 / (own[0].size * (FRAMES - 1)))
+    even = [np.ones((ROWS, COLUMNS))]
+    kept = Kept.of(
+        list(np.fft.rfft2(own - own[0])[1:]), 1 / (own[0].size * (FRAMES - 1)), 1.0, even
+    )
     fine = np.zeros((2 * ROWS, COLUMNS + 2))
     fine[round(2 * sign * down) % (2 * ROWS), round(2 * across)] = 1.0
     found = highest([kept], fine, COLUMNS, 1)
@@ -64,3 +67,29 @@ def test_chances_are_chances() -> None:
     past = logs[heights > 1.5]
     assert (np.diff(past) <= 1e-12).all()
     assert past[-1] < norm.logsf(15)
+
+
+@pytest.mark.parametrize("amplitude", [0.6, 1.5, 4.0])
+def test_a_checkerboard_is_none_of_the_waves_about_it(amplitude: float) -> None:
+    """Of whatever strength: about places that are high by chance it must not be seen."""
+    board = (-1.0) ** np.add.outer(np.arange(ROWS), np.arange(COLUMNS))
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        stack = noise(rng) + amplitude * rng.choice([-1, 1], (FRAMES, 1, 1)) * board
+        assert summed([stack], Cfa.MONO, keep=True).number()[0] < 3.5
+
+
+@pytest.mark.parametrize("cfa", [Cfa.MONO, Cfa.RGGB])
+@pytest.mark.parametrize("uneven", ["middle", "fall", "left"])
+def test_of_many_frames_uneven_noise_is_no_wave(uneven: str, cfa: Cfa) -> None:
+    """Few bins see most of the middle of the sensor: so much for each frame."""
+    y, x = (np.linspace(-1, 1, size) for size in (ROWS, COLUMNS))
+    square = np.add.outer(y**2, x**2)
+    variance = {
+        "middle": 1 + 2 * np.exp(-4 * square),
+        "fall": 1 - 0.3 * square,
+        "left": np.where(x < -0.8, 4.0, 1.0) + 0 * square,
+    }[uneven]
+    rng = np.random.default_rng(5)
+    stacks = [1000 + np.sqrt(variance) * rng.normal(0, 1, (60, ROWS, COLUMNS)) for _ in range(10)]
+    assert summed(stacks, cfa, keep=True).number()[0] < 3.0

@@ -35,7 +35,7 @@ def omitted_effect(named: Named, why: tuple[str, ...], gain: Gain, final: State)
                 parameters[name] = FittedParameter(value, named.proposal.errors.get(name, least))
             elif isinstance(value, (int, float)) and not isinstance(value, bool):
                 error = _error(named, named.proposal, name)
-                if value or error:
+                if value or 0 < error < np.inf:
                     parameters[name] = FittedParameter(float(value), error)
     else:
         switch = as_settled(final.calibrated, named.switch_dn, named.errors["switch_dn"])

@@ -134,9 +134,8 @@ class SensorSums:
 
     def looked(self, exposure: str, frames: int, seen: Iterable[NDArray[np.generic]]) -> "Looked":
         """Return what an exposure's frames show; nothing is summed yet."""
-        few = self.shape[0] * self.shape[1] <= _MANY_PIXELS and not self.layout.large
-        lines, after = Waves(self.shape, keep=few), CarryOver(keep=self.samples)
-        cells = Periods()
+        lines = Waves(self.shape, keep=self.layout.keeps_amplitudes)
+        after, cells = CarryOver(keep=self.samples), Periods()
         if SPECTRA not in self.made:
             lines.frames = frames
         else:

@@ -24,6 +24,7 @@ from dsis.exposing import Shared, link_numbers
 R = TypeVar("R")
 _MOST_BYTES = 640 << 20  # in each process, of all cameras that are looked at together
 _PIXEL_BYTES = 192  # a pixel: sums over frames and exposures, images that links made
+_SAMPLE_BYTES = 4  # amplitudes of frames, where they are kept
 _LARGEST_CODE = 65535
 Work = tuple[Sequence[tuple[Model, frozenset[str]]], int]
 """Models, what of each is made (see `observe`), and the number of the replicate."""
@@ -32,8 +33,10 @@ Work = tuple[Sequence[tuple[Model, frozenset[str]]], int]
 def most_together(layout: Layout) -> int:
     """Return of how many cameras recordings may be simulated side by side."""
     pixels = layout.rows * layout.columns
-    frames = max((len(e.numbers) for e in layout.uniform), default=0)
-    return max(_MOST_BYTES // (pixels * (_PIXEL_BYTES + 2 * frames)), 1)
+    frames = [len(e.numbers) for e in layout.uniform]
+    kept = _SAMPLE_BYTES * sum(frames) if layout.keeps_amplitudes else 0
+    of_pixel = _PIXEL_BYTES + 2 * max(frames, default=0) + kept
+    return max(_MOST_BYTES // (pixels * of_pixel), 1)
 
 
 def simulated_together(

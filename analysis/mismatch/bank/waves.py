@@ -173,7 +173,8 @@ class WaveSums:
         if self.taken:
             waves.add_to(self.power, weight / white)
             if waves.kept:
-                own = Kept(np.stack(waves.kept), waves.per_bin(weight / white))
+                maps = [channel.variance_map for channel in channels.values()]
+                own = Kept.of(waves.kept, waves.per_bin(weight / white), weight / white, maps)
                 self._kept.append(own)
         self.weight += weight
         self.squares += weight**2 / seen
@@ -191,7 +192,8 @@ class WaveSums:
 
         Of the least of so many chances, as of independent ones (Sidak, 1967): it is standard normal
         in white noise, and its upper tail, by which a line is told, no lighter than that. Where
-        amplitudes of frames are kept, of the largest power at any frequency.
+        amplitudes of frames are kept, of the largest power at any frequency: of that the upper tail
+        is normal.
         """
         seen = self._told()
         parts = [part for part in _by_place(self.power, seen) if part.size]
@@ -214,7 +216,7 @@ class WaveSums:
         return score_of_log(any_of(least, len(parts))), 1.0
 
     def _top(self) -> Top | None:
-        """Return where the power at any frequency is largest; None: no amplitudes were kept."""
+        """Return where the power at any frequency is largest; None: that is not known."""
         if self._highest is None and self._kept:
             fine = self._fine(self._told())
             if fine is not None:

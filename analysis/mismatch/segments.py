@@ -1,6 +1,6 @@
 """A second read-out path that the camera model does not have: dual gain."""
 
-from collections.abc import Container, Sequence
+from collections.abc import Container, Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import inf, isclose, log, nan, sqrt
@@ -28,6 +28,7 @@ _SPIKY = 10.0  # standard errors from which tails bend the variances
 _TAILS = frozenset({"kurtosis", "kurtosis_within_pixels", "one_off_outliers"})
 _ROUNDS = 4  # of weights of a fit
 _PENALTY = 4.0  # two numbers, and the choice among the gaps
+_ALIKE, _LEAST_DN = 1.02, 1.0  # times a signal; both greens of a mosaic have one
 
 
 @dataclass(frozen=True)
@@ -64,16 +65,13 @@ def second_path(state: State, beside: Array | None = None) -> Path | None:
     if len(calibrated.switches) > 0:
         return None
     misshapen, unfitted = _misshapen(state), calibrated.left_out | {name for name, _ in _cut(state)}
-    means = sorted(
-        {
-            round(float(np.mean([calibrated.fit.signal_dn[e.name, c] for c in layout.channels])), 3)
-            for e in layout.uniform
-            if e.name not in unfitted
-        }
-    )
+    # The exposure that is left out of fits tells where in a gap the switch lies.
+    seen = [e.name for e in layout.uniform if e.name not in unfitted - {state.setting.interpolated}]
+    signals = calibrated.fit.signal_dn
+    levels = _apart(signals[name, channel] for name in seen for channel in layout.channels)
     paths = [
         path
-        for low, high in pairwise(means[1:-1])
+        for low, high in pairwise(levels[1:-1])
         if not _elsewhere(state, misshapen, (low, high))
         and (path := _path(state, low, high, mean)) is not None
     ]
@@ -85,6 +83,15 @@ def second_path(state: State, beside: Array | None = None) -> Path | None:
     chances = np.exp([path.gain - best.gain for path in paths])
     squares = [path.error_dn**2 + (path.switch_dn - best.switch_dn) ** 2 for path in paths]
     return replace(best, error_dn=sqrt(float(np.average(squares, weights=chances))))
+
+
+def _apart(signals: Iterable[float]) -> list[float]:
+    """Return signals, ascending, of those that are alike the least: colours differ."""
+    found: list[float] = []
+    for own in sorted(round(float(signal), 3) for signal in signals):
+        if not found or own > max(found[-1], _LEAST_DN) * _ALIKE:
+            found.append(own)
+    return found
 
 
 def explained(state: State, mean: Array) -> float:

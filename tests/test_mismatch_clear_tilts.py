@@ -44,3 +44,10 @@ def test_uneven_light_that_the_model_has_is_a_match(seed: int) -> None:
     true = camera(registry()["shading"](falloff_percent=0.0, tilt_down_percent=-1.5))
     found = find_mismatch(true, recorded(true, seed), seed=1, vocabulary=frozenset())
     assert found.verdict == "match"
+
+
+def test_a_map_whose_pixels_are_all_alike_is_no_error() -> None:
+    """As of frames that a limit cuts off altogether."""
+    numbers = parts(np.full((48, 64), 3.0), 1.0).numbers
+    assert not any(np.isinf(value) for value, _ in numbers.values())
+    assert numbers["fixed_pixel_variance"][0] == pytest.approx(0, abs=1e-6)

@@ -154,3 +154,19 @@ def test_steep_maps_push_none_below(shape: str, seed: int) -> None:
     state.setting.seen.images["MONO", "offset"] = (image, 1.0)
     state.camera.effect = (HOT,)
     assert jumped(state, HOT) is None
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("tails", [True, False])
+def test_offsets_of_heavy_tails_are_no_hot_pixels(seed: int, *, tails: bool) -> None:
+    """Of few that stand out a little: as many lie below; hot ones of one time all lie above."""
+    rng = np.random.default_rng(seed)
+    image = rng.normal(0, 1, (96, 128))
+    few = rng.choice(image.size, 24, replace=False)
+    image.flat[few] = rng.uniform(3.6, 4.6, 24) * (
+        np.where(np.arange(24) % 2, 1, -1) if tails else 1
+    )
+    state = _state((0.01,), 0.0)
+    state.camera.effect = (HOT,)
+    state.setting.seen.images = {("MONO", "offset"): (image, 1.0)}
+    assert (jumped(state, HOT) is not None) == tails

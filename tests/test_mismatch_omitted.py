@@ -6,10 +6,11 @@ from typing import Any
 import pytest
 
 from analysis.mismatch.candidates import Proposal
-from analysis.mismatch.finding import Gain
+from analysis.mismatch.finding import FittedParameter, Gain
 from analysis.mismatch.jsonfile import _fitted
 from analysis.mismatch.named import Named
 from analysis.mismatch.omitted import omitted_effect
+from analysis.mismatch.report.sentences import fitted
 from dsis.effects import registry
 
 STATE: Any = None
@@ -64,3 +65,10 @@ def test_a_rival_that_came_near_says_what_would_settle_it() -> None:
     (rival,) = found.alternatives
     assert rival.why_not == "explains the numbers 4 nats worse"
     assert rival.would_settle
+
+
+def test_a_value_that_was_taken_is_said_to_be_not_measured() -> None:
+    assert fitted("switch_probability", FittedParameter(0.1, math.inf)) == (
+        "switch probability 0.1 (not measured)"
+    )
+    assert fitted("spread_percent", FittedParameter(0.5, 0.1)) == "spread 0.50 ± 0.10 %"

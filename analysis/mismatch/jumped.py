@@ -1,9 +1,10 @@
 """Pixels that stand out in the dark, and may be some that jump but stay where they are."""
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import norm
 
 from analysis.mismatch.bank.parts import parts
 from analysis.mismatch.contradicted import Denial
@@ -17,6 +18,7 @@ from dsis.effects.rts import Rts
 
 Array = NDArray[np.float64]
 _CLEAR, _BELOW = 5.0, -4.0  # standard deviations of a map's noise: of all pixels, of few
+_LESS = 3.5
 _MOST, _FEWEST = 0.5, 3  # of those that stand out
 _SHORT, _SHARE = 0.2, 0.3  # of the longest time; of what a pixel grows by in that
 
@@ -60,18 +62,24 @@ def _both_ways(state: State) -> bool:
     deviations makes the means of its lines higher, and the others seem lower.
     """
     maps = first_maps(state, ("time", "offset")).values()
-    return _in_both(heights(parts(*own).pixels, 1.0) for own in maps) and _in_both(
-        heights(_single(image), noise) for image, noise in maps
+    return _in_both([heights(parts(*own).pixels, 1.0) for own in maps]) and _in_both(
+        [heights(_single(image), noise) for image, noise in maps]
     )
 
 
-def _in_both(maps: Iterable[Array]) -> bool:
-    """Return whether heights are far below in half as many places as above, or in more."""
-    above = below = 0
-    for height in maps:
-        above += int((height > _CLEAR).sum())
-        below += int((height < -_CLEAR).sum())
-    return below >= max(_MOST * above, _FEWEST)
+def _in_both(maps: Sequence[Array]) -> bool:
+    """Return whether heights are far below in half as many places as above, or in more.
+
+    Where few are so far out that tells less than more that are less far, beyond what chance has.
+    """
+    for clear in (_CLEAR, _LESS):
+        chance = float(norm.sf(clear)) * sum(height.size for height in maps)
+        above, below = (
+            sum(int((sign * height > clear).sum()) for height in maps) - chance for sign in (1, -1)
+        )
+        if below >= max(_MOST * above, _FEWEST):
+            return True
+    return False
 
 
 def _single(image: Array) -> Array:

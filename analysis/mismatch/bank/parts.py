@@ -19,6 +19,7 @@ from dsis.measures.residuals import pixel_residuals
 Array = NDArray[np.float64]
 _FAR_OUT, _FEW = 5.0, 0.01  # standard deviations of single pixels, and their share at most
 _CHANCE = 3.0  # standard errors of a mean square
+_LEAST = 1e-30  # square of a pixel, in units of its noise: all may be alike
 STANDING_OUT = (3.5, 5.0, 8.0)  # standard deviations of a map above its middle
 OUTLYING = tuple(f"outlying_pixels of {limit:g}" for limit in STANDING_OUT)
 
@@ -59,13 +60,13 @@ def parts(image: Array, noise: float) -> Parts:
         unit, smooth.weights(coefficients), smooth.across
     )
     dof = (n - 1) * (m - 1) - smooth.kinds
-    square = squares / dof
+    square = max(squares / dof, _LEAST)
     rows = by_row - smooth.along_rows @ (smooth.along_rows.T @ by_row)
     columns = by_column - smooth.along_columns @ (smooth.along_columns.T @ by_column)
     degree = smooth.degree
     row = m * float(rows @ rows) / (n - 1 - degree)
     column = n * float(columns @ columns) / (m - 1 - degree)
-    mean_square, sd = squares / pixels.size, sqrt(square)
+    mean_square, sd = max(squares / pixels.size, _LEAST), sqrt(square)
     *above, far = _above(pixels, sd, *STANDING_OUT, _FAR_OUT)
     lines = (
         sure_of_lines(row, square, n - 1 - degree),

@@ -119,9 +119,12 @@ def fitted(name: str, parameter: FittedParameter) -> str:
     """Return a parameter with its standard error and unit, `sigma 3.20 ± 0.10 DN` say."""
     values = np.ravel(parameter.value)
     errors = np.broadcast_to(np.ravel(parameter.standard_error), values.shape)
-    numbers = [measured(float(v), float(e)) for v, e in zip(values, errors, strict=True)]
+    known = [float(e) if isfinite(e) else 0.0 for e in errors]
+    numbers = [measured(float(v), e) for v, e in zip(values, known, strict=True)]
     text = numbers[0] if len(numbers) == 1 else f"({', '.join(numbers)})"
-    return " ".join(part for part in (parameter_words(name), text, unit(name)) if part)
+    not_measured = "" if np.isfinite(errors).all() else "(not measured)"
+    said = (parameter_words(name), text, unit(name), not_measured)
+    return " ".join(part for part in said if part)
 
 
 def effect_label(effect: OmittedEffect) -> str:

@@ -96,6 +96,22 @@ def evidence_beside(image: Array, cause: Cause, other: Cause) -> float:
     return float(both - by_strength[which][strength])
 
 
+def alone(image: Array, cause: Cause) -> tuple[float, float]:
+    """Return the log evidence of a cause without a field, as `evidences`, and what one adds to it.
+
+    That is relative to the cause alone; a field is as likely there as not.
+    """
+    own = _modes(image)
+    if own is None:
+        return -np.inf, np.inf
+    none = own.base - own.seen.size / 2 * np.log(own.squares)
+    terms = np.array([own.base[:, None] + _with(one, own) for one in _shapes(*own.shape)[cause]])
+    plain, beside = (float(logsumexp(some)) for some in np.split(terms, [own.whites], axis=1))
+    plain -= np.log(len(terms) * _COUNT)
+    beside -= np.log(len(terms) * _COUNT)
+    return plain - float(logsumexp(none[: own.whites])), beside - plain
+
+
 @dataclass(frozen=True)
 class _Modes:
     """Modes of a map, those of rows and columns first, and what noise and fields make of them.

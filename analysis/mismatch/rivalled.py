@@ -1,16 +1,21 @@
 """Uneven light, halves and decays that another cause of an uneven gain explains as well."""
 
+import numpy as np
+from numpy.typing import NDArray
+
 from analysis.mismatch.contradicted import Denial, rival
 from analysis.mismatch.edged import settles
 from analysis.mismatch.gainmap import gains_beside
-from analysis.mismatch.gainodds import Cause, evidence_beside, evidences
+from analysis.mismatch.gainodds import Cause, alone, evidence_beside, evidences
 from analysis.mismatch.rank import TOLD_APART
 from analysis.mismatch.state import State
 from dsis.effects import Effect
 from dsis.effects.line_settling import LineSettling
 from dsis.effects.shading import Shading
+from dsis.effects.smooth_prnu import SmoothPrnu
 from dsis.effects.tap_mismatch import TapMismatch
 
+Array = NDArray[np.float64]
 _HALVES = {"top_bottom": Cause.HALVES_OF_ROWS, "left_right": Cause.HALVES_OF_COLUMNS}
 _EDGES = {"top": Cause.TOP, "bottom": Cause.BOTTOM, "left": Cause.LEFT, "right": Cause.RIGHT}
 
@@ -23,13 +28,15 @@ def rivalled(state: State, effect: Effect) -> Denial | None:
     20, and beside it the effect is no likelier than nothing, it is not told from that. Of a decay
     of the gain with an offset that is sure, nothing is asked: lines do settle at that edge.
     """
-    cause = _cause(state, effect)
+    cause = Cause.FIELD if isinstance(effect, SmoothPrnu) else _cause(state, effect)
     if cause is None:
         return None
     others = [own for own in state.camera.effect if own != effect]
     image = gains_beside(state.clues(), others)
     if image is None:
         return None
+    if cause is Cause.FIELD:
+        return _no_field(image)
     found = evidences(image)
     for other in sorted(found, key=lambda one: -found[one]):
         behind = found[other] - found[cause]
@@ -38,6 +45,21 @@ def rivalled(state: State, effect: Effect) -> Denial | None:
         if other is not Cause.FIELD:  # which may be beside the effect as it is
             behind = -evidence_beside(image, cause, other)
         if behind > -TOLD_APART:
+            return rival(behind, f"its map of gains may as well be {other.value}")
+    return None
+
+
+def _no_field(image: Array) -> Denial | None:
+    """Return how gains that neighbours share are denied by halves alone; None: they are not.
+
+    Where these are seen, as likely as a field without them, and one beside them no likelier than
+    none, there may be none: a long field has no step where parts of the sensor meet.
+    """
+    found = evidences(image)
+    for other in _HALVES.values() if found else ():
+        plain, beside = alone(image, other)
+        behind = plain - found[Cause.FIELD]
+        if plain > TOLD_APART and behind > -TOLD_APART and beside < TOLD_APART:
             return rival(behind, f"its map of gains may as well be {other.value}")
     return None
 

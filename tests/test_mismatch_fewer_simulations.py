@@ -59,7 +59,9 @@ def test_recordings_made_ahead_are_those_that_are_asked_for(
 
     monkeypatch.setattr("analysis.mismatch.simulations.each", each)
     model: Any = SimpleNamespace(with_camera=lambda own: SimpleNamespace(camera=own), camera=one)
-    layout: Any = SimpleNamespace(cfa=Cfa.MONO, rows=4, columns=6, uniform=())
+    layout: Any = SimpleNamespace(
+        cfa=Cfa.MONO, rows=4, columns=6, uniform=(), keeps_amplitudes=False
+    )
     made = Simulations(layout, model, np.array, 0, 2)
     made.keep(one, [np.array((one.black_level, 0))])
     made.ready([one, other], 3)

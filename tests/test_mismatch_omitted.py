@@ -29,11 +29,14 @@ def _made(
     return omitted_effect(named, ("level",), GAIN, STATE)
 
 
-def test_a_term_that_is_no_part_of_an_effect_has_no_entry() -> None:
+def test_a_term_that_is_no_part_of_an_effect_is_none_without_an_error() -> None:
     found = _made(
         "shading", ("falloff_percent",), {"falloff_percent": 0.02}, {}, falloff_percent=0.4
     )
-    assert set(found.parameters) == {"falloff_percent"}
+    assert found.parameters.pop("falloff_percent").standard_error == 0.02
+    assert found.parameters
+    for term in found.parameters.values():
+        assert (term.value, term.standard_error) == (0, 0)
     fitted_to_none = _made(
         "shading",
         ("falloff_percent", "tilt_down_percent"),

@@ -45,7 +45,9 @@ def made(monkeypatch: pytest.MonkeyPatch) -> list[tuple[float, int]]:
 
 
 def simulations(jobs: int) -> Simulations:
-    layout: Any = SimpleNamespace(cfa=Cfa.MONO, rows=4, columns=6, uniform=())
+    layout: Any = SimpleNamespace(
+        cfa=Cfa.MONO, rows=4, columns=6, uniform=(), keeps_amplitudes=False
+    )
     return Simulations(layout, Model(CAMERAS[0], {}), np.array, 1, jobs)
 
 

@@ -17,8 +17,8 @@ _TAKEN = frozenset({"switch_probability"})  # one of few values is taken where f
 def omitted_effect(named: Named, why: tuple[str, ...], gain: Gain, final: State) -> OmittedEffect:
     """Return an effect with its parameters, statistics that it explains, gain and alternatives.
 
-    A term of size 0 that was not fitted is no part of it. A value that was taken, and not fitted,
-    may be any: its error is infinite.
+    A term of size 0 that was not fitted, with an error of 0, is no part of it. A value that was
+    taken, and not fitted, may be any: its error is infinite.
     """
     parameters, choices = {}, {}
     if named.proposal is not None:
@@ -35,8 +35,7 @@ def omitted_effect(named: Named, why: tuple[str, ...], gain: Gain, final: State)
                 parameters[name] = FittedParameter(value, named.proposal.errors.get(name, least))
             elif isinstance(value, (int, float)) and not isinstance(value, bool):
                 error = _error(named, named.proposal, name)
-                if value or 0 < error < np.inf:
-                    parameters[name] = FittedParameter(float(value), error)
+                parameters[name] = FittedParameter(float(value), error)
     else:
         switch = as_settled(final.calibrated, named.switch_dn, named.errors["switch_dn"])
         parameters["switch_dn"] = FittedParameter(*switch)

@@ -7,7 +7,7 @@ import pytest
 from scipy.ndimage import gaussian_filter
 
 from analysis.mismatch import rivalled as told
-from analysis.mismatch.gainodds import Cause, alone, evidences
+from analysis.mismatch.gainodds import Cause, evidences, without_field
 from dsis.effects.smooth_prnu import SmoothPrnu
 
 SHAPE = (96, 128)
@@ -47,11 +47,11 @@ def test_halves_alone_deny_a_field(
         assert "a left and a right part" in denial.why
 
 
-def test_a_cause_alone_and_with_a_field_make_up_what_evidences_say() -> None:
+def test_what_is_alone_and_what_is_beside_make_up_what_evidences_say() -> None:
     image = np.random.default_rng(1).normal(size=SHAPE) + _halves(0.1) + _field(1, 0.08)
-    for cause in (Cause.LIGHT, Cause.HALVES_OF_COLUMNS, Cause.TOP):
-        plain, beside = alone(image, cause)
-        nothing = alone(np.zeros(SHAPE), cause)
-        assert nothing == (-np.inf, np.inf)
-        # Relative to none in both; that of `evidences` is of both, with and without.
-        assert np.logaddexp(plain, plain + beside) == pytest.approx(evidences(image)[cause])
+    causes = (Cause.LIGHT, Cause.HALVES_OF_COLUMNS, Cause.TOP)
+    both = evidences(image)  # with a field or without
+    for cause, odds in without_field(image, causes).items():
+        assert odds.seen - odds.behind == pytest.approx(both[Cause.FIELD])
+        assert np.logaddexp(odds.seen, odds.seen + odds.beside) == pytest.approx(both[cause])
+    assert without_field(np.zeros(SHAPE), causes) == {}

@@ -7,7 +7,7 @@ noise of unknown size, so that its evidence is known in closed form: what has mo
 from explains by chance more, and pays for it.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property, lru_cache
@@ -96,20 +96,33 @@ def evidence_beside(image: Array, cause: Cause, other: Cause) -> float:
     return float(both - by_strength[which][strength])
 
 
-def alone(image: Array, cause: Cause) -> tuple[float, float]:
-    """Return the log evidence of a cause without a field, as `evidences`, and what one adds to it.
+@dataclass(frozen=True)
+class Alone:
+    """Log evidence of a cause without a field: relative to none and to a field without it."""
 
-    That is relative to the cause alone; a field is as likely there as not.
+    seen: float
+    behind: float
+    beside: float
+    """What a field beside it adds, relative to the cause alone."""
+
+
+def without_field(image: Array, causes: Iterable[Cause]) -> dict[Cause, Alone]:
+    """Return the log evidence of causes without a field, as `evidences`.
+
+    Nothing is said of a map that is too small, or without noise.
     """
     own = _modes(image)
     if own is None:
-        return -np.inf, np.inf
-    none = own.base - own.seen.size / 2 * np.log(own.squares)
-    terms = np.array([own.base[:, None] + _with(one, own) for one in _shapes(*own.shape)[cause]])
-    plain, beside = (float(logsumexp(some)) for some in np.split(terms, [own.whites], axis=1))
-    plain -= np.log(len(terms) * _COUNT)
-    beside -= np.log(len(terms) * _COUNT)
-    return plain - float(logsumexp(none[: own.whites])), beside - plain
+        return {}
+    by_noise = own.base - own.seen.size / 2 * np.log(own.squares)
+    none, field = (float(logsumexp(some)) for some in np.split(by_noise, [own.whites]))
+    shapes, found = _shapes(*own.shape), {}
+    for cause in causes:
+        terms = np.array([own.base[:, None] + _with(one, own) for one in shapes[cause]])
+        plain, beside = (float(logsumexp(some)) for some in np.split(terms, [own.whites], axis=1))
+        own_odds = plain - np.log(len(terms) * _COUNT)
+        found[cause] = Alone(own_odds - none, own_odds - field, beside - plain)
+    return found
 
 
 @dataclass(frozen=True)

@@ -17,8 +17,7 @@ from dsis.effects.hot_pixels import HotPixels
 from dsis.effects.rts import Rts
 
 Array = NDArray[np.float64]
-_CLEAR, _BELOW = 5.0, -4.0  # standard deviations of a map's noise: of all pixels, of few
-_LESS = 3.5
+_CLEAR, _LESS, _BELOW = 5.0, 3.5, -4.0  # of a map's noise: far out, less far; below, of few
 _MOST, _FEWEST = 0.5, 3  # of those that stand out
 _SHORT, _SHARE = 0.2, 0.3  # of the longest time; of what a pixel grows by in that
 

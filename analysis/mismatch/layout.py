@@ -17,7 +17,8 @@ from dsis.grid import PixelGrid
 
 _grid = lru_cache(maxsize=8)(PixelGrid)  # fields are found sooner by the very same grid
 _LARGE = 2.5e7  # samples
-_FEW, _MANY_PIXELS = 16, 2e5  # lines, pixels
+_FEW_LINES = 16
+MANY_PIXELS = 2e5  # of a frame, of which more than neighbours would take long
 _OF_FULL = 1e-9  # of the weight of a flat whose pixels are full: it says nothing of gains
 Place = tuple[str, str]
 """Exposure and channel; of a scene also channel and bin of signal."""
@@ -117,7 +118,7 @@ class Layout:
     def keeps_amplitudes(self) -> bool:
         """Whether amplitudes of all frames are kept, 4 bytes a sample: of few, of many bins."""
         rows, columns = self.rows, self.columns
-        return min(rows, columns) >= _FEW and rows * columns <= _MANY_PIXELS and not self.large
+        return min(rows, columns) >= _FEW_LINES and rows * columns <= MANY_PIXELS and not self.large
 
     @property
     def channels(self) -> tuple[str, ...]:

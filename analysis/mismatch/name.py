@@ -281,11 +281,7 @@ class Search(Choice):
             return True
         if named.kind == "rts" and why.startswith((NEEDLESS, LITTLE)) and self._jumping:
             return True  # numbers of few pixels scatter
-        if (
-            named.kind == "read_noise_spread"
-            and why.startswith((NEEDLESS, LITTLE))
-            and self._spreads
-        ):
+        if named.kind == _SPREAD and why.startswith((NEEDLESS, LITTLE)) and self._spreads:
             return True  # and that of all others is lost in it
         if why != NEEDLESS or (own := named.proposal) is None:
             return False

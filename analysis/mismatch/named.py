@@ -112,11 +112,10 @@ def unclear(named: Named, *, at_random: bool = False) -> str:
     if named.plain is not None and not unclear(_plain(named, *named.plain), at_random=at_random):
         return ""
     clear = APART if effect.draws else _CLEAR
-    free = named.proposal.free
     sizes = {
-        name: (float(getattr(effect, name)), named.errors.get(name, inf))
-        for name in free
-        if name not in SHAPES and not _sure(named, effect, _FAR_FROM_LEVELS.get(name, ""))
+        name: own
+        for name, own in _sizes(named).items()
+        if not _sure(named, effect, _FAR_FROM_LEVELS.get(name, ""))
     }
     signed = named.proposal.signed
     if not sizes or any(
@@ -180,14 +179,7 @@ def vague(named: Named, errors: float = 1.0, *, unknown: bool = False) -> str:
 
     Where the error of one is not known nothing is said, unless what is `unknown` counts as none.
     """
-    effect = named.effect
-    if named.proposal is None or effect is None:
-        return ""
-    sizes = {
-        name: (float(getattr(effect, name)), named.errors.get(name, inf))
-        for name in named.proposal.free
-        if name not in SHAPES
-    }
+    sizes = _sizes(named)
     if not sizes or any(
         abs(value) >= errors * error if isfinite(error) else not unknown
         for value, error in sizes.values()
@@ -203,15 +195,23 @@ def told_by_itself(named: Named) -> bool:
     Of few frames the size is never known well, however clear it is that they wander: 1.96 of its
     own errors reach to the farther end of its interval.
     """
+    signed = () if named.proposal is None else named.proposal.signed
+    return any(
+        isfinite(error) and _errors_of(value, error, signed=name in signed) >= APART
+        for name, (value, error) in _sizes(named).items()
+    )
+
+
+def _sizes(named: Named) -> dict[str, tuple[float, float]]:
+    """Return free sizes, which are no shapes, and their errors; infinite: not known."""
     effect, own = named.effect, named.proposal
     if effect is None or own is None:
-        return False
-    sizes = {name: float(getattr(effect, name)) for name in own.free if name not in SHAPES}
-    return any(
-        _errors_of(value, named.errors.get(name, inf), signed=name in own.signed) >= APART
-        for name, value in sizes.items()
-        if isfinite(named.errors.get(name, inf))
-    )
+        return {}
+    return {
+        name: (float(getattr(effect, name)), named.errors.get(name, inf))
+        for name in own.free
+        if name not in SHAPES
+    }
 
 
 def _said(sizes: Mapping[str, tuple[float, float]]) -> str:

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from analysis.mismatch.contradicted import Denial, rival
 from analysis.mismatch.edged import settles
 from analysis.mismatch.gainmap import gains_beside
-from analysis.mismatch.gainodds import Cause, alone, evidence_beside, evidences
+from analysis.mismatch.gainodds import Cause, evidence_beside, evidences, without_field
 from analysis.mismatch.rank import TOLD_APART
 from analysis.mismatch.state import State
 from dsis.effects import Effect
@@ -55,12 +55,11 @@ def _no_field(image: Array) -> Denial | None:
     Where these are seen, as likely as a field without them, and one beside them no likelier than
     none, there may be none: a long field has no step where parts of the sensor meet.
     """
-    found = evidences(image)
-    for other in _HALVES.values() if found else ():
-        plain, beside = alone(image, other)
-        behind = plain - found[Cause.FIELD]
-        if plain > TOLD_APART and behind > -TOLD_APART and beside < TOLD_APART:
-            return rival(behind, f"its map of gains may as well be {other.value}")
+    found = without_field(image, _HALVES.values())
+    for other in sorted(found, key=lambda one: -found[one].behind):
+        odds = found[other]
+        if odds.seen > TOLD_APART > odds.beside and odds.behind > -TOLD_APART:
+            return rival(odds.behind, f"its map of gains may as well be {other.value}")
     return None
 
 

@@ -24,14 +24,13 @@ from analysis.mismatch.bank.periods import NUMBER, PLACE, Periods, PeriodSums
 from analysis.mismatch.bank.persistent import VarianceSums
 from analysis.mismatch.bank.scalars import Number
 from analysis.mismatch.bank.waves import Waves, WaveSums, of_sensor
-from analysis.mismatch.layout import Layout
+from analysis.mismatch.layout import MANY_PIXELS, Layout
 from analysis.mismatch.touches import ALL_SUMS, CARRY_OVER, NEIGHBOURS, SPECTRA
 from dsis.measures import Accumulator, Channel, Measured
 from dsis.measures.accumulator import AT_ONCE, LAGS
 from dsis.measures.plane import Transforms
 
 _FEW_LAGS = 2  # of neighbours: the bank asks for no farther ones
-_MANY_PIXELS = 2e5  # of which farther ones would take long
 _SMALL_PIXELS = 2**15  # of frames that are looked at together
 
 
@@ -46,7 +45,7 @@ def measure(
     `made` are those of `ALL_SUMS` that are.
     """
     size, codes = (layout.rows, layout.columns), (layout.black_dn, layout.white_dn)
-    lags = _FEW_LAGS if layout.rows * layout.columns > _MANY_PIXELS else LAGS
+    lags = _FEW_LAGS if layout.rows * layout.columns > MANY_PIXELS else LAGS
     sums = Accumulator(
         *size,
         layout.cfa,

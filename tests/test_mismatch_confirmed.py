@@ -244,10 +244,10 @@ def test_what_nothing_calls_for_in_all_frames_must_be_shown_by_locked_ones(
     monkeypatch.setattr(explaining, "changes", lambda *_: {named.name: None})
     monkeypatch.setattr(explaining, "explained", lambda *_, **__: told)
     gains = {"column_prnu": Gain(0.14, (low, 0.5))}
-    found = explaining.uncalled(search, base, base, gains, trial)
+    found = explaining.uncalled(search, base, base, gains, trial, search.named)
     assert found == ((named, explaining.UNCALLED) if dropped else None)
     named.measured = True
-    assert explaining.uncalled(search, base, base, gains, trial) is None
+    assert explaining.uncalled(search, base, base, gains, trial, search.named) is None
 
 
 @pytest.mark.parametrize(
@@ -271,7 +271,7 @@ def test_a_line_that_explains_nothing_must_be_sure(
     told = {first: ("periodic_noise" if explains else None, 5.0)}
     monkeypatch.setattr(explaining, "explained", lambda *_, **__: told)
     gains = {"periodic_noise": Gain(0.3, (0.1, 0.5))}
-    found = explaining.uncalled(search, base, base, gains, trial)
+    found = explaining.uncalled(search, base, base, gains, trial, search.named)
     assert found == ((named, explaining.UNCALLED) if dropped else None)
 
 
@@ -288,7 +288,10 @@ def test_what_only_hints_at_an_effect_does_not_call_for_it(
     told = {"fixed_smooth_variance": ("amp_glow", 1.0)}
     monkeypatch.setattr(explaining, "explained", lambda *_, **__: told)
     gains = {named.name: Gain(0.13, (-0.2, 0.4))}
-    assert explaining.uncalled(search, base, base, gains, trial) == (named, explaining.UNCALLED)
+    assert explaining.uncalled(search, base, base, gains, trial, search.named) == (
+        named,
+        explaining.UNCALLED,
+    )
 
 
 @pytest.mark.parametrize(

@@ -16,9 +16,12 @@ from analysis.mismatch.feigned import (
     stepped,
 )
 from analysis.mismatch.standout import side_by_side
+from dsis.effects.hot_pixels import HotPixels
+from dsis.effects.rts import Rts
 
 NUMBERS = (0, 1, 2, 4, 5, 6)  # of eight frames two are locked
 FRAMES, PIXELS = 6, 200_000
+JUMPS = Rts(pixel_fraction=0.02, amplitude_dn=2.0)
 
 
 def _state(rho: float, pattern: float, located: bool = True) -> Any:
@@ -154,27 +157,30 @@ def test_columns_that_differ_one_by_one_are_believed(columns: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    ("kind", "scope", "z", "denied"),
+    ("effect", "scope", "z", "warm", "denied"),
     [
-        ("rts", "time", 8.0, True),
-        ("rts", "time", 2.0, False),
-        ("rts", "offset", 8.0, False),
-        ("hot_pixels", "time", 8.0, False),
+        (JUMPS, "time", 8.0, 40, True),
+        (JUMPS, "time", 2.0, 40, False),
+        (JUMPS, "offset", 8.0, 40, False),
+        (HotPixels(pixel_fraction=0.01, mean_dn_per_s=5.0), "time", 8.0, 40, False),
+        (JUMPS, "time", 8.0, 2, False),  # far fewer than those that jump
     ],
 )
 def test_hot_pixels_that_have_no_word_do_not_jump(
-    kind: str, scope: str, z: float, denied: bool
+    effect: Any, scope: str, z: float, warm: int, denied: bool
 ) -> None:
     keys = (Key("outlying_pixels", scope, "", "R"),)
+    image = np.random.default_rng(1).normal(size=(100, 100))
+    image.flat[: 25 * warm : 25] = 8.0
     state: Any = SimpleNamespace(
         vector=None,
         setting=SimpleNamespace(
-            seen=SimpleNamespace(images={}),
+            seen=SimpleNamespace(images={("R", "time"): (image, 1.0)}),
             layout=SimpleNamespace(uniform=[SimpleNamespace(exposure_time_s=0.01)]),
         ),
         null=SimpleNamespace(keys=keys, departures=lambda _: np.array([z])),
     )
-    assert (heated(state, kind) is not None) == denied
+    assert (heated(state, effect) is not None) == denied
 
 
 @pytest.mark.parametrize(("kind", "name"), [("dsnu", "offset"), ("prnu", "gain alone")])

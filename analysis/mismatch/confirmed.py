@@ -16,12 +16,13 @@ from analysis.mismatch.finding import Gain
 from analysis.mismatch.fixedforetold import FIXED_LINES
 from analysis.mismatch.framebyframe import SIZES
 from analysis.mismatch.instance import LINES, same_place
-from analysis.mismatch.judge import Judge
+from analysis.mismatch.judge import NOTHING, Judge
 from analysis.mismatch.locate import FAMILY
 from analysis.mismatch.model import side_by_side
 from analysis.mismatch.name import Search
 from analysis.mismatch.named import APART, Named, told_by_itself, unclear, vague
 from analysis.mismatch.relit import relit
+from analysis.mismatch.resolved import explains
 from analysis.mismatch.state import State
 from analysis.mismatch.trial import Gained, Trial, denied
 from dsis.camera import Camera
@@ -42,11 +43,35 @@ def undenied(search: Search, final: State) -> State:
 def denied_by_rest(search: Search, state: State, base: State) -> tuple[Named, str] | None:
     """Return the effect that all frames together deny, by what they leave; None: they deny none.
 
-    `base` is the state without any.
+    `base` is the state without any. Whether anything differs without an effect is asked of the
+    state without it, too: a few simulated recordings hardly tell what is just certain.
     """
     first = frozenset(m.statistic for m in base.mismatches)
     judge = Judge(state, partial(search.without, state), search.setting.nulls)
-    return judge.denied_by_rest(search.named, first)
+    some = list(search.named)
+    while (denied := judge.denied_by_rest(some, first)) is not None and denied[1] == NOTHING:
+        if not _needed_beside(search, state, denied[0]):
+            break
+        some.remove(denied[0])
+    return denied
+
+
+def _uncalled(
+    search: Search, base: State, state: State, gains: dict[str, Gain], trial: Trial
+) -> tuple[Named, str] | None:
+    """Return an effect that nothing calls for, as `uncalled`, nor without it beside the others."""
+    some = list(search.named)
+    while (denied := uncalled(search, base, state, gains, trial, some)) is not None:
+        if not _needed_beside(search, state, denied[0]):
+            break
+        some.remove(denied[0])
+    return denied
+
+
+def _needed_beside(search: Search, state: State, named: Named) -> bool:
+    """Return whether the state without an effect leaves open what it explains."""
+    bare = State.of(state.setting, search.without(state, named), search.step, near=state)
+    return explains(state, bare, bare, ())
 
 
 def undenied_by_all(
@@ -60,7 +85,7 @@ def undenied_by_all(
         everything = search.of_all(final.camera)
         denied = denied_by_rest(search, everything, whole)
         denied = denied or idle(search, whole, everything)
-        denied = denied or uncalled(search, whole, everything, gains, trial)
+        denied = denied or _uncalled(search, whole, everything, gains, trial)
         denied = denied or hollow(search, whole, everything)
         denied = denied or unsized(search, everything)
         if denied is None:

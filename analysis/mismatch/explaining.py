@@ -72,9 +72,14 @@ def _explaining_nothing(
 
 
 def uncalled(
-    search: Search, base: State, final: State, gains: Mapping[str, Gain], trial: Trial
+    search: Search,
+    base: State,
+    final: State,
+    gains: Mapping[str, Gain],
+    trial: Trial,
+    some: Sequence[Named],
 ) -> tuple[Named, str] | None:
-    """Return an effect for which nothing calls in all frames, nor do locked ones; None: none is.
+    """Return one of some effects for which nothing calls in all frames, nor locked ones; or None.
 
     What hides behind another is called for by nothing at first: locked frames must show it then,
     whatever hinted at it. A line that explains nothing must be shown by all frames, at odds that
@@ -83,7 +88,7 @@ def uncalled(
     first = {m.statistic for m in base.mismatches}
     asked = [
         n
-        for n in search.named
+        for n in some
         if n.kind in CANDIDATES and n.name in gains
         if n.kind in LINES or first.isdisjoint(CANDIDATES[n.kind].calls)
         if _unshown(n, gains[n.name], trial)

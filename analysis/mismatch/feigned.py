@@ -40,7 +40,7 @@ from analysis.mismatch.noslope import untold_slope
 from analysis.mismatch.notfull import far_below
 from analysis.mismatch.persisting import persisting
 from analysis.mismatch.rivalled import rivalled
-from analysis.mismatch.standout import side_by_side
+from analysis.mismatch.standout import heights, side_by_side
 from analysis.mismatch.state import State
 from analysis.mismatch.unequal import unequal
 from analysis.mismatch.unequalframes import unequally_noisy
@@ -51,12 +51,14 @@ from analysis.mismatch.wholeframes import of_pink_noise
 from dsis.effects import Effect
 from dsis.effects.black_level_drift import BlackLevelDrift
 from dsis.effects.readout_memory import ReadoutMemory
+from dsis.effects.rts import Rts
 from dsis.measures.spikes import variance_of_quartiles
 
 Array = NDArray[np.float64]
 _AXES = {"row_fpn": "rows", "column_fpn": "columns", "row_prnu": "rows", "column_prnu": "columns"}
 _GROWING = frozenset({"row_prnu", "column_prnu"})
 _CLEAR = 5.0  # standard errors of what stands out
+_STANDS_OUT, _FEW = 3.5, 0.1  # standard deviations; of pixels that jump
 _ALIKE_ROWS = frozenset({"row_correlation", "slow_row_variance"})
 _SHAPED = frozenset({"half_seam", "parity", STATISTIC})
 _MOST = 0.5  # of a pattern's variance, or of tails, that something else may feign
@@ -84,7 +86,7 @@ def of_another(state: State, effect: Effect, without: Array) -> Denial | None:
         or edged(state, kind)
         or single(state, effect)
         or rivalled(state, effect)
-        or heated(state, kind)
+        or heated(state, effect)
         or warm_spots(state, effect)
         or jumped(state, effect)
         or wandering(state, effect)
@@ -185,17 +187,23 @@ def stepped(state: State, kind: str) -> Denial | None:
     )
 
 
-def heated(state: State, kind: str) -> Denial | None:
+def heated(state: State, effect: Effect) -> Denial | None:
     """Return how pixels that jump are denied by others that stand out with exposure time.
 
     The dark current of hot pixels is noisy, and so are they, in long exposures. Where pixels that
     grow with time are left unexplained, they may be all that is noisy; unless these jump
-    themselves, as hot ones do not.
+    themselves, as hot ones do not, or they are far fewer than those that jump.
     """
-    if kind != "rts" or turned(state):
+    if not isinstance(effect, Rts) or not warm_left(state) or turned(state):
+        return None
+    maps = [own for (_, name), own in state.setting.seen.images.items() if name == "time"]
+    seen = [heights(*own) for own in maps]
+    # One that jumped stands out to either side.
+    left = sum(int((own > _STANDS_OUT).sum()) - int((own < -_STANDS_OUT).sum()) for own in seen)
+    if left < _FEW * effect.pixel_fraction * sum(own.size for own in seen):
         return None
     why = "pixels that stand out with exposure time are left, whose dark current is noisy too"
-    return Denial(0.0, why) if warm_left(state) else None
+    return Denial(0.0, why)
 
 
 def wandering(state: State, effect: Effect) -> Denial | None:

@@ -209,15 +209,19 @@ class Fitted:
     def _named_beside(self, named: Named) -> set[str]:
         return {n.kind for n in self.named if n is not named and n.proposal is not None}
 
-    def explained_by(self, named: Named, state: State, bare: State) -> bool:
+    def explained_by(
+        self, named: Named, state: State, bare: State, asked: State | None = None
+    ) -> bool:
         """Return whether a state with an effect explains half of something that one without leaves.
 
-        Or what called for it alone: at first, or beside the user's effects of other sizes.
+        Or what called for it alone: at first, beside the user's effects of other sizes, or in all
+        frames, as they were `asked` last.
         """
-        called = [(self.base, self._beside(named)), (self.left, self._named_beside(named))]
+        beside = self._beside(named)
+        called = [(self.base, beside), (self.left, self._named_beside(named)), (asked, beside)]
         return any(
-            explains(state, bare, base, calls_alone(named.kind, beside))
-            for base, beside in called
+            explains(state, bare, base, calls_alone(named.kind, others))
+            for base, others in called
             if base is not None
         )
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm
+from scipy.stats import norm, poisson
 
 from analysis.mismatch.bank.parts import parts
 from analysis.mismatch.contradicted import Denial
@@ -19,6 +19,7 @@ from dsis.effects.rts import Rts
 Array = NDArray[np.float64]
 _CLEAR, _LESS, _BELOW = 5.0, 3.5, -4.0  # of a map's noise: far out, less far; below, of few
 _MOST, _FEWEST = 0.5, 3  # of those that stand out
+_CHANCE = 1e-3  # that noise alone has as many below
 _SHORT, _SHARE = 0.2, 0.3  # of the longest time; of what a pixel grows by in that
 
 
@@ -61,22 +62,26 @@ def _both_ways(state: State) -> bool:
     deviations makes the means of its lines higher, and the others seem lower.
     """
     maps = first_maps(state, ("time", "offset")).values()
-    return _in_both([heights(parts(*own).pixels, 1.0) for own in maps]) and _in_both(
-        [heights(_single(image), noise) for image, noise in maps]
+    # Offsets may have tails; in what grows with time all that is below is noise, or jumped.
+    most = _CHANCE if any(name == "time" for _, name in state.setting.seen.images) else 1.0
+    return _in_both([heights(parts(*own).pixels, 1.0) for own in maps], most) and _in_both(
+        [heights(_single(image), noise) for image, noise in maps], most
     )
 
 
-def _in_both(maps: Sequence[Array]) -> bool:
+def _in_both(maps: Sequence[Array], chance: float) -> bool:
     """Return whether heights are far below in half as many places as above, or in more.
 
-    Where few are so far out that tells less than more that are less far, beyond what chance has.
+    Where few are so far out that tells less than more that are less far, beyond what noise has;
+    `chance` is the largest of that noise alone has so many below.
     """
     for clear in (_CLEAR, _LESS):
-        chance = float(norm.sf(clear)) * sum(height.size for height in maps)
+        noise = float(norm.sf(clear)) * sum(height.size for height in maps)
         above, below = (
-            sum(int((sign * height > clear).sum()) for height in maps) - chance for sign in (1, -1)
+            sum(int((sign * height > clear).sum()) for height in maps) for sign in (1, -1)
         )
-        if below >= max(_MOST * above, _FEWEST):
+        enough = below - noise >= max(_MOST * (above - noise), _FEWEST)
+        if enough and poisson.sf(below - 1, noise) <= chance:
             return True
     return False
 

@@ -276,7 +276,7 @@ class Search(Choice):
     def _needed(self, state: State, bare: State, named: Named, why: str) -> bool:
         """Return whether a state without an effect shows that it is no needless one after all."""
         if why == NOTHING:
-            return self.explained_by(named, state, bare)
+            return self.explained_by(named, state, bare, self.asked and self.asked[0])
         if why.startswith((NEEDLESS, INSTEAD)) and opened(state, bare):
             return True
         if named.kind == "rts" and why.startswith((NEEDLESS, LITTLE)) and self._jumping:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from analysis.mismatch.source import Source
 from analysis.mismatch.spikes.hits import Hits
 from analysis.mismatch.spikes.population import Spikes, spikes_of
+from analysis.mismatch.spikes.shared import with_shares
 from dsis.camera import Camera
 from dsis.recording import RecordedExposure, Recording
 from dsis.recording.model import Codes
@@ -67,8 +68,16 @@ def without_spikes(recording: Recording, camera: Camera) -> tuple[Recording, Sou
     spikes = spikes_of(recording, source, camera)
     if spikes is None:
         return recording, source, None
+    own, made = _without(spikes, recording, source)
+    spikes = with_shares(spikes, own, made, camera)
+    if spikes.shares is not None:
+        own, made = _without(spikes, recording, source)
+    return own, made, spikes
+
+
+def _without(spikes: Spikes, recording: Recording, source: Source) -> tuple[Cleaned, Source]:
     own = cleaned(recording, spikes.replaced)
     made = Source(own)
     made.identities = source.identities  # of what lies on disk
     made.kept = {key: own.patched(key, frame) for key, frame in source.kept.items()}
-    return own, made, spikes
+    return own, made

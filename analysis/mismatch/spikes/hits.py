@@ -130,7 +130,22 @@ def hits_of(
         count += len(found)
     places = _all_of_the_often_far(places)
     hits = _exact(watch, source, places, moved, number)
+    hits = hits.of(np.abs(hits.ratio) > watch.noises)
     return Looked(hits, watch.noise, watch.level, watch.of_lines)
+
+
+def samples_at(
+    recording: Recording, source: Source, camera: Camera, number: int, at: NDArray[np.intp]
+) -> Hits:
+    """Return samples of an exposure, of frame, row and column `at` (sample, 3), in that order."""
+    exposure = recording.exposures[number]
+    watch = _Watch.of(recording, source, camera, exposure, FAR)
+    frames = range(len(exposure.frames))
+    order = np.argsort(at[:, 0], kind="stable")
+    places = [at[order][at[order, 0] == k, 1:].astype(np.int32) for k in frames]
+    images = enumerate(source.frames(exposure.name, frames))
+    moved = [watch.moved(image, k) for k, image in images]
+    return _exact(watch, source, places, moved, number).of(np.argsort(order, kind="stable"))
 
 
 def _all_of_the_often_far(places: list[Places]) -> list[Places]:
@@ -242,7 +257,7 @@ class _Watch:
 def _exact(
     watch: _Watch, source: Source, places: list[Places], moved: list[Movement], number: int
 ) -> Hits:
-    """Return the hits among far samples, by all frames of their pixels."""
+    """Return samples at places of each frame, by all frames of their pixels."""
     frame = np.repeat(np.arange(len(places)), [len(own) for own in places])
     rows, columns = np.concatenate(places).T.astype(np.intp)
     series, common = np.empty((len(places), frame.size)), [np.zeros((0, 3))]
@@ -262,7 +277,7 @@ def _exact(
     beside = np.concatenate(common) - beyond[frame, each][:, np.newaxis]
     up, down = np.maximum(beside.max(1), 0), np.minimum(beside.min(1), 0)
     heights = np.where(heights > 0, np.maximum(heights - up, 0), np.minimum(heights - down, 0))
-    hits = Hits(
+    return Hits(
         np.full(frame.size, number),
         frame,
         rows,
@@ -273,7 +288,6 @@ def _exact(
         instead.astype(np.uint16),
         series[frame, each] >= watch.white,
     )
-    return hits.of(np.abs(hits.ratio) > watch.noises)
 
 
 def _seen(

@@ -57,6 +57,8 @@ class Spikes:
         Samples that a spike drags along: of its row, its column, or its pixel afterwards.
     lower
         Spikes that are too low to be counted.
+    shares
+        Samples that have too little of a spike to be seen one by one; see `with_shares`.
     quiet_dn
         Noise of uniform exposures by number, as rows and columns of the colour filter: (2, 2);
         infinite where a spike has no room below the white level.
@@ -69,11 +71,13 @@ class Spikes:
     lower: Hits
     quiet_dn: dict[int, Array]
     lowest: float = SPIKE
+    shares: Hits | None = None
 
     @property
     def replaced(self) -> Hits:
         """All samples that are put aside."""
-        return Hits.joined([self.hits, self.echoes, self.lower])
+        shares = [] if self.shares is None else [self.shares]
+        return Hits.joined([self.hits, self.echoes, self.lower, *shares])
 
 
 def spikes_of(recording: Recording, source: Source, camera: Camera) -> Spikes | None:

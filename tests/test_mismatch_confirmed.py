@@ -288,10 +288,8 @@ def test_what_only_hints_at_an_effect_does_not_call_for_it(
     told = {"fixed_smooth_variance": ("amp_glow", 1.0)}
     monkeypatch.setattr(explaining, "explained", lambda *_, **__: told)
     gains = {named.name: Gain(0.13, (-0.2, 0.4))}
-    assert explaining.uncalled(search, base, base, gains, trial, search.named) == (
-        named,
-        explaining.UNCALLED,
-    )
+    found = explaining.uncalled(search, base, base, gains, trial, search.named)
+    assert found == (named, explaining.UNCALLED)
 
 
 @pytest.mark.parametrize(

@@ -271,7 +271,8 @@ def _exact(
     # Of two frames each has moved from the other: half of that from where both would be.
     shift = beyond / len(watch.middles)
     each = np.arange(frame.size)
-    seen = [_seen(watch, series, shift, frame, (rows, columns), i) for i in range(frame.size)]
+    both = enumerate(_at_same_pixels(rows, columns))
+    seen = [_seen(watch, series, shift, frame, (rows, columns), one) for one in both]
     heights, noise, instead = np.array(seen).reshape(-1, 3).T
     # What the frame has in common beyond its own movement counts for no spike.
     beside = np.concatenate(common) - beyond[frame, each][:, np.newaxis]
@@ -290,24 +291,37 @@ def _exact(
     )
 
 
+def _at_same_pixels(rows: NDArray[np.intp], columns: NDArray[np.intp]) -> list[NDArray[np.intp]]:
+    """Return for each sample the places of all that are of its pixel, itself too, in order."""
+    order = np.lexsort((columns, rows))
+    new = (np.diff(rows[order]) != 0) | (np.diff(columns[order]) != 0)
+    groups = np.split(order, np.flatnonzero(new) + 1)
+    found = [order] * rows.size
+    for group in groups:
+        for i in group:
+            found[i] = group
+    return found
+
+
 def _seen(
     watch: _Watch,
     series: Array,
     shift: Array,
     frame: NDArray[np.intp],
     at: tuple[NDArray[np.intp], NDArray[np.intp]],
-    i: int,
+    which: tuple[int, NDArray[np.intp]],
 ) -> tuple[float, float, float]:
     """Return the height of a far sample, its pixel's noise, DN, and the code it has without it.
 
-    No less noise than its channel has, than the pixel has in the frames where it is not far, or
-    than light of its level makes. The code is one that occurs, unless whole frames moved.
+    `which` it is, and all that are of its pixel. No less noise than its channel has, than the pixel
+    has in the frames where it is not far, or than light of its level makes. The code is one that
+    occurs, unless whole frames moved.
     """
-    rows, columns = at
+    (rows, columns), (i, here) = at, which
     k, values = frame[i], series[:, i] - shift[:, i]
     others = np.delete(values, k)
     level, site = float(np.median(others)), (rows[i] % 2, columns[i] % 2)
-    far = frame[(rows == rows[i]) & (columns == columns[i])]
+    far = frame[here]
     if far.size == values.size:  # it is asked in all frames
         far = np.flatnonzero(np.abs(values - level) > watch.noises * watch.noise[site])
     calm = np.delete(values, far) if far.size < values.size - 1 else others

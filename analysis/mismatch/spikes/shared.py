@@ -67,7 +67,8 @@ def with_shares(spikes: Spikes, recording: Recording, source: Source, camera: Ca
     squares; samples that are put aside already tell none.
     """
     look = partial(_around, recording, source, camera, spikes)
-    few = look(spikes.hits.of(np.arange(_ASKED)[: spikes.hits.frame.size]), _AROUND)
+    strongest = spikes.hits.of(np.arange(_ASKED)[: spikes.hits.frame.size])
+    few = look(strongest, _AROUND, np.full(len(_AROUND), np.inf))
     weight = few.spike_dn / few.seen.noise_dn**2
     count = len(_AROUND)
     told = np.bincount(few.place, weight * few.seen.height_dn, count)
@@ -76,7 +77,7 @@ def with_shares(spikes: Spikes, recording: Recording, source: Source, camera: Ca
     if not sure.any():
         return spikes
     share = np.abs(told[sure] / square[sure])
-    every = look(spikes.hits, _AROUND[sure])
+    every = look(spikes.hits, _AROUND[sure], share)
     enough = share[every.place] * every.spike_dn > _LEAST * every.seen.noise_dn
     return replace(spikes, shares=_once(every.seen.of(enough)))
 
@@ -88,15 +89,20 @@ def _around(
     spikes: Spikes,
     hits: Hits,
     places: Indices,
+    shares: Array,
 ) -> _Around:
-    """Return the samples at places around some spikes that are not put aside already."""
+    """Return the samples at places around some spikes that are not put aside already.
+
+    Where a place's share of a spike is as much as half of the least at the spike's own colour.
+    """
     at = _at(hits)[:, np.newaxis] + np.insert(places, 0, 0, axis=1)
     frames = np.array([len(exposure.frames) for exposure in recording.exposures])
     ends = np.broadcast_to((0, recording.rows, recording.columns), (len(hits.frame), 3)).copy()
     ends[:, 0] = frames[hits.exposure]
     own = at[:, :, 1:]
     inside = ((own >= 0) & (own < ends[:, np.newaxis])).all(2)
-    which, place = np.nonzero(inside)
+    least = _LEAST / 2 * hits.quiet_dn[:, np.newaxis]
+    which, place = np.nonzero(inside & (shares * hits.height_dn[:, np.newaxis] > least))
     some = at[which, place]
     free = ~_among(some, _at(spikes.replaced))
     which, place, some = which[free], place[free], some[free]

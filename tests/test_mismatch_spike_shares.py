@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from scipy.stats import kurtosis
 
 from analysis.mismatch.source import Source
-from analysis.mismatch.spikes import Spikes, spikes_of, without_spikes
+from analysis.mismatch.spikes import Spikes, left_dn4, spikes_of, without_spikes
 from analysis.mismatch.spikes.cleaned import cleaned
 from spiked_recordings import MODEL, Change, made, spikes
 
@@ -16,13 +16,15 @@ Offset = tuple[int, int, int]
 NEXT: frozenset[Offset] = frozenset({(0, 0, 1), (0, 0, -1), (0, 1, 0), (0, -1, 0)})
 
 
-def _sharing(share: float, offsets: frozenset[Offset], mean_dn: float = MEAN_DN) -> Change:
+def _sharing(
+    share: float, offsets: frozenset[Offset], mean_dn: float = MEAN_DN, count: int = COUNT
+) -> Change:
     """Return what adds spikes that give places around them a share of themselves."""
 
     def change(rng: np.random.Generator, stacks: dict[str, Array]) -> None:
         for name, stack in stacks.items():
             without = stack.copy()
-            spikes(COUNT // len(stacks), mean_dn)(rng, {"": stack})
+            spikes(count // len(stacks), mean_dn)(rng, {"": stack})
             whole = stack - without
             for frames, down, right in offsets:
                 moved = np.roll(whole, (down, right), (1, 2))
@@ -80,6 +82,40 @@ def _residuals(recording: object, name: str) -> Array:
     return np.asarray((frames - np.median(frames, 0)).reshape(-1))
 
 
+@pytest.mark.parametrize(
+    ("count", "mean_dn", "share"), [(800, 3000.0, 0.015), (2400, 400.0, 0.03), (2400, 1500.0, 0.01)]
+)
+def test_shares_of_strong_spikes_are_put_aside_and_leave_the_variance(
+    count: int, mean_dn: float, share: float
+) -> None:
+    """Around the strongest all samples of a share are seen one by one."""
+    _, _, some = without_spikes(made(0, _sharing(share, NEXT, mean_dn, count)), MODEL)
+    alone = made(0, _sharing(0.0, NEXT, mean_dn, count))
+    _, _, plain = without_spikes(alone, MODEL)
+    assert some is not None
+    assert plain is not None
+    assert _offsets(some) == NEXT
+    recording = made(0, _sharing(share, NEXT, mean_dn, count))
+    own, without = (
+        _residuals(cleaned(stored, one.replaced), "dark-0")
+        for stored, one in ((recording, some), (alone, plain))
+    )
+    assert kurtosis(own) == pytest.approx(kurtosis(without), abs=0.05)
+    assert own.var() == pytest.approx(without.var(), rel=5e-3)
+    assert left_dn4(some, recording) == pytest.approx(left_dn4(plain, alone), rel=0.5)
+
+
+@pytest.mark.parametrize("count", [800, 2400])
+def test_skewed_noise_of_few_electrons_is_no_share(count: int) -> None:
+    def electrons(rng: np.random.Generator, mean: Array) -> Array:
+        return np.asarray(8 * rng.poisson(mean.clip(0) / 8 + 0.3) + rng.normal(0, 1, mean.shape))
+
+    recording = made(0, spikes(count, 3000.0), clean=electrons)
+    _, _, told = without_spikes(recording, MODEL)
+    assert told is not None
+    assert told.shares is None
+
+
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("scene", [True, False])
 def test_spikes_that_share_nothing_put_nothing_aside(seed: int, *, scene: bool) -> None:
@@ -89,7 +125,7 @@ def test_spikes_that_share_nothing_put_nothing_aside(seed: int, *, scene: bool) 
     assert told.shares is None
 
 
-def test_samples_of_a_share_keep_their_order_and_are_no_spikes() -> None:
+def test_samples_of_a_share_are_no_spikes() -> None:
     """Each sample is told once; none of them is a spike, or was put aside before."""
     recording = made(0, _sharing(0.01, NEXT, 800.0))
     _, _, told = without_spikes(recording, MODEL)

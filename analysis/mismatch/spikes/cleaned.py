@@ -71,6 +71,7 @@ def without_spikes(recording: Recording, camera: Camera) -> tuple[Recording, Sou
     own, made = _without(spikes, recording, source)
     spikes = with_shares(spikes, own, made, camera)
     if spikes.shares is not None:
+        del own, made  # no frame is held three times
         own, made = _without(spikes, recording, source)
     return own, made, spikes
 

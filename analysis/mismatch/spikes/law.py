@@ -147,8 +147,12 @@ class _Dragged:
 
 
 def _dragged(spikes: Spikes) -> list[_Dragged]:
-    """Return samples seen around spikes by each power, of so many as are high enough for them."""
-    hits, echoes = spikes.hits, spikes.echoes
+    """Return samples seen around spikes by each power, of so many as are high enough for them.
+
+    Not at places whose share of spikes is put aside, however small.
+    """
+    hits = spikes.hits
+    echoes = spikes.echoes if spikes.uncovered is None else spikes.uncovered
     if not echoes.frame.size:
         return [_Dragged(1, np.zeros(0), np.zeros(0))]
     at, here = (

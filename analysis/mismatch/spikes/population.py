@@ -57,8 +57,9 @@ class Spikes:
         Samples that a spike drags along: of its row, its column, or its pixel afterwards.
     lower
         Spikes that are too low to be counted.
-    shares
-        Samples that have too little of a spike to be seen one by one; see `with_shares`.
+    shares, uncovered
+        Samples that have too little of a spike to be seen one by one, and echoes at places around
+        spikes that have no such share; see `with_shares`. None: not asked, or there are none.
     quiet_dn
         Noise of uniform exposures by number, as rows and columns of the colour filter: (2, 2);
         infinite where a spike has no room below the white level.
@@ -72,6 +73,7 @@ class Spikes:
     quiet_dn: dict[int, Array]
     lowest: float = SPIKE
     shares: Hits | None = None
+    uncovered: Hits | None = None
 
     @property
     def replaced(self) -> Hits:

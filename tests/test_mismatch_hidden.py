@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from analysis.mismatch import confirmed
+from analysis.mismatch.explaining import UNCALLED
 from analysis.mismatch.fitted import Fitted
 from analysis.mismatch.judge import NOTHING
 from analysis.mismatch.jumped import jumped
@@ -81,15 +82,14 @@ def test_the_next_effect_is_asked_where_one_is_needed_after_all(
 
 @pytest.mark.parametrize(("without", "denied"), [((PATCHES,), False), ((), True)])
 def test_what_nothing_calls_for_is_kept_where_all_frames_need_it_beside_the_others(
-    without: tuple[Any, ...], denied: bool, asked: list[str], monkeypatch: pytest.MonkeyPatch
+    without: tuple[Any, ...], denied: bool, asked: list[str]
 ) -> None:
-    monkeypatch.setattr(
-        confirmed, "uncalled", lambda *own: (HIDDEN, "none") if HIDDEN in own[-1] else None
-    )
+    def uncalled(some: Any) -> Any:
+        return (HIDDEN, UNCALLED) if HIDDEN in some else None
+
     state: Any = Stub(setting=object(), mismatches=(), left=without)
-    trial: Any = None
-    found = confirmed._uncalled(_search(), state, state, {}, trial)
-    assert found == ((HIDDEN, "none") if denied else None)
+    found = confirmed._unless_needed(_search(), state, uncalled)
+    assert found == ((HIDDEN, UNCALLED) if denied else None)
     assert asked == ["smooth_prnu"]
 
 

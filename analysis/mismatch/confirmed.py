@@ -1,6 +1,6 @@
 """What a search found, confirmed or dropped: by all frames together, and by the locked ones."""
 
-from collections.abc import Container, Sequence
+from collections.abc import Callable, Container, Sequence
 from dataclasses import replace
 from functools import partial
 from math import isfinite
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from analysis.mismatch.allframes import shown_by_all
 from analysis.mismatch.candidates import CANDIDATES, calls_of
 from analysis.mismatch.explain import changes
-from analysis.mismatch.explaining import DOUBTFUL, hollow, idle, uncalled
+from analysis.mismatch.explaining import DOUBTFUL, UNCALLED, hollow, idle, uncalled
 from analysis.mismatch.finding import Gain
 from analysis.mismatch.fixedforetold import FIXED_LINES
 from analysis.mismatch.framebyframe import SIZES
@@ -43,35 +43,28 @@ def undenied(search: Search, final: State) -> State:
 def denied_by_rest(search: Search, state: State, base: State) -> tuple[Named, str] | None:
     """Return the effect that all frames together deny, by what they leave; None: they deny none.
 
-    `base` is the state without any. Whether anything differs without an effect is asked of the
-    state without it, too: a few simulated recordings hardly tell what is just certain.
+    `base` is the state without any.
     """
     first = frozenset(m.statistic for m in base.mismatches)
     judge = Judge(state, partial(search.without, state), search.setting.nulls)
-    some = list(search.named)
-    while (denied := judge.denied_by_rest(some, first)) is not None and denied[1] == NOTHING:
-        if not _needed_beside(search, state, denied[0]):
-            break
-        some.remove(denied[0])
-    return denied
+    return _unless_needed(search, state, lambda some: judge.denied_by_rest(some, first))
 
 
-def _uncalled(
-    search: Search, base: State, state: State, gains: dict[str, Gain], trial: Trial
+def _unless_needed(
+    search: Search, state: State, denied_of: Callable[[Sequence[Named]], tuple[Named, str] | None]
 ) -> tuple[Named, str] | None:
-    """Return an effect that nothing calls for, as `uncalled`, nor without it beside the others."""
+    """Return the effect that is denied among some, and why; None: none is.
+
+    Whether one explains anything is asked of the state without it, beside the others: a few
+    simulated recordings hardly tell what is just certain, and at first what hides is not seen.
+    """
     some = list(search.named)
-    while (denied := uncalled(search, base, state, gains, trial, some)) is not None:
-        if not _needed_beside(search, state, denied[0]):
+    while (denied := denied_of(some)) is not None and denied[1] in (NOTHING, UNCALLED):
+        bare = State.of(state.setting, search.without(state, denied[0]), search.step, near=state)
+        if not explains(state, bare, bare, ()):
             break
         some.remove(denied[0])
     return denied
-
-
-def _needed_beside(search: Search, state: State, named: Named) -> bool:
-    """Return whether the state without an effect leaves open what it explains."""
-    bare = State.of(state.setting, search.without(state, named), search.step, near=state)
-    return explains(state, bare, bare, ())
 
 
 def undenied_by_all(
@@ -85,7 +78,8 @@ def undenied_by_all(
         everything = search.of_all(final.camera)
         denied = denied_by_rest(search, everything, whole)
         denied = denied or idle(search, whole, everything)
-        denied = denied or _uncalled(search, whole, everything, gains, trial)
+        calling = partial(uncalled, search, whole, everything, gains, trial)
+        denied = denied or _unless_needed(search, everything, calling)
         denied = denied or hollow(search, whole, everything)
         denied = denied or unsized(search, everything)
         if denied is None:

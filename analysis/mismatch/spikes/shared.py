@@ -116,6 +116,8 @@ def with_shares(spikes: Spikes, recording: Recording, source: Source, camera: Ca
     share = np.where(sure, share, 0.0)
     taken_dn = share[around.place] * heights_dn[around.spike]
     every = around.which(np.abs(taken_dn) > _LEAST / 2 * quiet[around.at[:, 0]]).in_exposures()
+    if not every.spike.size:
+        return spikes
     seen, taken_dn = look(every), share[every.place] * heights_dn[every.spike]
     enough = np.abs(taken_dn) > _LEAST * seen.noise_dn
     unsure = spikes.hits.clipped[every.spike]  # higher than is known

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from analysis.mismatch.bank.motion import MotionSums, _strongest
+from analysis.mismatch.bank.key import Key
+from analysis.mismatch.bank.motion import STATISTIC, MotionSums, _strongest
+from analysis.mismatch.null import _normal
 from analysis.mismatch.scenes import scene_of
 
 ROWS, COLUMNS, FRAMES = 96, 130, 8
@@ -114,6 +116,19 @@ def test_scores_of_white_noise_are_those_of_a_normal_variate(frames: int) -> Non
     assert -0.5 < scores.mean() < 0.1
     assert (scores > 2.326).sum() <= 36  # 20 are expected: 4 standard deviations
     assert (scores > 1.282).sum() <= 254  # 200
+
+
+@pytest.mark.parametrize("count", [4, 16, 64])
+def test_scores_are_normal_that_lie_no_higher_than_normal_variates(count: int) -> None:
+    """How long their lower tail is does not matter; a long upper one does."""
+    drawn = np.random.default_rng(count).normal(size=(count, 20000))
+    keys = [Key(STATISTIC, "scene")] * drawn.shape[1]
+    denied = drawn.shape[1] - _normal(keys, drawn).sum()
+    assert 6 <= denied <= 38  # 1 in 1000 by chance: 3 standard deviations
+    assert _normal(keys, np.where(drawn < 0, 3 * drawn, drawn)).sum() == len(keys) - denied
+    higher = _normal(keys, np.where(drawn > 0, 2 * drawn, drawn)).mean()
+    assert higher < {4: 0.9, 16: 0.55, 64: 0.05}[count]
+    assert not _normal([Key("row_variance", "exposure")] * drawn.shape[1], drawn).any()
 
 
 @pytest.mark.parametrize("cfa", ["MONO", "RGGB"])

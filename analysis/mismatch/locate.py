@@ -7,7 +7,6 @@ from numpy.typing import NDArray
 
 from analysis.mismatch.bank.home import TIME, homes, one_sided
 from analysis.mismatch.bank.key import MOSAIC, Key
-from analysis.mismatch.bank.motion import STATISTIC as MOTION
 from analysis.mismatch.bank.movingbands import DETAIL as MOVING_BANDS
 from analysis.mismatch.bank.movingbands import KIND as MOVING_PLACE
 from analysis.mismatch.bank.parts import parts
@@ -64,8 +63,8 @@ def tested(layout: Layout, null: Null, seen: Vector) -> tuple[Array, Array]:
         if small[np.flatnonzero(row)].all():
             z[size + i] = 0.0
     # The largest of many bins says nothing where it is smaller than chance makes it.
-    peaks = np.array([key.is_peak or key.statistic == MOTION for key in null.keys])
-    z[peaks] = np.maximum(z[peaks], 0.0)
+    scores = np.array([key.is_score for key in null.keys])
+    z[scores] = np.maximum(z[scores], 0.0)
     # No pattern is less than none: lower tails of these ratios of few degrees are heavy.
     nothing = _without_pattern(null, seen)
     z[nothing] = np.maximum(z[nothing], 0.0)

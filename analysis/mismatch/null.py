@@ -7,6 +7,7 @@ from math import exp, log, sqrt
 import numpy as np
 import scipy.optimize
 import scipy.special
+import scipy.stats
 from numpy.typing import NDArray
 
 from analysis.mismatch.bank.key import Key
@@ -235,10 +236,20 @@ def _grown(keys: Sequence[Key], mean: Array) -> Array:
 
 
 def _normal(keys: Sequence[Key], values: Array) -> NDArray[np.bool_]:
-    """Return which numbers are scores that simulations, (recording, number), show as normal."""
-    scores = np.array([key.is_peak for key in keys], bool)
-    far = scipy.special.chdtrc(len(values), (values**2).sum(0)) < _ODD
-    return np.asarray(scores & ~far)
+    """Return which numbers are scores that simulations, (recording, number), show as normal.
+
+    The highest of bins that overlap is often less than that of as many apart, and nothing is said
+    of less: how far they lie above 0 counts, by the law of squares of which half are none (Self &
+    Liang 1987, "Asymptotic properties of maximum likelihood estimators", case 5).
+    """
+    scores = np.array([key.is_score for key in keys], bool)
+    count = len(values)
+    square = (np.maximum(values, 0.0) ** 2).sum(0)
+    above = np.arange(1, count + 1)
+    chance = scipy.stats.binom.pmf(above, count, 0.5) @ scipy.special.chdtrc(
+        above[:, np.newaxis], square
+    )
+    return np.asarray(scores & (chance >= _ODD))
 
 
 def _by_name(

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 MOSAIC = "in all channels"
+_HIGHEST = ("spectrum_peak", "spectral_peak", "outlying_patch", "scene_motion")
 
 
 @dataclass(frozen=True)
@@ -31,9 +32,9 @@ class Key:
     detail: str = ""
 
     @property
-    def is_peak(self) -> bool:
-        """Whether it is a normal score of the highest of many bins, or patches."""
-        return self.statistic.endswith(("spectrum_peak", "spectral_peak", "outlying_patch"))
+    def is_score(self) -> bool:
+        """Whether it is a normal score of the highest of many bins, patches or slow waves."""
+        return self.statistic.endswith(_HIGHEST)
 
     @property
     def is_cube_root(self) -> bool:

@@ -29,6 +29,7 @@ _OF_FRAMES = "frame_variance"
 _NU = 6.0  # degrees of freedom of the likelihood's tails
 _LIGHT = 15.0  # of a number whose scatter some 16 simulated recordings tell
 _FAR = 4.0  # standard deviations
+_HALF = 0.5
 _FLOOR = 0.3  # of a cube root that is 1 in white noise: below it, chance
 _LEAST_ROOT = 1e-2  # frames that agree to their last digit are no surer than that
 _FORM = 0.08  # relative error of a predicted change
@@ -177,13 +178,15 @@ class Predictor:
         """Return what is gained besides where one number alone is far off, nats; else nothing.
 
         Tails are heavy since models have errors of their own, which other numbers show. Where none
-        does, the one departs as far as the simulated recordings tell how it scatters.
+        does, the one departs as far as the simulated recordings tell how it scatters. Of a thousand
+        numbers chance may have another that is off, but hardly by half as much as one that is far.
         """
         null = self.reference.null
         rest, sd, known = self.weights(mean)
         known &= ~self.few & ~self.counts.said
         before = np.where(known, self.reference.vector.values - null.mean, 0.0) / null.sd
-        far = np.flatnonzero(np.abs(before) > _FAR)
+        off = np.abs(before)
+        far = np.flatnonzero(off > max(_FAR, _HALF * float(off.max(initial=0.0))))
         if far.size != 1:
             return 0.0
         now = rest[far[0]] / sd[far[0]]

@@ -35,6 +35,8 @@ def concealed(options: argparse.Namespace) -> dict[str, dict[str, Any]]:
     deals = deal(options.seed, options.cases, options.only)
     if options.no_word:
         deals = [d for d in deals if d.out is not None]
+    if options.real:
+        deals = [d for d in deals if d.real]
     ccd = options.ccd / "EMVA1288_Data.txt" if options.ccd.is_dir() else options.ccd
     if not ccd.exists():
         print(f"no real recording at {ccd}: those cases are simulated")
@@ -89,6 +91,9 @@ def main() -> None:
     parser.add_argument(
         "--no-word", action="store_true", help="of these only cases with an effect without a word"
     )
+    parser.add_argument(
+        "--real", action="store_true", help="of these only cases planted into real frames"
+    )
     parser.add_argument("--layout", choices=sorted(LAYOUTS), default="small")
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--work", type=Path)
@@ -98,6 +103,7 @@ def main() -> None:
     if options.work is None:
         drawn = f"{options.seed}-{options.cases}" + (f"-{options.only}" if options.only else "")
         drawn += "-no-word" if options.no_word else ""
+        drawn += "-real" if options.real else ""
         drawn += "" if options.layout == "small" else f"-{options.layout}"
         options.work = Path(gettempdir()) / f"dsis-concealed-{drawn}"
     options.work.mkdir(parents=True, exist_ok=True)

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.stats import chi2
 
 from analysis.mismatch.bank.key import Key
 from analysis.mismatch.bank.motion import STATISTIC, MotionSums, _strongest
@@ -100,6 +101,21 @@ def test_one_fast_wave_is_seen_among_all_that_are_slow(cycles: float) -> None:
 
     for seed in range(3):
         assert max(_found("RGGB", seed, vibrating)) > 5
+        shifts = _sums("RGGB", seed, vibrating, FRAMES).shifts()
+        right = shifts.waves["rows"]
+        assert abs(int(right.argmax()) - cycles) <= 0.5
+        assert right.max() > chi2.ppf(0.9999, shifts.degrees.max()) / shifts.degrees.max()
+
+
+def test_waves_of_a_scene_at_rest_are_1_by_chance() -> None:
+    all_waves = []
+    for seed in range(24):
+        shifts = _sums("RGGB", seed, lambda _: _picture(), FRAMES).shifts()
+        all_waves += [shifts.waves["rows"], shifts.waves["columns"]]
+        assert shifts.degrees.tolist() == [FRAMES - 1, *[2 * (FRAMES - 1)] * 12]
+    waves = np.stack(all_waves)
+    error = np.sqrt(2 / shifts.degrees / len(waves))
+    assert (np.abs(waves.mean(0) - 1) < 4 * error + 0.03).all()
 
 
 @pytest.mark.parametrize("frames", [3, 9])
@@ -155,4 +171,6 @@ def test_few_rows_say_nothing() -> None:
     sums = MotionSums(scene)
     list(sums.watching(np.full((20, 30), 500.0 + k) for k in range(3)))
     assert not any(np.isfinite(value) for value, _ in sums.numbers().values())
-    assert sums.shifts().errors == {"rows": np.inf, "columns": np.inf}  # nothing has a gradient
+    shifts = sums.shifts()
+    assert shifts.errors == {"rows": np.inf, "columns": np.inf}  # nothing has a gradient
+    assert not shifts.waves

@@ -151,12 +151,18 @@ class Shift:
         By number of the frame; nan: not looked at.
     right_error_px, down_error_px
         Standard errors by the noise of the pixels.
+    right_waves, down_waves, degrees
+        Mean squares of waves over the rows, by cycles a frame, chance being 1, and their degrees of
+        freedom; empty: there are too few rows.
     """
 
     right_px: Array
     down_px: Array
     right_error_px: float
     down_error_px: float
+    right_waves: Array
+    down_waves: Array
+    degrees: Array
 
 
 @dataclass(frozen=True, eq=False)

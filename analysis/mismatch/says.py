@@ -84,6 +84,8 @@ def sentence(statistic: str, key: Key, z: float, where: Where) -> str:
             lag, colour = f"{2 * float(lag):.0f}", ""
         pixels = "pixel" if lag == "1" else "pixels"
         how = f" ({lag} {pixels}{colour} apart along {axis})"
+    elif statistic == "scene_motion":
+        how = f" (along {detail})"
     elif detail and key.scope not in ("contrast", "exposure", SCENE):
         how += f" ({detail})"
     if detail and key.scope == SCENE and where.signal_dn is not None:

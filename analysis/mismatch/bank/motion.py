@@ -8,7 +8,7 @@ vibrates while rows are read one after the other in waves of some cycles.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 
 import numpy as np
@@ -69,10 +69,17 @@ class Shifts:
         By axis, see `AXES`: (frame,), pixels to the right, or down.
     errors
         Standard error of each, by axis: pixels; infinite where the picture has no gradient.
+    waves
+        By axis: mean squares of its waves over the rows, of 0, 1, ... cycles a frame, in that of
+        waves which are too fast for a movement: 1 by chance. None of few rows.
+    degrees
+        Degrees of freedom of each.
     """
 
     along: Mapping[str, Array]
     errors: Mapping[str, float]
+    waves: Mapping[str, Array] = field(default_factory=dict)
+    degrees: Array = field(default_factory=lambda: np.zeros(0))
 
 
 class MotionSums:
@@ -94,16 +101,20 @@ class MotionSums:
 
     def numbers(self) -> dict[str, Number]:
         """Return the normal score of the strongest slow waves, of movements along each axis."""
-        rows, frames = len(self.scene.signal_dn), len(self.series)
-        if rows < _LEAST_ROWS or frames < 2:
+        if not self._enough:
             return {f"{STATISTIC} along {axis}": UNKNOWN for axis in AXES}
-        apart = np.stack(self.series) - np.mean(self.series, 0)
         return {
-            f"{STATISTIC} along {axis}": _strongest(
-                apart[:, k], self.design.noise[k], self.design.slow[k]
-            )
-            for k, axis in enumerate(AXES)
+            f"{STATISTIC} along {axis}": _strongest(*self._slow(k)) for k, axis in enumerate(AXES)
         }
+
+    @property
+    def _enough(self) -> bool:
+        return len(self.scene.signal_dn) >= _LEAST_ROWS and len(self.series) > 1
+
+    def _slow(self, k: int) -> tuple[Array, Array, Array]:
+        """Return projections about their mean (frame, row), and what noise makes of an axis."""
+        apart = np.stack([own[k] for own in self.series])
+        return apart - apart.mean(0), self.design.noise[k], self.design.slow[k]
 
     def shifts(self) -> Shifts:
         """Return how far each frame lies from the mean of all, as a whole."""
@@ -112,9 +123,18 @@ class MotionSums:
         along = (sums - sums.mean(0)) @ inverse.T
         known = np.linalg.matrix_rank(self.design.per_pixel) == len(AXES)
         errors = np.sqrt(np.diag(inverse @ self.design.spread @ inverse.T) * (1 - 1 / len(sums)))
+        waves, degrees = {}, np.zeros(0)
+        for k, axis in enumerate(AXES):
+            if self._enough and self.design.noise[k].any():
+                power, dof, ground = _powers(*self._slow(k))
+                slow = len(self.design.slow[k])
+                degrees = dof[:slow]
+                waves[axis] = power[:slow] / degrees / max(ground, 1e-300)
         return Shifts(
             {axis: along[:, k] for k, axis in enumerate(AXES)},
             {axis: float(errors[k]) if known else np.inf for k, axis in enumerate(AXES)},
+            waves,
+            degrees,
         )
 
 
@@ -125,6 +145,20 @@ def _strongest(apart: Array, noise: Array, slow: Array) -> Number:
     """
     if not noise.any():
         return UNKNOWN
+    power, degrees, ground = _powers(apart, noise, slow)
+    if not ground > 0:
+        return UNKNOWN
+    others = int(degrees[len(slow) :].sum())
+    some = np.array(_TOGETHER)
+    power, degrees = (np.append(0.0, own).cumsum() for own in (power, degrees))
+    power, degrees = (own[some[:, 1]] - own[some[:, 0]] for own in (power, degrees))
+    chances = np.asarray(ratios.logsf(power / degrees / ground, degrees, others))
+    least = max(float(chances.min()), _RAREST)
+    return score_of_log(any_of(least, _INDEPENDENT)), 1.0
+
+
+def _powers(apart: Array, noise: Array, slow: Array) -> tuple[Array, Array, float]:
+    """Return power and degrees of freedom of waves, by cycles, and power a degree of fast ones."""
     frames, rows = apart.shape
     cos, sin = _waves(rows)
     a, b = apart @ cos.T, apart @ sin.T  # (frame, cycles)
@@ -135,16 +169,8 @@ def _strongest(apart: Array, noise: Array, slow: Array) -> Number:
     power = (a**2 * bb - 2 * a * b * ab + b**2 * aa).sum(0) / np.maximum(aa * bb - ab**2, 1e-30)
     power[0] = (a[:, 0] ** 2).sum() / aa[0]
     degrees = np.where(np.arange(len(cos)) > 0, 2, 1) * (frames - 1)
-    others = int(degrees[len(slow) :].sum())
-    ground = float(power[len(slow) :].sum()) / others
-    if not ground > 0:
-        return UNKNOWN
-    some = np.array(_TOGETHER)
-    power, degrees = (np.append(0.0, own).cumsum() for own in (power, degrees))
-    power, degrees = (own[some[:, 1]] - own[some[:, 0]] for own in (power, degrees))
-    chances = np.asarray(ratios.logsf(power / degrees / ground, degrees, others))
-    least = max(float(chances.min()), _RAREST)
-    return score_of_log(any_of(least, _INDEPENDENT)), 1.0
+    fast = slice(len(slow), None)
+    return power, degrees, float(power[fast].sum()) / int(degrees[fast].sum())
 
 
 @lru_cache(maxsize=4)

@@ -117,7 +117,9 @@ def shifts(layout: Layout, seen: Observation) -> dict[str, Shift]:
             along[axis][list(exposure.numbers)] = pixels
         right, down = AXES
         errors = own.errors[right], own.errors[down]
-        found[exposure.name] = Shift(along[right], along[down], *errors)
+        none = np.zeros(0)
+        waves = own.waves.get(right, none), own.waves.get(down, none)
+        found[exposure.name] = Shift(along[right], along[down], *errors, *waves, own.degrees)
     return found
 
 

@@ -184,8 +184,9 @@ def _of_frames(m: Mismatch, name: str, evidence: Evidence) -> Iterator[Picture]:
         draw = partial(series.draw, shown=_some(m, evidence.series))
         yield Picture("frame-means", words, (m,), series.SIZE_INCHES, draw)
     if name == MOTION and evidence.shifts:
-        own = partial(shifts.draw, shown=_some(m, evidence.shifts))
-        yield Picture("scene-motion", words, (m,), shifts.SIZE_INCHES, own)
+        some = _some(m, evidence.shifts)
+        own = partial(shifts.draw, shown=some)
+        yield Picture("scene-motion", words, (m,), shifts.size_inches(some), own)
     if name in OF_CODES and evidence.codes:
         key = _oddest(m, evidence.codes)
         draw = partial(codes.draw, histograms=evidence.codes[key])

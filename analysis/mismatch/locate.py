@@ -223,9 +223,10 @@ def _frequency(
         of_planes = mosaic and key.scope != MOSAIC and MOSAIC not in key.detail
         top = 0.25 if of_planes else 0.5
         return top * (name != "rows"), top * (name != "columns")
+    grows = "with the signal" in key.detail  # darks show something else
     kind = {
         "spectral_peak": f"spectrum, {key.detail}" if key.detail else "spectrum",
-        "row_spectrum_peak": _BANDS.get(key.detail, "rows"),
+        "row_spectrum_peak": _BANDS.get(key.detail, _BANDS["light"] if grows else "rows"),
         FIXED_WAVE: f"{FIXED_WAVE}, {key.scope}",
     }.get(statistic)
     peak = seen.peaks.get((key.channel, kind or ""))

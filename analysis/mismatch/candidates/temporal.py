@@ -16,6 +16,8 @@ from analysis.mismatch.candidates.candidate import Candidate, Proposal, measured
 from analysis.mismatch.clues import NO_LINE, Clues, alike
 from analysis.mismatch.framewalk import Walk, means_of, walk_of
 from analysis.mismatch.instance import Frequency, same_line
+from analysis.mismatch.layout import Layout
+from dsis.effects import Effect
 from dsis.effects.black_level_drift import BlackLevelDrift
 
 _ALTERNATING = {"checkerboard": ((0.5, 0.5),), "rows": ((0.0, 0.5),), "columns": ((0.5, 0.0),)}
@@ -130,6 +132,16 @@ def _line_flicker(clues: Clues) -> Sequence[Proposal]:
     )
     error = _PARABOLA * sqrt(6 / (excess * frames)) / (2 * pi) / clues.layout.seen_cycles(1.0)
     return [replace(one, errors={"cycles_per_frame": error}) for one in made]
+
+
+def _of_a_lamp(layout: Layout, effect: Effect) -> bool:
+    """Return whether bands are wider than a row: a lamp's, and not of every other row.
+
+    Two fields of a frame, or two amplifiers, have light that goes up and down from each row to the
+    next, and a lamp once in as many cases as there are rows.
+    """
+    cycles = layout.seen_cycles(float(effect.model_dump()["cycles_per_frame"]))
+    return cycles < (layout.rows - 1) / 2
 
 
 def _cycles(clues: Clues, channel: str, peak: Peak) -> float:
@@ -294,7 +306,9 @@ CANDIDATES = (
     _lines("column_noise", "column_variance"),
     Candidate("black_level_drift", ("frame_variance", "level"), _drift),
     Candidate("flicker", ("frame_variance", "level"), _flicker),
-    Candidate("line_flicker", ("row_spectrum_peak", "row_variance"), _line_flicker),
+    Candidate(
+        "line_flicker", ("row_spectrum_peak", "row_variance"), _line_flicker, sane=_of_a_lamp
+    ),
     Candidate("pink_noise", _SLOW, _pink),
     _patterns("periodic_noise"),
     _patterns("bistable_pattern"),

@@ -94,3 +94,16 @@ def test_light_above_white_has_its_noise_unless_a_well_is_full(
     lights |= {"dark-0": np.zeros((2, 2)), "dark-1": np.zeros((2, 2))}
     made = virtual_sensor(camera(*effects), held, lights, 1)
     assert float(made["flat-6"].fresh.var(0).mean()) == pytest.approx(noise, rel=0.15)
+
+
+@pytest.mark.parametrize("below", [0.0, 11.0, 60.0])
+def test_light_just_below_white_has_its_whole_noise(below: float) -> None:
+    """What neighbours take of it, say, leaves it below white with all of its noise."""
+    light = 4095.0 - 64.0 - below
+    held = held_of(filled())
+    lights: dict[str, Any] = {f"flat-{i}": np.full((2, 2), v) for i, v in enumerate(LEVELS)}
+    lights |= {"dark-0": np.zeros((2, 2)), "dark-1": np.zeros((2, 2))}
+    made = virtual_sensor(camera(), held, lights | {"flat-6": np.full((2, 2), light)}, 1)
+    noise = 0.5 * light + 20.0
+    assert float(made["flat-6"].fresh.var(0, ddof=1).mean()) == pytest.approx(noise, rel=0.03)
+    assert float(made["flat-6"].fresh.mean()) == pytest.approx(light, abs=1.0)

@@ -136,14 +136,12 @@ def virtual_sensor(camera: Camera, held: Held, signals: Signals, seed: int) -> d
 def _top(camera: Camera, held: Held, clean: Image) -> np.float32:
     """Return the highest value that is kept, DN above black: white, or above all of the light.
 
-    A full well keeps light that would be above white below it: beside it the base model's noise is
-    asked for.
+    A full well keeps light that would be above white below it, and neighbours of another colour
+    take some of what is just below white: beside them the base model's noise is asked for, whole.
     """
     white, brightest = np.float32(held.white_code - held.black_dn), clean.max(keepdims=True)
-    if brightest <= white:
-        return white
     variance = base_of(camera).segments.variance_dn2(brightest)
-    return np.float32((brightest + _ABOVE * np.sqrt(variance)).item())
+    return max(white, np.float32((brightest + _ABOVE * np.sqrt(variance)).item()))
 
 
 def sensor_draw(seed: int) -> Draw:

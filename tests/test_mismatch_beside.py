@@ -9,6 +9,7 @@ from analysis.mismatch.basefit import BaseFit
 from analysis.mismatch.beside import Beside, fitted_beside
 from analysis.mismatch.candidates import Proposal
 from analysis.mismatch.named import Named
+from analysis.mismatch.own import Own
 from analysis.mismatch.parameters import parameter_errors
 from analysis.mismatch.state import State
 from dsis.effects import Effect, registry
@@ -53,6 +54,13 @@ def test_a_slope_goes_with_the_lag_that_takes_noise_away(state: State) -> None:
     assert moves == pytest.approx(expected, rel=0.05)
     alone, both = _error(state, []), _error(state, [beside])
     assert both == pytest.approx(np.hypot(alone, moves), rel=1e-6)
+
+
+def test_a_size_of_the_user_that_was_wrong_counts_as_one_that_is_named(state: State) -> None:
+    own = Own(0, "fraction", 0.3, LAG, gain=50.0, errors={"fraction": ERROR})
+    assert fitted_beside(state, [], [own]) == fitted_beside(state, [_named(LAG, ERROR)])
+    (one,) = fitted_beside(state, [_named(WAVE, 0.1)], [own])  # the camera has no wave
+    assert one.after.pieces[0].slope != one.before.pieces[0].slope
 
 
 def test_a_size_that_is_known_well_adds_nothing(state: State) -> None:

@@ -312,8 +312,8 @@ def _finding(
     """Return the finding."""
     fits = camera, final.calibrated, final.setting.layout, final.replicates.fits
     errors = parameter_errors(*fits)
-    if errors and search.named:
-        errors = parameter_errors(*fits, fitted_beside(final, search.named))
+    if errors and (search.named or search.own):
+        errors = parameter_errors(*fits, fitted_beside(final, search.named, search.own))
     errors += wrong_sizes(search.own) + wrong_spread(search.unlike, final.camera)
     missing = [named for named in search.named if named.name not in search.changes]
     own = changes(base, final, missing, partial(search.without, final))

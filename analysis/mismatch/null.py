@@ -239,8 +239,8 @@ def _normal(keys: Sequence[Key], values: Array) -> NDArray[np.bool_]:
     """Return which numbers are scores that simulations, (recording, number), show as normal.
 
     The highest of bins that overlap is often less than that of as many apart, and nothing is said
-    of less: how far they lie above 0 counts, by the law of squares of which half are none (Self &
-    Liang 1987, "Asymptotic properties of maximum likelihood estimators", case 5).
+    of less: how far they lie above 0 counts, by the law of squares each of which is none in half of
+    all cases (Self & Liang 1987, "Asymptotic properties of maximum likelihood estimators", case 5).
     """
     scores = np.array([key.is_score for key in keys], bool)
     count = len(values)

@@ -248,7 +248,7 @@ def observing(
             if kept.images:
                 surfaces[place] = leaning(channel, frames)
         yield
-    local, shifts = _scenes(layout, frames_of, watch, found, whole.common, kept.made)
+    local, shifts = _scenes(layout, frames_of, watch, found, whole.common, kept)
     maps, images, fixed = maps_of(layout, sums, whole.waves)
     pooled, peaks = _pooled(sums, whole, places=kept.places)
     return Observation(
@@ -263,7 +263,7 @@ def observing(
         whole.memory.samples,
         lines,
         surfaces,
-        shifts if kept.images else {},
+        shifts,
         lattices,
         middles,
         gaps,
@@ -312,16 +312,19 @@ def _scenes(
     watch: Watcher | None,
     found: dict[Place, Mapping[str, Number]],
     shared: dict[str, Mapping[str, Number]],
-    made: frozenset[str],
+    kept: Kept,
 ) -> tuple[dict[Place, Level], dict[str, Shifts]]:
-    """Add what scenes show to what was found; return their variances by signal, and movements."""
+    """Add what scenes show to what was found; return their variances by signal, and movements.
+
+    Movements are kept with images.
+    """
     local: dict[Place, Level] = {}
     shifts: dict[str, Shifts] = {}
     for exposure in layout.pictures:
         scene = layout.scenes[exposure.name]
         motion = MotionSums(scene)
         seen = motion.watching(map(scene.steadied, frames_of(exposure.name)))
-        measured = measure(layout, seen, made=made)
+        measured = measure(layout, seen, made=kept.made)
         if watch is not None:
             watch(exposure.name, measured)
         frames, parts = len(exposure.numbers), scene.channels
@@ -330,7 +333,8 @@ def _scenes(
             alike = common(measured.channels, signals, frames, layout.sites)
             shared[exposure.name] = widened(alike, measured.channels, parts)
         shared[exposure.name] = {**shared.get(exposure.name, {}), **motion.numbers()}
-        shifts[exposure.name] = motion.shifts()
+        if kept.images:
+            shifts[exposure.name] = motion.shifts()
         for name, channel in measured.channels.items():
             own = parts[name]
             found[exposure.name, name] = local_scalars(channel, frames, own)
